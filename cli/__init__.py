@@ -1,0 +1,1 @@
+"""robotctl: the command line of the fleet."""

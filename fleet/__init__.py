@@ -1,0 +1,1 @@
+"""The central planner: a pure core, its variants, and the shell that runs them."""

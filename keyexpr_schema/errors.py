@@ -1,0 +1,31 @@
+"""Errors of the contract: what a caller of this package may have to handle."""
+
+from __future__ import annotations
+
+
+class SchemaError(Exception):
+    """Root of every error this package raises. The message is one sentence for a person."""
+
+
+class InvalidId(SchemaError):
+    """A name cannot be a chunk of a key expression."""
+
+
+class ForeignKey(SchemaError):
+    """A key expression does not belong to the key that was asked to parse it."""
+
+
+class UndecodablePayload(SchemaError):
+    """Bytes on a key are not a payload of the type that the key promises."""
+
+
+class Unreachable(SchemaError):
+    """No router answers at the configured endpoints."""
+
+
+class Unconfirmed(SchemaError):
+    """A write that must last was not read back from storage before its deadline."""
+
+
+class NoAnswer(SchemaError):
+    """A query ended without a reply: nobody serves the key, or the server was too slow."""

@@ -1,0 +1,71 @@
+"""Payloads about goals."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from keyexpr_schema.ids import Id
+from keyexpr_schema.key import Address, Payload
+from keyexpr_schema.world import Value
+
+
+class GoalAddress(Address, frozen=True):
+    """One goal."""
+
+    goal: str
+
+
+class Condition(Payload, frozen=True, kw_only=True):
+    """`relation(subject) = value` must hold, e.g. `at(cup_1) = hallway`.
+
+    A goal `at(object) = place` also holds when the object lies in the basket of a robot that is
+    at the place; it does not while a hand holds the object.
+    """
+
+    relation: Id
+    subject: Id
+    value: Value
+
+    def __str__(self) -> str:
+        return (
+            f"{self.relation}({self.subject}) = {'unknown' if self.value is None else self.value}"
+        )
+
+
+class Goal(Payload, frozen=True, kw_only=True):
+    """A sentence, and the facts that must hold when it is done.
+
+    With no `conditions` the planner reads them out of `text`.
+    """
+
+    goal: Id
+    text: str
+    conditions: tuple[Condition, ...] = ()
+    priority: int = 0
+    ordinal: int = 0
+    """Order in which goals were given; ties in priority go to the lower one."""
+
+
+class GoalState(str, Enum):
+    """Where a goal stands."""
+
+    WAITING = "waiting"
+    PLANNED = "planned"
+    RUNNING = "running"
+    REACHED = "reached"
+    FAILED = "failed"
+    REJECTED = "rejected"
+
+
+ENDED_GOALS = frozenset({GoalState.REACHED, GoalState.FAILED, GoalState.REJECTED})
+
+
+class GoalStatus(Payload, frozen=True, kw_only=True):
+    """What the planner says of a goal. `reason` is a sentence where it failed or was rejected."""
+
+    goal: Id
+    state: GoalState
+    conditions: tuple[Condition, ...] = ()
+    plan: Id | None = None
+    reason: str | None = None
+    time_s: float = 0.0

@@ -1,0 +1,163 @@
+"""`Key`: one type that builds, parses, encodes and decodes one family of key expressions."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import Enum
+from typing import Generic, TypeVar
+
+import msgspec
+
+from keyexpr_schema.errors import ForeignKey, InvalidId, UndecodablePayload
+from keyexpr_schema.ids import check_id
+
+SCHEMA_PREFIX = "robotfleet"
+
+
+class Payload(msgspec.Struct, frozen=True, kw_only=True):
+    """Base of every payload. JSON; a field added later has a default, so old bytes decode."""
+
+
+class Address(msgspec.Struct, frozen=True, order=True):
+    """Base of every address: the variable chunks of a key, in order.
+
+    Fields are `str` (an id) or `int` (a positive count). An invalid address cannot be made.
+
+    Raises:
+        InvalidId: on construction, if a field cannot be a chunk.
+    """
+
+    def __post_init__(self) -> None:
+        for name in self.__struct_fields__:
+            value = getattr(self, name)
+            if isinstance(value, str):
+                check_id(value, name)
+            elif not isinstance(value, int) or isinstance(value, bool) or value < 1:
+                raise InvalidId(f"{name} {value!r} is not valid: use a whole number from 1 up")
+
+
+A = TypeVar("A", bound=Address)
+P = TypeVar("P", bound=Payload)
+
+
+class Kept(Enum):
+    """What becomes of a value after it is put."""
+
+    STORED = "stored"
+    LATEST = "stored, latest matters"
+    STREAM = "not stored"
+    TOKEN = "liveliness token"
+    QUERY = "query and reply"
+
+
+@dataclass(frozen=True)
+class Key(Generic[A, P]):
+    """One row of the key-space.
+
+    `template` is a key expression whose `{field}` chunks are the fields of `address`.
+    `reply` is the payload type of the answer where `kept` is `QUERY`.
+    """
+
+    name: str
+    template: str
+    address: type[A]
+    payload: type[P]
+    writer: str
+    readers: str
+    kept: Kept
+    about: str
+    version: int = 1
+    reply: type[Payload] | None = None
+
+    def __post_init__(self) -> None:
+        fields = re.findall(r"\{(\w+)\}", self.template)
+        if tuple(fields) != self.address.__struct_fields__:
+            raise TypeError(
+                f"{self.name}: template fields {fields} are not the fields of {self.address.__name__}"
+            )
+
+    @property
+    def schema(self) -> str:
+        """The schema suffix of the Zenoh encoding, e.g. `robotfleet/goal_spec/1`."""
+        return f"{SCHEMA_PREFIX}/{self.name}/{self.version}"
+
+    @property
+    def stored(self) -> bool:
+        """Whether the store keeps the value."""
+        return self.kept in (Kept.STORED, Kept.LATEST)
+
+    def build(self, address: A) -> str:
+        """The key expression of `address`, canonical and without wildcards."""
+        return self.template.format(
+            **{name: getattr(address, name) for name in address.__struct_fields__}
+        )
+
+    def pattern(self, **fixed: str | int) -> str:
+        """The key expression that matches every address whose named fields have these values.
+
+        Raises:
+            InvalidId: a value cannot be a chunk.
+            TypeError: a name is not a field of the address.
+        """
+        unknown = set(fixed) - set(self.address.__struct_fields__)
+        if unknown:
+            raise TypeError(f"{self.name} has no field {', '.join(sorted(unknown))}")
+        chunks = {name: "*" for name in self.address.__struct_fields__}
+        for name, value in fixed.items():
+            chunks[name] = check_id(str(value), name)
+        return self.template.format(**chunks)
+
+    def parse(self, keyexpr: str) -> A:
+        """The address a key expression was built from.
+
+        Raises:
+            ForeignKey: the key expression is not one of this key.
+        """
+        own, other = self.template.split("/"), keyexpr.split("/")
+        values: list[str | int] = []
+        types = self.address.__annotations__
+        try:
+            if len(own) != len(other):
+                raise ValueError
+            for mine, theirs in zip(own, other, strict=True):
+                if not mine.startswith("{"):
+                    if mine != theirs:
+                        raise ValueError
+                elif types[mine[1:-1]] in (int, "int"):
+                    if not re.fullmatch(r"[1-9][0-9]{0,17}", theirs, re.ASCII):
+                        raise ValueError
+                    values.append(int(theirs))
+                else:
+                    values.append(theirs)
+            return self.address(*values)
+        except (ValueError, InvalidId):
+            raise ForeignKey(
+                f"{keyexpr!r} is not a {self.name} key: those look like {self.template!r}"
+            ) from None
+
+    def encode(self, payload: P) -> bytes:
+        """JSON bytes of `payload`."""
+        return msgspec.json.encode(payload)
+
+    def decode(self, data: bytes, keyexpr: str | None = None) -> P:
+        """The payload in `data`.
+
+        Raises:
+            UndecodablePayload: it is not one; the message names the field and what it should be.
+        """
+        return decode_payload(self.payload, data, keyexpr or self.template)
+
+
+def decode_payload(kind: type[P], data: bytes, where: str) -> P:
+    """Decode JSON `data` found at `where` as `kind`.
+
+    Raises:
+        UndecodablePayload: it is not one; the message names the field and what it should be.
+    """
+    try:
+        return msgspec.json.decode(data, type=kind)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise UndecodablePayload(
+            f"the value at {where} is not a {kind.__name__}: {error}"
+        ) from None

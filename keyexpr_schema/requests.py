@@ -1,0 +1,69 @@
+"""Payloads of requests to the planner, and its answers."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from keyexpr_schema.ids import Id
+from keyexpr_schema.key import Address, Payload
+from keyexpr_schema.plans import Violation
+
+
+class RequestAddress(Address, frozen=True):
+    """One request."""
+
+    request: str
+
+
+class PlanRequest(Payload, frozen=True, kw_only=True):
+    """Make a plan for these goals (none named: every goal that waits)."""
+
+    request: Id
+    plan: Id | None = None
+    goals: tuple[Id, ...] = ()
+    strategy: str = "big-dag"
+    planner: str = "symbolic"
+    allocator: str = "milp"
+    start: bool = True
+
+
+class ReplanRequest(Payload, frozen=True, kw_only=True):
+    """Plan again from what is known now."""
+
+    request: Id
+    plan: Id
+    reason: str
+
+
+class Control(str, Enum):
+    """What can be asked of a plan."""
+
+    START = "start"
+    CANCEL = "cancel"
+    DELETE = "delete"
+    ADD_TASK = "add-task"
+
+
+class ControlRequest(Payload, frozen=True, kw_only=True):
+    """Start, cancel or delete a plan; or add a task to one (`skill`, `args`, `after`).
+
+    An added task without `robot` is allocated like any other.
+    """
+
+    request: Id
+    control: Control
+    plan: Id
+    skill: Id | None = None
+    args: dict[str, str] = {}
+    after: tuple[Id, ...] = ()
+    robot: Id | None = None
+
+
+class Answer(Payload, frozen=True, kw_only=True):
+    """The planner's answer to a request: final, a sentence, and the plan it is about."""
+
+    request: Id
+    accepted: bool
+    sentence: str
+    plan: Id | None = None
+    violations: tuple[Violation, ...] = ()

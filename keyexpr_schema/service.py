@@ -1,0 +1,72 @@
+"""Payloads about the running system itself."""
+
+from __future__ import annotations
+
+from keyexpr_schema.ids import Id
+from keyexpr_schema.key import Address, Payload
+
+
+class PlannerAddress(Address, frozen=True):
+    """The central planner; there is one to a realm."""
+
+
+class PlannerAliveAddress(Address, frozen=True):
+    """One run of the planner."""
+
+    incarnation: str
+
+
+class PlannerStatus(Payload, frozen=True, kw_only=True):
+    """Who plans in this realm. A planner that sees a higher `epoch` than its own stops."""
+
+    epoch: int
+    incarnation: Id
+    planners: tuple[str, ...] = ()
+    strategies: tuple[str, ...] = ()
+    allocators: tuple[str, ...] = ()
+    skills: tuple[str, ...] = ()
+
+
+class RejectAddress(Address, frozen=True):
+    """A payload that `component` could not decode; `digest` names the key it was on."""
+
+    component: str
+    digest: str
+
+
+class Reject(Payload, frozen=True, kw_only=True):
+    """A value that was put on a key and is not what the key promises."""
+
+    component: Id
+    keyexpr: str
+    reason: str
+    count: int = 1
+
+
+class StoreAddress(Address, frozen=True):
+    """The store of the realm."""
+
+
+class StoreQuery(Payload, frozen=True, kw_only=True):
+    """Asks the store for its journal: changes after `after`, at most `limit` of them."""
+
+    after: int = 0
+    limit: int = 1000
+
+
+class JournalEntry(Payload, frozen=True, kw_only=True):
+    """One applied change: when the store applied it (Unix seconds) and what it was."""
+
+    number: int
+    wall_time_s: float
+    keyexpr: str
+    deleted: bool
+    timestamp: str
+    value: str | None
+
+
+class StoreJournal(Payload, frozen=True, kw_only=True):
+    """A piece of the store's journal. `last` is the number of the newest entry there is."""
+
+    entries: tuple[JournalEntry, ...]
+    last: int

@@ -1,0 +1,106 @@
+"""Payloads about the world: facts, statements, places, objects.
+
+Lengths are metres in the world frame (x east, y north, z up), angles radians.
+"""
+
+from __future__ import annotations
+
+from keyexpr_schema.ids import Id
+from keyexpr_schema.key import Address, Payload
+
+Value = str | bool | int | float | None
+"""The value of a fact. `None` is *unknown*: somebody says that nobody knows."""
+
+NOTHING = "nothing"
+"""The value of `holding` for an empty hand."""
+
+
+class FactAddress(Address, frozen=True):
+    """One state variable, written `relation(subject)`."""
+
+    subject: str
+    relation: str
+
+
+class StatementAddress(Address, frozen=True):
+    """One statement."""
+
+    statement: str
+
+
+class PlaceAddress(Address, frozen=True):
+    """One place."""
+
+    place: str
+
+
+class ObjectAddress(Address, frozen=True):
+    """One object."""
+
+    object: str
+
+
+class Fact(Payload, frozen=True, kw_only=True):
+    """One state variable and its value, with who said so and when.
+
+    `at(x)` is a place; for a thing that a robot has in its hand or basket it is that robot.
+    `holding(robot)` is an object or `nothing`.
+    `time_s` is seconds on the fleet's clock (simulated time in a simulation).
+    """
+
+    subject: Id
+    relation: Id
+    value: Value
+    source: str
+    time_s: float = 0.0
+
+
+class Statement(Payload, frozen=True, kw_only=True):
+    """A sentence about the world, kept as it was written."""
+
+    statement: Id
+    text: str
+    source: str = "person"
+
+
+class Surface(Payload, frozen=True, kw_only=True):
+    """A flat, level area on which things can be put down; axis-aligned in its own yaw."""
+
+    surface: Id
+    x_m: float
+    y_m: float
+    z_m: float
+    yaw_rad: float
+    length_m: float
+    width_m: float
+
+
+class Place(Payload, frozen=True, kw_only=True):
+    """A region of the floor with a name.
+
+    `region_m` is a list of axis-aligned rectangles `(x_min, y_min, x_max, y_max)`.
+    `travel_m` gives the driven distance from here to other places.
+    """
+
+    place: Id
+    label: str
+    aliases: tuple[str, ...] = ()
+    region_m: tuple[tuple[float, float, float, float], ...] = ()
+    surfaces: tuple[Surface, ...] = ()
+    travel_m: dict[str, float] = {}
+
+    def contains(self, x_m: float, y_m: float) -> bool:
+        """Whether the point lies in the region, borders included."""
+        return any(a <= x_m <= c and b <= y_m <= d for a, b, c, d in self.region_m)
+
+
+class Object(Payload, frozen=True, kw_only=True):
+    """A thing that can be spoken about. `ordinal` counts within a kind: cup 1 is the first cup."""
+
+    object: Id
+    kind: Id
+    label: str
+    ordinal: int = 1
+    aliases: tuple[str, ...] = ()
+    mass_kg: float = 0.0
+    movable: bool = True

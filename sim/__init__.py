@@ -1,0 +1,1 @@
+"""The simulated world: physics, robot models, their drivers, and ground truth."""

@@ -1,0 +1,1 @@
+"""Robot workers: skills, their journal, and the runtime that carries out orders."""

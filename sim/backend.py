@@ -1,0 +1,150 @@
+"""`Backend`: one shared simulated world, whatever carries it out."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+from keyexpr_schema.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
+from keyexpr_schema.simulation import ContactCount, Frame, Scene, Truth
+from sim.world_model import WorldFile
+
+NEEDS: dict[MotionKind, tuple[str, ...]] = {
+    MotionKind.GO_TO: ("place",),
+    MotionKind.LOOK: (),
+    MotionKind.APPROACH: ("point_m",),
+    MotionKind.GRASP: ("object", "point_m"),
+    MotionKind.RELEASE: ("point_m",),
+    MotionKind.RELEASE_IN_BASKET: ("robot",),
+    MotionKind.STOW: (),
+}
+"""The fields of a motion that its kind cannot do without."""
+
+
+class Backend(ABC):
+    """One shared simulated world. Synchronous, single-threaded, knows no clock but its own.
+
+    The public methods check what they are told and call the abstract ones. What a robot is told
+    that it cannot do becomes a failed outcome with a sentence, never an exception.
+    """
+
+    time_s: float
+    """Simulated seconds since the start."""
+
+    def __init__(self, world: WorldFile, robots: tuple[str, ...]) -> None:
+        self.world = world
+        self.robots = robots
+        self.time_s = 0.0
+        self._refused: dict[str, str] = {}
+
+    def begin(self, robot: str, motion: Motion) -> None:
+        """Start `motion`; what the robot was doing is stopped first.
+
+        Raises:
+            KeyError: there is no such robot (see `robots`).
+        """
+        self._check_robot(robot)
+        self._stop(robot)
+        reason = self._objection(robot, motion)
+        if reason is None:
+            self._refused.pop(robot, None)
+            self._begin(robot, motion)
+        else:
+            self._refused[robot] = reason
+
+    def stop(self, robot: str) -> None:
+        """Halt the robot. The outcome of what it was doing, if it still was, becomes `stopped`.
+
+        Raises:
+            KeyError: there is no such robot (see `robots`).
+        """
+        self._check_robot(robot)
+        if robot not in self._refused:
+            self._stop(robot)
+
+    def advance(self) -> None:
+        """Let the world go on for one step: a control period, or to the next event."""
+        self._advance()
+
+    def outcome(self, robot: str) -> MotionOutcome | None:
+        """How the robot's latest motion stands or ended; `None` if it never moved.
+
+        Raises:
+            KeyError: there is no such robot (see `robots`).
+        """
+        self._check_robot(robot)
+        if robot in self._refused:
+            return MotionOutcome(
+                state=MotionState.FAILED, senses=self._senses(robot), reason=self._refused[robot]
+            )
+        return self._outcome(robot)
+
+    def senses(self, robot: str) -> Senses:
+        """What the robot knows of itself.
+
+        Raises:
+            KeyError: there is no such robot (see `robots`).
+        """
+        self._check_robot(robot)
+        return self._senses(robot)
+
+    @abstractmethod
+    def truths(self) -> tuple[Truth, ...]:
+        """Where every object really is, in the order of the world file."""
+
+    @abstractmethod
+    def contacts(self) -> ContactCount:
+        """How often robots touched each other or walls since the start."""
+
+    @abstractmethod
+    def scene(self) -> Scene:
+        """The shapes of everything."""
+
+    @abstractmethod
+    def frame(self) -> Frame:
+        """Where everything that moves is now."""
+
+    @abstractmethod
+    def _begin(self, robot: str, motion: Motion) -> None:
+        """As `begin`, with a motion that has what its kind needs and names only what exists."""
+
+    @abstractmethod
+    def _stop(self, robot: str) -> None:
+        """As `stop`; a robot that does nothing stays as it is."""
+
+    @abstractmethod
+    def _advance(self) -> None: ...
+
+    @abstractmethod
+    def _outcome(self, robot: str) -> MotionOutcome | None: ...
+
+    @abstractmethod
+    def _senses(self, robot: str) -> Senses: ...
+
+    def _check_robot(self, robot: str) -> None:
+        if robot not in self.robots:
+            raise KeyError(f"there is no robot {robot!r}; there are {', '.join(self.robots)}")
+
+    def _objection(self, robot: str, motion: Motion) -> str | None:
+        """Why the motion makes no sense in this world, or `None`."""
+        kind = motion.kind.value
+        for field in NEEDS[motion.kind]:
+            if getattr(motion, field) is None:
+                return f"{kind} needs `{field}`, which says {_ABOUT[field]}"
+        places, objects = self.world.place_entries, self.world.object_entries
+        if motion.place is not None and motion.place not in places:
+            return f"there is no place {motion.place!r}; there are {', '.join(places)}"
+        if motion.object is not None and motion.object not in objects:
+            return f"there is no object {motion.object!r}; there are {', '.join(objects)}"
+        if motion.robot is not None and motion.robot not in self.robots:
+            return f"there is no robot {motion.robot!r}; there are {', '.join(self.robots)}"
+        if motion.kind is MotionKind.RELEASE_IN_BASKET and motion.robot == robot:
+            return "a robot cannot let go into its own basket; name another robot"
+        return None
+
+
+_ABOUT = {
+    "place": "where to drive",
+    "point_m": "where, as [x, y, z] in metres",
+    "object": "which object",
+    "robot": "into whose basket",
+}

@@ -103,7 +103,7 @@ class Key(Generic[A, P]):
         unknown = set(fixed) - set(self.address.__struct_fields__)
         if unknown:
             raise TypeError(f"{self.name} has no field {', '.join(sorted(unknown))}")
-        chunks = {name: "*" for name in self.address.__struct_fields__}
+        chunks = dict.fromkeys(self.address.__struct_fields__, "*")
         for name, value in fixed.items():
             chunks[name] = check_id(str(value), name)
         return self.template.format(**chunks)

@@ -36,6 +36,7 @@ class Plan(Payload, frozen=True, kw_only=True):
 
     `revision` counts replans of the same plan from 1. `made_by` names planner and strategy.
     `conditions` are the facts that hold when the plan is done, goal by goal.
+    `pins` maps actors to the robot that they must be; every other actor is free to allocate.
     """
 
     plan: Id
@@ -46,6 +47,7 @@ class Plan(Payload, frozen=True, kw_only=True):
     strategy: str = "big-dag"
     made_by: str = "symbolic"
     allocator: str = "milp"
+    pins: dict[str, Id] = {}
     autostart: bool = True
 
 

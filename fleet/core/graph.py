@@ -1,0 +1,80 @@
+"""Task graphs: order, reachability, cycles. Reachability as bit sets in Python integers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from heapq import heapify, heappop, heappush
+
+
+class Cycle(Exception):
+    """The graph has a cycle; `tasks` are those on it or behind it."""
+
+    def __init__(self, tasks: Sequence[str]) -> None:
+        super().__init__(f"cycle among {', '.join(tasks)}")
+        self.tasks = tuple(tasks)
+
+
+class TaskGraph:
+    """A DAG of task names. Edges point from a task to those that come after it.
+
+    Raises:
+        Cycle: on construction, if there is one.
+        KeyError: on construction, if an edge names a task that does not exist.
+    """
+
+    def __init__(self, after: Mapping[str, Iterable[str]]) -> None:
+        """`after` maps every task to the tasks that it waits for."""
+        self.predecessors: dict[str, frozenset[str]] = {
+            task: frozenset(befores) for task, befores in after.items()
+        }
+        self.successors: dict[str, set[str]] = {task: set() for task in self.predecessors}
+        for task, befores in self.predecessors.items():
+            for before in befores:
+                self.successors[before].add(task)
+        self.order = self._topological()
+        self._index = {task: number for number, task in enumerate(self.order)}
+        self._ancestors = [0] * len(self.order)
+        for number, task in enumerate(self.order):
+            bits = 0
+            for before in self.predecessors[task]:
+                index = self._index[before]
+                bits |= self._ancestors[index] | 1 << index
+            self._ancestors[number] = bits
+
+    def _topological(self) -> tuple[str, ...]:
+        rank = {task: number for number, task in enumerate(self.predecessors)}
+        missing = {task: len(befores) for task, befores in self.predecessors.items()}
+        ready = [rank[task] for task, count in missing.items() if count == 0]
+        names = list(self.predecessors)
+        heapify(ready)
+        order: list[str] = []
+        while ready:
+            task = names[heappop(ready)]
+            order.append(task)
+            for later in self.successors[task]:
+                missing[later] -= 1
+                if missing[later] == 0:
+                    heappush(ready, rank[later])
+        if len(order) < len(names):
+            done = set(order)
+            raise Cycle([task for task in names if task not in done])
+        return tuple(order)
+
+    def precedes(self, first: str, second: str) -> bool:
+        """Whether `first` ends before `second` starts in every order the graph allows."""
+        return bool(self._ancestors[self._index[second]] >> self._index[first] & 1)
+
+    def ordered(self, one: str, other: str) -> bool:
+        """Whether the graph fixes which of two tasks comes first."""
+        return self.precedes(one, other) or self.precedes(other, one)
+
+    def reduced(self) -> dict[str, tuple[str, ...]]:
+        """The fewest edges with the same meaning: task to the tasks it waits for directly."""
+        result: dict[str, tuple[str, ...]] = {}
+        for task in self.predecessors:
+            covered = 0
+            for before in self.predecessors[task]:
+                covered |= self._ancestors[self._index[before]]
+            direct = [b for b in self.predecessors[task] if not covered >> self._index[b] & 1]
+            result[task] = tuple(sorted(direct, key=self._index.__getitem__))
+        return result

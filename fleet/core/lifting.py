@@ -1,0 +1,85 @@
+"""From a sequence of actions of certain robots to a DAG of tasks of actors."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fleet.core.graph import TaskGraph
+from fleet.core.skills import Action, Variable
+from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.plans import Task
+
+
+@dataclass(frozen=True)
+class Strand:
+    """Consecutive actions for one goal; each robot in it becomes an actor of its own."""
+
+    goal: str
+    actions: tuple[Action, ...]
+
+
+def tasks_from(strands: Sequence[Strand], first_task: int = 1) -> tuple[Task, ...]:
+    """Tasks that do what the strands do, one after the other, with only the order that matters.
+
+    A task waits for the last one before it that wrote what it reads, for those that read what it
+    overwrites, and for its robots' earlier tasks in the same strand (deordering by causal links).
+    """
+    rows: list[tuple[str, str, Action]] = []
+    actor_count = 0
+    for strand in strands:
+        actors: dict[str, str] = {}
+        for action in strand.actions:
+            args = dict(action.args)
+            for parameter in action.skill.robot_parameters:
+                robot = args[parameter]
+                if robot not in actors:
+                    actor_count += 1
+                    actors[robot] = (
+                        f"a{first_task}-{actor_count}" if first_task > 1 else (f"a{actor_count}")
+                    )
+                args[parameter] = ACTOR_PREFIX + actors[robot]
+            lifted = action.skill.ground(args)
+            rows.append((f"t{first_task + len(rows)}", strand.goal, lifted))
+    after = _dependencies([(name, action) for name, _, action in rows])
+    reduced = TaskGraph(after).reduced()
+    return tuple(
+        Task(
+            task=name,
+            skill=action.skill.name,
+            args=dict(action.args),
+            actor=action.actor.removeprefix(ACTOR_PREFIX),
+            after=reduced[name],
+            goal=goal,
+            duration_s=action.skill.duration_s,
+        )
+        for name, goal, action in rows
+    )
+
+
+def _dependencies(rows: Sequence[tuple[str, Action]]) -> dict[str, set[str]]:
+    after: dict[str, set[str]] = {}
+    writer: dict[Variable, str] = {}
+    readers: dict[Variable, set[str]] = defaultdict(set)
+    last: dict[str, str] = {}
+    for name, action in rows:
+        befores: set[str] = set()
+        for literal in action.before:
+            if literal.variable in writer:
+                befores.add(writer[literal.variable])
+        for literal in action.after:
+            befores |= readers[literal.variable]
+            if literal.variable in writer:
+                befores.add(writer[literal.variable])
+        for robot in action.participants:
+            if robot in last:
+                befores.add(last[robot])
+            last[robot] = name
+        for literal in action.before:
+            readers[literal.variable].add(name)
+        for literal in action.after:
+            writer[literal.variable] = name
+            readers[literal.variable] = set()
+        after[name] = befores - {name}
+    return after

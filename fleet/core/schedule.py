@@ -1,0 +1,189 @@
+"""When tasks would run: durations, the order of actors on a robot, and the makespan of a plan."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+
+from fleet.core.checker import CheckedPlan
+from fleet.core.graph import Cycle, TaskGraph
+from fleet.core.skills import Action, Variable
+from fleet.core.world_model import WorldModel
+from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.plans import Plan
+from keyexpr_schema.world import Value
+
+EXHAUSTIVE_GROUPS = 5
+"""Up to this many groups every order is tried (120); beyond, neighbours are swapped."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Predicted start and end of every task [s], with the order of actors on each robot.
+
+    `extra_after` are the dependencies that follow from that order.
+    """
+
+    start_s: Mapping[str, float]
+    end_s: Mapping[str, float]
+    sequence: Mapping[str, tuple[str, ...]]
+    extra_after: Mapping[str, tuple[str, ...]]
+
+    @property
+    def makespan_s(self) -> float:
+        """When the last task ends."""
+        return max(self.end_s.values(), default=0.0)
+
+    @property
+    def work_s(self) -> float:
+        """The sum of all tasks' durations."""
+        return sum(end - self.start_s[task] for task, end in self.end_s.items())
+
+
+def predicted_duration_s(action: Action, origin: Value, robot: str, world: WorldModel) -> float:
+    """Seconds that the action takes, started by `robot` from place `origin` (or from anywhere)."""
+    skill = action.skill
+    travel_s = (
+        0.0
+        if skill.travel_to is None
+        else world.travel_s(robot, origin, action.args[skill.travel_to])
+    )
+    return skill.duration_s + travel_s
+
+
+def actors_of(plan: Plan) -> tuple[str, ...]:
+    """The plan's actors in the order of their first tasks."""
+    return tuple(dict.fromkeys(task.actor for task in plan.tasks))
+
+
+def actor_groups(plan: Plan) -> tuple[tuple[str, ...], ...]:
+    """Actors that depend on each other, together; groups in the order of their first tasks."""
+    leader = {actor: actor for actor in actors_of(plan)}
+
+    def find(actor: str) -> str:
+        while leader[actor] != actor:
+            leader[actor] = leader[leader[actor]]
+            actor = leader[actor]
+        return actor
+
+    owner = {task.task: task.actor for task in plan.tasks}
+    for task in plan.tasks:
+        others = [
+            value.removeprefix(ACTOR_PREFIX)
+            for value in task.args.values()
+            if value.startswith(ACTOR_PREFIX)
+        ]
+        for other in (*others, *(owner[before] for before in task.after)):
+            leader[find(other)] = find(task.actor)
+    groups: dict[str, list[str]] = defaultdict(list)
+    for actor in leader:
+        groups[find(actor)].append(actor)
+    return tuple(tuple(members) for members in groups.values())
+
+
+def best_schedule(
+    plan: Plan, checked: CheckedPlan, allocation: Mapping[str, str], world: WorldModel
+) -> Schedule | None:
+    """The shortest schedule over orders of groups of actors, or `None` if every order deadlocks.
+
+    One robot does its actors one after the other. Robots take groups in the same order, so they
+    never wait for each other in a circle.
+    """
+    groups = actor_groups(plan)
+    if len(groups) <= EXHAUSTIVE_GROUPS:
+        tried = (
+            schedule(plan, checked, allocation, world, order) for order in permutations(groups)
+        )
+        return min((found for found in tried if found is not None), key=_quality, default=None)
+    return _swap_neighbours(plan, checked, allocation, world, groups)
+
+
+def _quality(found: Schedule) -> tuple[float, float]:
+    return round(found.makespan_s, 3), sum(found.end_s.values())
+
+
+def _swap_neighbours(
+    plan: Plan,
+    checked: CheckedPlan,
+    allocation: Mapping[str, str],
+    world: WorldModel,
+    groups: Sequence[tuple[str, ...]],
+) -> Schedule | None:
+    order = list(groups)
+    best = schedule(plan, checked, allocation, world, order)
+    improved = True
+    while improved:
+        improved = False
+        for left in range(len(order) - 1):
+            order[left], order[left + 1] = order[left + 1], order[left]
+            found = schedule(plan, checked, allocation, world, order)
+            if found is not None and (best is None or _quality(found) < _quality(best)):
+                best, improved = found, True
+            else:
+                order[left], order[left + 1] = order[left + 1], order[left]
+    return best
+
+
+def schedule(
+    plan: Plan,
+    checked: CheckedPlan,
+    allocation: Mapping[str, str],
+    world: WorldModel,
+    groups: Iterable[tuple[str, ...]],
+) -> Schedule | None:
+    """The earliest schedule if robots take groups of actors in this order; `None` on deadlock."""
+    graph = checked.graph
+    if graph is None:
+        return None
+    tasks_of: dict[str, list[str]] = defaultdict(list)
+    for task in graph.order:
+        for participant in checked.actions[task].participants:
+            tasks_of[participant.removeprefix(ACTOR_PREFIX)].append(task)
+    sequence: dict[str, list[str]] = defaultdict(list)
+    extra: dict[str, set[str]] = defaultdict(set)
+    for group in groups:
+        for actor in sorted(group, key=lambda name: graph.order.index(tasks_of[name][0])):
+            robot = allocation[actor]
+            if sequence[robot]:
+                extra[tasks_of[actor][0]].add(tasks_of[sequence[robot][-1]][-1])
+            sequence[robot].append(actor)
+    try:
+        whole = TaskGraph(
+            {task: graph.predecessors[task] | extra.get(task, set()) for task in graph.order}
+        )
+    except Cycle:
+        return None
+    start_s, end_s = _earliest(whole, checked.actions, allocation, world)
+    return Schedule(
+        start_s,
+        end_s,
+        {robot: tuple(actors) for robot, actors in sequence.items()},
+        {task: tuple(sorted(befores)) for task, befores in extra.items()},
+    )
+
+
+def _earliest(
+    graph: TaskGraph,
+    actions: Mapping[str, Action],
+    allocation: Mapping[str, str],
+    world: WorldModel,
+) -> tuple[dict[str, float], dict[str, float]]:
+    where: dict[str, Value] = {robot: world.value("at", robot) for robot in world.robots}
+    start_s: dict[str, float] = {}
+    end_s: dict[str, float] = {}
+    for task in graph.order:
+        action = actions[task]
+        robot = _robot(action.actor, allocation)
+        start = max((end_s[before] for before in graph.predecessors[task]), default=0.0)
+        start_s[task] = start
+        end_s[task] = start + predicted_duration_s(action, where.get(robot), robot, world)
+        for variable, value in action.after:
+            if variable == Variable("at", action.actor):
+                where[robot] = value
+    return start_s, end_s
+
+
+def _robot(name: str, allocation: Mapping[str, str]) -> str:
+    return allocation[name.removeprefix(ACTOR_PREFIX)] if name.startswith(ACTOR_PREFIX) else name

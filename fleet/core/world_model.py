@@ -1,0 +1,140 @@
+"""What the planner believes of the world at one moment: a frozen snapshot, and questions to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from fleet.core.skills import Action, SkillModel, Variable
+from keyexpr_schema.goals import Condition
+from keyexpr_schema.robots import RobotSpec
+from keyexpr_schema.world import NOTHING, Fact, Object, Place, Value
+
+TRAVEL_SPEED_M_S = 0.5
+"""Speed assumed for a robot whose spec gives none, m/s; a slow walk indoors."""
+UNKNOWN_TRAVEL_M = 5.0
+"""Distance assumed where the map has none, m; about one room to the next."""
+
+
+@dataclass(frozen=True)
+class WorldModel:
+    """Places, objects and robots that exist, and the facts believed of them.
+
+    `available` names the robots whose workers are connected now; only those get work.
+    """
+
+    skills: Mapping[str, SkillModel]
+    places: Mapping[str, Place] = field(default_factory=dict)
+    objects: Mapping[str, Object] = field(default_factory=dict)
+    robots: Mapping[str, RobotSpec] = field(default_factory=dict)
+    available: frozenset[str] = frozenset()
+    facts: Mapping[Variable, Value] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        skills: Mapping[str, SkillModel],
+        places: Iterable[Place],
+        objects: Iterable[Object],
+        robots: Iterable[RobotSpec],
+        facts: Iterable[Fact],
+        available: Iterable[str] | None = None,
+    ) -> WorldModel:
+        """A model from payloads; without `available` every robot is taken to be connected."""
+        specs = {spec.robot: spec for spec in robots}
+        return cls(
+            skills=skills,
+            places={place.place: place for place in places},
+            objects={thing.object: thing for thing in objects},
+            robots=specs,
+            available=frozenset(specs if available is None else available),
+            facts={Variable(fact.relation, fact.subject): fact.value for fact in facts},
+        )
+
+    def value(self, relation: str, subject: str) -> Value:
+        """The believed value of a variable; `None` is unknown."""
+        return self.facts.get(Variable(relation, subject))
+
+    def kind_of(self, name: str) -> str | None:
+        """`robot`, `object` or `place`, or `None` for a name that stands for nothing."""
+        if name in self.robots:
+            return "robot"
+        if name in self.objects:
+            return "object"
+        return "place" if name in self.places else None
+
+    @cached_property
+    def team(self) -> tuple[str, ...]:
+        """The robots that can get work now, in a fixed order."""
+        return tuple(sorted(self.available & self.robots.keys()))
+
+    def capability(self, robot: str, name: str) -> float | None:
+        """The parameter of a robot's capability, or `None` if it lacks it."""
+        return self.robots[robot].capabilities.get(name)
+
+    def lacks(self, robot: str, action: Action, parameter: str) -> str | None:
+        """Why `robot` cannot stand for a robot `parameter` of the action, or `None` if it can."""
+        spec = self.robots[robot]
+        skill = action.skill
+        if parameter == skill.actor_parameter and skill.name not in spec.skills:
+            return f"{robot} does not have the skill {skill.name}"
+        for need in skill.needs.get(parameter, ()):
+            has = spec.capabilities.get(need.capability)
+            if has is None:
+                return f"{robot} has no {need.capability}"
+            if need.at_least_mass_of is not None:
+                thing = self.objects.get(action.args[need.at_least_mass_of])
+                if thing is not None and thing.mass_kg > has:
+                    return (
+                        f"{thing.object} weighs {thing.mass_kg:g} kg, "
+                        f"{robot}'s {need.capability} takes {has:g} kg"
+                    )
+        return None
+
+    def travel_s(self, robot: str, origin: Value, target: str) -> float:
+        """Seconds that a robot takes from one place to another; from anywhere if unknown."""
+        speed = self.capability(robot, "drive") or TRAVEL_SPEED_M_S
+        place = self.places.get(target)
+        if place is None or origin == target:
+            return 0.0
+        if isinstance(origin, str) and origin in self.places:
+            metres = self.places[origin].travel_m.get(target, UNKNOWN_TRAVEL_M)
+        else:
+            known = place.travel_m.values()
+            metres = sum(known) / len(known) if known else UNKNOWN_TRAVEL_M
+        return metres / speed
+
+    def holds(self, condition: Condition) -> bool:
+        """Whether the facts say that the condition holds."""
+        return condition_holds(self.facts, condition)
+
+    def with_facts(self, facts: Mapping[Variable, Value]) -> WorldModel:
+        """The same world with some facts changed."""
+        return WorldModel(
+            self.skills,
+            self.places,
+            self.objects,
+            self.robots,
+            self.available,
+            {**self.facts, **facts},
+        )
+
+
+def condition_holds(facts: Mapping[Variable, Value], condition: Condition) -> bool:
+    """Whether a condition holds in `facts`.
+
+    `at(object) = place` also holds while the object lies in the basket of a robot that is there:
+    it is at a robot, and that robot's hand does not hold it.
+    """
+    value = facts.get(Variable(condition.relation, condition.subject))
+    if value is None:
+        return False
+    if value == condition.value:
+        return True
+    return (
+        condition.relation == "at"
+        and isinstance(value, str)
+        and facts.get(Variable("at", value)) == condition.value
+        and facts.get(Variable("holding", value), NOTHING) != condition.subject
+    )

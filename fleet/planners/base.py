@@ -1,0 +1,64 @@
+"""The planner interface: goals and a world in, a checked plan out."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+
+from fleet.core.checker import check_plan
+from fleet.core.world_model import WorldModel
+from keyexpr_schema.goals import Goal
+from keyexpr_schema.plans import Plan, Violation
+
+
+@dataclass(frozen=True)
+class PlanningProblem:
+    """Goals with their conditions, and the world to reach them in.
+
+    `first_task` is the number of the first new task, so that task names stay unique over
+    revisions of a plan.
+    """
+
+    plan: str
+    goals: tuple[Goal, ...]
+    world: WorldModel
+    revision: int = 1
+    strategy: str = "big-dag"
+    allocator: str = "milp"
+    first_task: int = 1
+
+
+@dataclass(frozen=True)
+class NoPlan:
+    """Why there is no plan: a sentence, and violations where a plan was found wanting."""
+
+    reason: str
+    violations: tuple[Violation, ...] = field(default=())
+
+
+class Planner(ABC):
+    """Makes plans. Subclasses solve; this class has every answer checked."""
+
+    name: str
+    strategies: tuple[str, ...]
+
+    def plan(self, problem: PlanningProblem) -> Plan | NoPlan:
+        """A plan that the checker passed, or why there is none."""
+        if problem.strategy not in self.strategies:
+            return NoPlan(
+                f"planner {self.name} has no strategy {problem.strategy}: "
+                f"choose one of {', '.join(self.strategies)}"
+            )
+        if not problem.world.team:
+            return NoPlan("no robot is connected")
+        made = self._solve(problem)
+        if isinstance(made, NoPlan):
+            return made
+        checked = check_plan(made, problem.world)
+        if not checked.valid:
+            return NoPlan(checked.violations[0].sentence, checked.violations)
+        return made
+
+    @abstractmethod
+    def _solve(self, problem: PlanningProblem) -> Plan | NoPlan:
+        """A plan for the problem; checked by the caller."""

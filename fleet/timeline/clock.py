@@ -1,0 +1,82 @@
+"""Two clocks, and what is known of how one runs against the other."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+
+NTP_FRACTION = 2**32
+"""Zenoh timestamps count 2^-32 s since the Unix epoch (NTP64)."""
+
+_ANCHORS = 20_000
+_SPACING_S = 0.1
+
+
+def wall_of(timestamp: str) -> float | None:
+    """Unix seconds of a Zenoh timestamp as text, e.g. `7386690599959157260/33`.
+
+    `None` if it is not one.
+    """
+    number = timestamp.partition("/")[0]
+    if not (number.isascii() and number.isdigit()):
+        return None
+    return int(number) / NTP_FRACTION
+
+
+class Clock:
+    """Fleet time against wall time, learned from every value that carries both.
+
+    A value that names no fleet time of its own still has a Zenoh timestamp, and is placed on the
+    fleet's timeline by that: so what was stored before the recorder started stands where it
+    happened. Fleet time is simulated time in a simulation, and both are seconds.
+    """
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+        self._wall: list[float] = []
+        self._fleet: list[float] = []
+
+    def tick(self, wall_s: float, fleet_s: float) -> None:
+        """The fleet's clock shows `fleet_s` now. A clock that went back is a new run."""
+        if self._fleet and fleet_s < self._fleet[-1] - 1.0:
+            self._wall.clear()
+            self._fleet.clear()
+        self.now_s = fleet_s
+        self.learn(wall_s, fleet_s)
+
+    def learn(self, wall_s: float, fleet_s: float) -> None:
+        """A value of fleet time `fleet_s` was written at `wall_s`."""
+        at = bisect_left(self._wall, wall_s)
+        before = at > 0
+        after = at < len(self._wall)
+        if before and (wall_s - self._wall[at - 1] < _SPACING_S or fleet_s < self._fleet[at - 1]):
+            return
+        if after and (self._wall[at] - wall_s < _SPACING_S or fleet_s > self._fleet[at]):
+            return
+        self._wall.insert(at, wall_s)
+        self._fleet.insert(at, fleet_s)
+        self.now_s = max(self.now_s, fleet_s)
+        if len(self._wall) > _ANCHORS:
+            # Every second one of the older half: the past needs less detail than the present.
+            half = _ANCHORS // 2
+            self._wall[:half] = self._wall[:half:2]
+            self._fleet[:half] = self._fleet[:half:2]
+
+    def fleet_at(self, wall_s: float) -> float:
+        """Fleet time [s] at a wall time; held at the ends of what is known, 0 if nothing is."""
+        return _between(wall_s, self._wall, self._fleet)
+
+    def wall_at(self, fleet_s: float) -> float | None:
+        """Unix seconds at which the fleet's clock showed `fleet_s`; `None` if nothing is known."""
+        return _between(fleet_s, self._fleet, self._wall) if self._fleet else None
+
+
+def _between(x: float, xs: list[float], ys: list[float]) -> float:
+    if not xs:
+        return 0.0
+    at = bisect_left(xs, x)
+    if at == 0:
+        return ys[0]
+    if at == len(xs):
+        return ys[-1]
+    x0, x1, y0, y1 = xs[at - 1], xs[at], ys[at - 1], ys[at]
+    return y1 if x1 <= x0 else y0 + (y1 - y0) * (x - x0) / (x1 - x0)

@@ -1,0 +1,209 @@
+"""The task graph: what waits for what, who does it, how it stands. Layers go down, lanes across."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import rerun as rr
+
+from fleet.timeline.lanes import call_text
+from fleet.timeline.palette import TASK_STATES
+from fleet.timeline.sink import Sink, entity
+from keyexpr_schema.plans import Plan, PlanStatus
+from keyexpr_schema.tasks import TaskRecord, TaskState
+
+ROW_PX = 70.0
+GLYPH_PX = 7.0
+GAP_PX = 40.0
+PLANS = 6
+"""At most so many plans are drawn, one below the other: the latest."""
+
+EAGER = 60
+"""Plans up to this many tasks are drawn at each change; larger ones every `tasks / 60` seconds."""
+
+GLYPHS = {
+    TaskState.WAITING: "…",
+    TaskState.ORDERED: "→",
+    TaskState.RUNNING: "▶",
+    TaskState.SUCCEEDED: "✔",
+    TaskState.FAILED: "✖",
+    TaskState.CANCELLED: "∅",
+}
+
+
+@dataclass(frozen=True)
+class Node:
+    """One task as it is drawn."""
+
+    task: str
+    label: str
+    state: TaskState
+    lane: str
+    after: tuple[str, ...]
+
+
+@dataclass
+class Drawing:
+    """What is known of one plan, and what of it was last drawn."""
+
+    path: str
+    plan: Plan | None = None
+    status: PlanStatus | None = None
+    records: dict[str, TaskRecord] = field(default_factory=dict)
+    drawn: object = None
+    drawn_s: float = float("-inf")
+    dirty: bool = False
+
+    def nodes(self) -> list[Node]:
+        """The tasks of the plan's latest revision, and what was done or runs from older ones."""
+        wanted = {task.task: task for task in self.plan.tasks} if self.plan else {}
+        revision = self.plan.revision if self.plan else 0
+        nodes = []
+        for name, task in wanted.items():
+            if name in self.records:
+                continue
+            robot = self.status.allocation.get(task.actor) if self.status else None
+            nodes.append(
+                _node(name, task.skill, task.args, task.actor, robot, TaskState.WAITING, task.after)
+            )
+        for name, record in self.records.items():
+            kept = record.state in (TaskState.SUCCEEDED, TaskState.RUNNING)
+            if name not in wanted and record.revision < revision and not kept:
+                continue
+            after = wanted[name].after if name in wanted else record.after
+            nodes.append(
+                _node(
+                    name, record.skill, record.args, record.actor, record.robot, record.state, after
+                )
+            )
+        return nodes
+
+
+class Graphs:
+    """Draws every plan, the latest below."""
+
+    def __init__(self, sink: Sink) -> None:
+        self._sink = sink
+        self.drawings: dict[str, Drawing] = {}
+
+    def of(self, plan: str) -> Drawing:
+        """The drawing of a plan, marked for drawing again."""
+        drawing = self.drawings.get(plan)
+        if drawing is None:
+            drawing = self.drawings[plan] = Drawing(entity("fleet", "dag", plan))
+        drawing.dirty = True
+        return drawing
+
+    def draw(self, now_s: float, final: bool = False) -> None:
+        """Log the plans that changed, at fleet time `now_s` [s]."""
+        if not any(drawing.dirty for drawing in self.drawings.values()):
+            return
+        top = 0.0
+        for at, drawing in enumerate(self.drawings.values()):
+            if at < len(self.drawings) - PLANS:
+                self._clear(drawing, now_s)
+                continue
+            nodes = drawing.nodes()
+            places = layout(nodes)
+            depth = 1 + max((row for _, row in places.values()), default=0.0) / ROW_PX
+            big = len(nodes) > EAGER and not final
+            late = now_s - drawing.drawn_s >= len(nodes) / EAGER or now_s < drawing.drawn_s
+            if not big or late:
+                self._log(drawing, nodes, {t: (x, y + top) for t, (x, y) in places.items()}, now_s)
+            top += (depth + 0.5) * ROW_PX if nodes else 0.0
+
+    def _log(
+        self,
+        drawing: Drawing,
+        nodes: list[Node],
+        places: dict[str, tuple[float, float]],
+        now_s: float,
+    ) -> None:
+        drawing.dirty = False
+        now = (tuple(nodes), tuple(places.items()))
+        if now == drawing.drawn:
+            return
+        drawing.drawn, drawing.drawn_s = now, now_s
+        if not nodes:
+            self._sink.log(drawing.path, rr.Clear(recursive=False), now_s)
+            return
+        names = {node.task for node in nodes}
+        edges = [(first, node.task) for node in nodes for first in node.after if first in names]
+        drawn = rr.GraphNodes(
+            node_ids=[node.task for node in nodes],
+            positions=[places[node.task] for node in nodes],
+            labels=[node.label for node in nodes],
+            colors=[TASK_STATES[node.state] for node in nodes],
+            show_labels=True,
+        )
+        # One entity for both, or the viewer does not know which nodes the edges mean.
+        edged = rr.GraphEdges(edges=edges, graph_type="directed")
+        self._sink.log(drawing.path, drawn, now_s, None, edged)
+
+    def _clear(self, drawing: Drawing, now_s: float) -> None:
+        drawing.dirty = False
+        if drawing.drawn is not None:
+            drawing.drawn = None
+            self._sink.log(drawing.path, rr.Clear(recursive=False), now_s)
+
+
+def layout(nodes: list[Node]) -> dict[str, tuple[float, float]]:
+    """Positions `(x, y)` in the viewer's points: y by longest path from a root, x by robot lane.
+
+    Two tasks of one lane and layer stand side by side. A dependency on itself, a cycle or an
+    unknown task counts for nothing.
+    """
+    rank = _ranks({node.task: node.after for node in nodes})
+    cells: dict[tuple[str, int], list[Node]] = {}
+    for node in sorted(nodes, key=lambda node: (rank[node.task], node.task)):
+        cells.setdefault((node.lane, rank[node.task]), []).append(node)
+    places: dict[str, tuple[float, float]] = {}
+    left = 0.0
+    for lane in sorted(
+        {node.lane for node in nodes}, key=lambda lane: (lane.startswith("?"), lane)
+    ):
+        mine = [cell for (name, _), cell in cells.items() if name == lane]
+        width = max(GLYPH_PX * len(line) for c in mine for n in c for line in n.label.split("\n"))
+        width += GAP_PX
+        columns = max(len(cell) for cell in mine)
+        middle = left + width * columns / 2
+        for cell in mine:
+            for i, node in enumerate(cell):
+                offset = (i - (len(cell) - 1) / 2) * width
+                places[node.task] = (middle + offset, rank[node.task] * ROW_PX)
+        left += width * columns
+    return places
+
+
+def _ranks(after: dict[str, tuple[str, ...]]) -> dict[str, int]:
+    """Longest path to each task, counted in tasks before it; Kahn's algorithm, cycles come last."""
+    waits = {task: {t for t in first if t in after and t != task} for task, first in after.items()}
+    next_of: dict[str, list[str]] = {task: [] for task in after}
+    for task, first in waits.items():
+        for before in first:
+            next_of[before].append(task)
+    rank = dict.fromkeys(after, 0)
+    missing = {task: len(first) for task, first in waits.items()}
+    ready = [task for task, count in missing.items() if count == 0]
+    while ready:
+        task = ready.pop()
+        for following in next_of[task]:
+            rank[following] = max(rank[following], rank[task] + 1)
+            missing[following] -= 1
+            if missing[following] == 0:
+                ready.append(following)
+    return rank
+
+
+def _node(
+    name: str,
+    skill: str,
+    args: dict[str, str],
+    actor: str,
+    robot: str | None,
+    state: TaskState,
+    after: tuple[str, ...],
+) -> Node:
+    who = robot or f"?{actor}"
+    label = f"{GLYPHS[state]} {call_text(skill, args, robot)}\n{who} · {state.value}"
+    return Node(task=name, label=label, state=state, lane=who, after=after)

@@ -1,0 +1,144 @@
+"""The recorder as a process: watches keys of a realm until it is told to stop."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from fleet.timeline import viewer
+from fleet.timeline.errors import NoPicture
+from fleet.timeline.recorder import RECORDED, Recorder
+from fleet.timeline.sink import free_port, open_stream
+from keyexpr_schema.session import SessionConfig, Watch, open_session
+
+FLUSH_S = 1.0
+"""How much wall time of rows a SIGKILL may cost."""
+
+LIVE_FLUSH_S = 0.25
+"""The same with a viewer looking on."""
+
+
+def say(sentence: str) -> None:
+    """Write a line to standard output, at once."""
+    sys.stdout.write(f"{sentence}\n")
+    sys.stdout.flush()
+
+
+def run(
+    endpoints: Sequence[str],
+    realm: str,
+    out: Path,
+    view: bool = False,
+    connect_timeout_s: float | None = 3.0,
+    tell: Callable[[str], None] = say,
+) -> None:
+    """Record a realm to `out` until SIGTERM or SIGINT; then close the file.
+
+    With `view` Rerun's viewer is opened on what is being recorded, where there is a screen.
+
+    Raises:
+        Unreachable: no router answers at the endpoints.
+        UnwritableRecording: the file cannot be written.
+    """
+    asyncio.run(record(endpoints, realm, out, view, connect_timeout_s, tell))
+
+
+async def record(
+    endpoints: Sequence[str],
+    realm: str,
+    out: Path,
+    view: bool = False,
+    connect_timeout_s: float | None = 3.0,
+    tell: Callable[[str], None] = say,
+) -> None:
+    """The same as `run`, in a running loop; ends at a signal or when it is cancelled."""
+    config = SessionConfig(
+        endpoints=tuple(endpoints),
+        realm=realm,
+        component="recorder",
+        connect_timeout_s=connect_timeout_s,
+    )
+    stop = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, stop.set)
+    shown: subprocess.Popen[bytes] | None = None
+    try:
+        async with open_session(config) as session:
+            port = free_port() if view else None
+            stream = open_stream(out, f"{realm} · {out.stem}", port)
+            recorder = Recorder(stream)
+            if port is not None:
+                shown = _show(port, tell)
+            try:
+                async with session.watch(*RECORDED) as watch:
+                    tell(f"recording to {out}")
+                    await _follow(watch, recorder, stop, LIVE_FLUSH_S if shown else FLUSH_S)
+            finally:
+                recorder.close()
+    finally:
+        if shown is not None:
+            viewer.end(shown)
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.remove_signal_handler(number)
+
+
+async def _follow(watch: Watch, recorder: Recorder, stop: asyncio.Event, flush_s: float) -> None:
+    """Hand changes to the recorder until `stop`; what was stored first, in the order of writing."""
+    backlog: list[Any] | None = []
+    loop = asyncio.get_running_loop()
+    synced = asyncio.ensure_future(watch.synced())
+    stopped = asyncio.ensure_future(stop.wait())
+    following = asyncio.ensure_future(anext(watch))
+    flush_at = loop.time() + flush_s
+    try:
+        while not stopped.done():
+            waiting = {stopped, following, *([synced] if backlog is not None else [])}
+            await asyncio.wait(
+                waiting,
+                timeout=max(0.0, flush_at - loop.time()),
+                return_when=asyncio.FIRST_COMPLETED,
+            )
+            if following.done():
+                change = following.result()
+                if backlog is None:
+                    recorder.record(change)
+                else:
+                    backlog.append(change)
+                following = asyncio.ensure_future(anext(watch))
+            elif backlog is not None and synced.done():
+                # Everything that the first listing held has come through the iterator.
+                synced.result()
+                recorder.record_all(backlog)
+                backlog = None
+            if loop.time() >= flush_at:
+                recorder.flush()
+                flush_at = loop.time() + flush_s
+    except StopAsyncIteration:
+        pass
+    finally:
+        if backlog:
+            recorder.record_all(backlog)
+        for task in (synced, stopped, following):
+            task.cancel()
+            with contextlib.suppress(asyncio.CancelledError, StopAsyncIteration):
+                await task
+
+
+def _show(port: int, tell: Callable[[str], None]) -> subprocess.Popen[bytes] | None:
+    """Open the viewer on the live stream, or say in a sentence why not."""
+    url = f"rerun+http://127.0.0.1:{port}/proxy"
+    if not viewer.has_screen():
+        tell(f"there is no screen here; look on with: rerun --connect {url}")
+        return None
+    try:
+        return viewer.start(["--port", "auto", "--connect", url])
+    except NoPicture as error:
+        tell(f"{error}; recording goes on")
+        return None

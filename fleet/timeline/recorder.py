@@ -1,0 +1,256 @@
+"""The recorder: changes of keys in, rows of a Rerun recording out.
+
+It is total: whatever order values come in, and whatever they name, it draws what it can. It asks
+nobody anything and writes no key.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, Protocol
+
+import rerun as rr
+
+from fleet.timeline import sentences
+from fleet.timeline.blueprint import blueprint
+from fleet.timeline.clock import Clock, wall_of
+from fleet.timeline.graph import Graphs
+from fleet.timeline.lanes import Lanes, call_text
+from fleet.timeline.palette import Palette
+from fleet.timeline.sink import Sink, entity
+from fleet.timeline.utilisation import Utilisation
+from fleet.timeline.world import World
+from keyexpr_schema.key import Key
+from keyexpr_schema.keyspace import (
+    FACT,
+    GOAL_SPEC,
+    GOAL_STATUS,
+    ORDER,
+    PLACE,
+    PLAN_SPEC,
+    PLAN_STATUS,
+    REJECT,
+    REPORT,
+    ROBOT_SPEC,
+    ROBOT_STATE,
+    SIM_CLOCK,
+    SIM_FRAME,
+    SIM_SCENE,
+    SIM_TRUTH,
+    TASK_RECORD,
+)
+from keyexpr_schema.tasks import TaskRecord, TaskState
+
+RECORDED: tuple[Key[Any, Any], ...] = (
+    SIM_SCENE,
+    SIM_FRAME,
+    SIM_CLOCK,
+    SIM_TRUTH,
+    PLACE,
+    ROBOT_SPEC,
+    ROBOT_STATE,
+    GOAL_SPEC,
+    GOAL_STATUS,
+    PLAN_SPEC,
+    PLAN_STATUS,
+    TASK_RECORD,
+    ORDER,
+    REPORT,
+    FACT,
+    REJECT,
+)
+"""The keys the recorder listens to."""
+
+_TELL: dict[str, tuple[str, Callable[[Any, Any], Iterator[sentences.Line]]]] = {
+    GOAL_SPEC.name: ("goals", sentences.goal),
+    GOAL_STATUS.name: ("goals", sentences.goal_status),
+    PLAN_SPEC.name: ("plans", sentences.plan),
+    PLAN_STATUS.name: ("plans", sentences.plan_status),
+    TASK_RECORD.name: ("tasks", sentences.task_record),
+    ORDER.name: ("orders", sentences.order),
+    REPORT.name: ("reports", sentences.report),
+    FACT.name: ("facts", sentences.fact),
+    ROBOT_SPEC.name: ("robots", sentences.robot_spec),
+    ROBOT_STATE.name: ("robots", sentences.robot_state),
+    SIM_TRUTH.name: ("truth", sentences.truth),
+    REJECT.name: ("rejects", sentences.reject),
+}
+
+_COLOURS = {
+    sentences.INFO: (205, 210, 215, 255),
+    sentences.WARN: (240, 190, 80, 255),
+    sentences.ERROR: (245, 105, 95, 255),
+}
+
+
+class Recorded(Protocol):
+    """What the recorder needs of a change: the key, the address, the value, the timestamp."""
+
+    @property
+    def key(self) -> Key[Any, Any]: ...
+    @property
+    def address(self) -> Any: ...
+    @property
+    def value(self) -> Any: ...
+    @property
+    def timestamp(self) -> str: ...
+
+
+class Recorder:
+    """Writes one recording.
+
+    `stream` comes from `fleet.timeline.sink.open_stream`. Call `flush()` every now and then: rows
+    wait for it, at most a few hundred of each body.
+    """
+
+    def __init__(self, stream: rr.RecordingStream) -> None:
+        self._clock = Clock()
+        self._palette = Palette()
+        self._sink = Sink(stream, self._clock)
+        self._world = World(self._sink, self._palette)
+        self._lanes = Lanes(self._sink, self._palette)
+        self._graphs = Graphs(self._sink)
+        self._utilisation = Utilisation(self._sink, self._lanes, self._palette)
+        self._known: dict[tuple[str, Any], Any] = {}
+        self._doing: dict[str, tuple[str, str]] = {}  # robot -> task as (plan, task)
+        self._framed: object = ()
+
+    @property
+    def now_s(self) -> float:
+        """Fleet time [s] of the newest value."""
+        return self._clock.now_s
+
+    def record_all(self, changes: Iterable[Recorded]) -> None:
+        """Record what was stored before: in the order in which it was written.
+
+        First the clocks are compared, so that values without a time of their own find theirs.
+        """
+        backlog = sorted(changes, key=lambda change: wall_of(change.timestamp) or 0.0)
+        for change in backlog:
+            wall_s = wall_of(change.timestamp)
+            own_s = _own_time(change)
+            if wall_s is not None and own_s:
+                self._clock.learn(wall_s, own_s)
+        for change in backlog:
+            self.record(change)
+
+    def record(self, change: Recorded) -> None:
+        """Record one change; a value that is already known changes nothing."""
+        key, value = change.key.name, change.value
+        wall_s = wall_of(change.timestamp) or time.time()
+        if key == SIM_FRAME.name and value is not None:
+            self._world.frame(value, wall_s)
+            return
+        if key == SIM_CLOCK.name and value is not None:
+            self._clock.tick(value.wall_time_s, value.time_s)
+            self._draw()
+            return
+        name = (key, change.address)
+        before = self._known.get(name)
+        if before == value:
+            return
+        own_s = _own_time(change)
+        if own_s:
+            self._clock.learn(wall_s, own_s)
+        at_s = own_s if own_s else self._clock.fleet_at(wall_s)
+        if value is None:
+            del self._known[name]
+            self._forget(key, change.address, at_s)
+        else:
+            self._known[name] = value
+            self._show(key, value, at_s, wall_s)
+            self._tell(key, value, before, at_s, wall_s)
+        self._graphs.draw(max(at_s, self._clock.now_s))
+
+    def flush(self) -> None:
+        """Hand everything that waits to the file."""
+        self._draw()
+        self._world.flush()
+        self._frame_view(final=False)
+        self._sink.stream.flush(timeout_sec=10.0)
+
+    def close(self) -> None:
+        """Write what is left and close the file; nothing may be recorded afterwards."""
+        self._utilisation.advance(self._clock.now_s, final=True)
+        self._graphs.draw(self._clock.now_s, final=True)
+        self._world.flush()
+        self._frame_view(final=True)
+        self._sink.stream.flush(timeout_sec=30.0)
+        self._sink.stream.disconnect()
+
+    # --- inside --------------------------------------------------------------------------------
+    def _draw(self) -> None:
+        self._utilisation.advance(self._clock.now_s)
+        self._graphs.draw(self._clock.now_s)
+
+    def _frame_view(self, final: bool) -> None:
+        floor = self._world.bounds.rectangle()
+        if floor == self._framed or (floor is None and not final):
+            return
+        if floor is None and self._framed != ():
+            return
+        self._framed = floor
+        self._sink.stream.send_blueprint(blueprint(floor))
+
+    def _show(self, key: str, value: Any, at_s: float, wall_s: float) -> None:
+        if key == SIM_SCENE.name:
+            self._world.scene(value)
+        elif key == PLACE.name:
+            self._world.place(value)
+        elif key == ROBOT_SPEC.name:
+            lane = self._lanes.robot(value.robot)
+            self._lanes.show_empty(lane, at_s)
+            self._world.robot(value)
+        elif key == ROBOT_STATE.name:
+            self._world.state(value, at_s, wall_s)
+        elif key == PLAN_SPEC.name:
+            self._graphs.of(value.plan).plan = value
+        elif key == PLAN_STATUS.name:
+            self._graphs.of(value.plan).status = value
+        elif key == TASK_RECORD.name:
+            self._graphs.of(value.plan).records[value.task] = value
+            self._lanes.record(value, at_s)
+            self._label(value, at_s)
+
+    def _label(self, record: TaskRecord, at_s: float) -> None:
+        if record.robot is None:
+            return
+        task = (record.plan, record.task)
+        if record.state is TaskState.RUNNING:
+            self._doing[record.robot] = task
+            doing = call_text(record.skill, record.args, record.robot)
+            self._world.robot_label(record.robot, doing, at_s, None)
+        elif self._doing.get(record.robot) == task:
+            del self._doing[record.robot]
+            self._world.robot_label(record.robot, None, at_s, None)
+
+    def _tell(self, key: str, value: Any, before: Any, at_s: float, wall_s: float) -> None:
+        telling = _TELL.get(key)
+        if telling is None:
+            return
+        topic, tell = telling
+        for level, sentence in tell(value, before):
+            line = rr.TextLog(sentence, level=level, color=_COLOURS[level])
+            self._sink.log(entity("fleet", "log", topic), line, at_s, wall_s)
+
+    def _forget(self, key: str, address: Any, at_s: float) -> None:
+        if key == TASK_RECORD.name:
+            self._graphs.of(address.plan).records.pop(address.task, None)
+            self._lanes.drop(address.plan, address.task, at_s)
+        elif key == PLAN_SPEC.name:
+            self._graphs.of(address.plan).plan = None
+        elif key == PLAN_STATUS.name:
+            self._graphs.of(address.plan).status = None
+
+
+def _own_time(change: Recorded) -> float | None:
+    """The fleet time [s] a value names for itself, if it names one."""
+    value = change.value
+    if value is None:
+        return None
+    if change.key.name in (TASK_RECORD.name, REPORT.name):
+        times = (getattr(value, name, None) for name in ("ended_s", "started_s", "ordered_s"))
+        return next((time_s for time_s in times if time_s is not None), None)
+    own = getattr(value, "time_s", None)
+    return float(own) if own else None

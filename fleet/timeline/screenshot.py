@@ -1,0 +1,138 @@
+"""A picture of a recording without a screen: `python -m fleet.timeline.screenshot REC OUT.png`."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import IO, Any
+
+from fleet.timeline import viewer
+from fleet.timeline.errors import NoPicture, TimelineError
+from fleet.timeline.read import summary
+from fleet.timeline.sink import SIM_TIME, free_port
+
+DRIVER = "mesa-vulkan-drivers"
+"""The Debian package with a Vulkan driver that needs no graphics card."""
+
+START_S = 40.0
+_NO_ADAPTER = "graphics adapter"
+
+
+def screenshot(
+    recording: Path, out: Path, size: tuple[int, int] = (1600, 900), at_s: float | None = None
+) -> None:
+    """Draw a recording as the viewer shows it, at fleet time `at_s` [s] (`None`: at its end).
+
+    `size` is width and height in pixels. Takes some ten seconds without a graphics card.
+
+    Raises:
+        UnreadableRecording: there is no such recording.
+        NoPicture: the viewer or a graphics driver is missing, or the picture cannot be written.
+    """
+    if at_s is None:
+        span = summary(recording).sim_span_s
+        at_s = span[1] if span else 0.0
+    else:
+        summary(recording)
+    port = free_port()
+    with tempfile.TemporaryFile() as said:
+        shown = viewer.start(
+            [
+                "--headless",
+                "--hide-welcome-screen",
+                "--window-size",
+                f"{size[0]}x{size[1]}",
+                "--port",
+                str(port),
+            ],
+            output=said.fileno(),
+        )
+        try:
+            picture = _take(shown, said, port, recording, at_s)
+        finally:
+            viewer.end(shown)
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        out.write_bytes(picture)
+    except OSError as error:
+        raise NoPicture(f"cannot write {out}: {error.strerror or error}") from None
+
+
+def _take(
+    shown: subprocess.Popen[bytes], said: IO[bytes], port: int, recording: Path, at_s: float
+) -> bytes:
+    from rerun.experimental import ViewerClient
+
+    deadline = time.monotonic() + START_S
+    url = f"rerun+http://127.0.0.1:{port}/proxy"
+    client: Any = None
+    trouble: Exception | None = None
+    while client is None:
+        if shown.poll() is not None:
+            raise NoPicture(_why(said))
+        if time.monotonic() > deadline:
+            raise NoPicture(f"Rerun's viewer does not answer after {START_S:.0f} s: {trouble}")
+        try:
+            client = ViewerClient.connect(url)
+            client.get_state()
+        except Exception as error:
+            # The client raises whatever its transport does while the viewer starts.
+            client, trouble = None, error
+            try:
+                shown.wait(0.2)
+            except subprocess.TimeoutExpired:
+                continue
+    try:
+        client.open(str(recording.resolve()))
+        client.set_time(SIM_TIME, duration=at_s, play_state="paused")
+        # The first pictures still lack what is laid out from one frame to the next.
+        picture, last = b"", None
+        for _ in range(20):
+            picture = client.take_screenshot()
+            if picture == last:
+                break
+            last = picture
+    except Exception as error:
+        raise NoPicture(f"Rerun's viewer could not show {recording}: {error}") from None
+    if not picture.startswith(b"\x89PNG"):
+        raise NoPicture(f"Rerun's viewer gave no picture of {recording}")
+    return picture
+
+
+def _why(said: IO[bytes]) -> str:
+    said.seek(0)
+    text = said.read().decode(errors="replace")
+    if _NO_ADAPTER in text or "adapter" in text.lower():
+        return (
+            "Rerun's viewer finds no graphics driver: install one that draws in software "
+            f"(on Debian and Ubuntu: apt-get install {DRIVER})"
+        )
+    last = text.strip().splitlines()[-1:] or ["it said nothing"]
+    return f"Rerun's viewer ended at once: {last[0]}"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The command line."""
+    parser = argparse.ArgumentParser(description="Draw a recording to a PNG, without a screen.")
+    parser.add_argument("recording", type=Path)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--at", type=float, help="fleet time in seconds (default: the end)")
+    parser.add_argument("--size", default="1600x900", help="WIDTHxHEIGHT in pixels")
+    options = parser.parse_args(arguments)
+    width, _, height = options.size.partition("x")
+    if not (width.isdigit() and height.isdigit()):
+        parser.error(f"--size {options.size!r} is not WIDTHxHEIGHT, e.g. 1600x900")
+    try:
+        screenshot(options.recording, options.out, (int(width), int(height)), options.at)
+    except TimelineError as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,337 @@
+"""`Navigator`: brings every robot where it shall go, and keeps them apart."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from keyexpr_schema.robots import PoseMRad
+from sim.errors import NoPath, NoStance
+from sim.navigation.clearance import Clearance
+from sim.navigation.lattice import Lattice
+from sim.navigation.spots import Dock, Spots
+from sim.navigation.steering import Leg, passed, steer
+from sim.navigation.traffic import Traffic, Traveller
+from sim.world_model import LARGEST_RADIUS_M, WorldFile
+
+PATIENCE_S = 30.0
+"""Simulated time after which a robot that cannot get on gives up."""
+
+LINGER_S = 10.0
+"""How long a robot that reached a stance is left alone there, since it came to do something."""
+
+LOOKAHEAD_NODES = 3
+"""Promised ahead of a robot: 1.2 m to 1.8 m, more than three times its braking distance."""
+
+
+@dataclass
+class _Task:
+    """Where one robot shall go. `place` or `point_m`, as it was asked."""
+
+    what: str
+    place: str | None = None
+    docks: tuple[Dock, ...] = ()
+    moved_s: float | None = None
+    moved_at: tuple[float, float] = (0.0, 0.0)
+
+
+class Navigator:
+    """Routes, traffic and legs for all robots of one world. Metres and radians, world frame.
+
+    `tick` is called once each control period with where every robot is. It answers with a `Leg` for
+    every robot that is not pinned, those with nowhere to go included, since they may have to make
+    way. A robot whose controller keeps within 5 cm of its legs touches nobody.
+    """
+
+    def __init__(self, world: WorldFile) -> None:
+        self._world = world
+        self._clearance = Clearance(world)
+        self._lattice = Lattice(world, self._clearance)
+        self._spots = Spots(world, self._lattice, self._clearance)
+        self._traffic = Traffic(self._lattice, self._spots.retreat)
+        self._robots: dict[str, Traveller] = {}
+        self._speeds: dict[str, float] = {}
+        self._poses: dict[str, PoseMRad] = {}
+        self._tasks: dict[str, _Task] = {}
+        self._failed: dict[str, str] = {}
+        self._pinned: set[str] = set()
+        self._lingers: dict[str, float] = {}
+        self._yaws: dict[str, float] = {}
+        self._time_s = 0.0
+
+    def add_robot(
+        self, robot: str, pose_m_rad: PoseMRad, radius_m: float, speed_m_s: float = 0.6
+    ) -> None:
+        """A robot that stands at `pose_m_rad`, with the radius of its footprint and its top speed.
+
+        Raises:
+            NoPath: it is too large, or there is no way from there to where robots drive.
+        """
+        if radius_m > LARGEST_RADIUS_M:
+            raise NoPath(
+                f"{robot} has a radius of {radius_m} m; "
+                f"the largest that traffic is laid out for is {LARGEST_RADIUS_M} m"
+            )
+        here = (float(pose_m_rad[0]), float(pose_m_rad[1]))
+        docks = [
+            self._spots.dock(here, node, radius_m, pose_m_rad[2])
+            for node in self._spots.ways_in(here, radius_m)
+        ]
+        if not docks:
+            raise NoPath(f"{robot} at ({here[0]:.2f}, {here[1]:.2f}) is hemmed in: no way out")
+        taken = self._claimed(*self._robots)
+        dock = next((d for d in docks if not d.owned & taken), docks[0])
+        traveller = Traveller(robot, radius_m, track=[dock.node], parked=dock)
+        traveller.recount()
+        self._robots[robot] = traveller
+        self._speeds[robot] = speed_m_s
+        self._poses[robot] = pose_m_rad
+
+    def go_to_place(self, robot: str, place: str) -> None:
+        """Send `robot` to a free spot in `place`, clear of doors and of others' spots.
+
+        A robot that already is there, in nobody's way, stays. If every spot is taken, it waits for
+        one for `PATIENCE_S`, then its leg has failed.
+
+        Raises:
+            NoStance: there is nowhere to wait in that place.
+            NoPath: there is no way to it, whatever the traffic.
+        """
+        self.cancel(robot)
+        spots = self._spots.waiting[place]
+        if not spots:
+            raise NoStance(f"there is no room to wait in {place}")
+        part = self._lattice.parts[self._robots[robot].frontier]
+        if not any(self._lattice.parts[node] == part for node in spots):
+            raise NoPath(f"there is no way to {place} from where {robot} stands")
+        self._tasks[robot] = _Task(place, place=place)
+
+    def approach(
+        self, robot: str, point_m: tuple[float, float, float], reach_m: tuple[float, float]
+    ) -> None:
+        """Let `robot` stand facing `point_m`, its centre between `reach_m` (min, max) away from it.
+
+        If all such stances are taken, it waits for one for `PATIENCE_S`, then its leg has failed.
+
+        Raises:
+            NoStance: there is no free floor at that distance.
+            NoPath: there is, and no way to it.
+        """
+        self.cancel(robot)
+        traveller = self._robots[robot]
+        what = f"({point_m[0]:.2f}, {point_m[1]:.2f})"
+        docks = self._spots.stances(point_m, traveller.radius_m, reach_m)
+        if not docks:
+            raise NoStance(
+                f"{robot} cannot stand anywhere with {what} "
+                f"between {reach_m[0]:.2f} and {reach_m[1]:.2f} m away"
+            )
+        part = self._lattice.parts[traveller.frontier]
+        docks = [dock for dock in docks if self._lattice.parts[dock.node] == part]
+        if not docks:
+            raise NoPath(f"there is no way to {what} from where {robot} stands")
+        self._tasks[robot] = _Task(what, docks=tuple(docks))
+
+    def cancel(self, robot: str) -> None:
+        """Forget where `robot` was going; it comes to rest within a step."""
+        traveller = self._robots[robot]
+        self._failed.pop(robot, None)
+        self._yaws.pop(robot, None)
+        if self._tasks.pop(robot, None) is None:
+            return
+        traveller.goal = traveller.dock = None
+        del traveller.track[2:], traveller.corners[1:]
+        if traveller.parked is not None and not traveller.leaving:
+            x, y, yaw = self._poses[robot]
+            parked = traveller.parked
+            traveller.parked = Dock(parked.node, (x, y), yaw, parked.owned)
+        traveller.recount()
+
+    def pin(self, robot: str, pinned: bool) -> None:
+        """Say that `robot` must not be moved (its arm is at work), or that it may be again."""
+        if pinned:
+            self._pinned.add(robot)
+        else:
+            self._pinned.discard(robot)
+
+    def tick(self, time_s: float, poses: dict[str, PoseMRad]) -> dict[str, Leg]:
+        """Where each robot that is not pinned shall drive now, given where all of them are."""
+        self._time_s = time_s
+        self._poses.update(poses)
+        for name, traveller in self._robots.items():
+            self._release(traveller)
+            busy = traveller.parked is not None and not traveller.leaving
+            lingers = time_s < self._lingers.get(name, -math.inf)
+            traveller.static = name in self._pinned or (
+                busy
+                and (
+                    lingers
+                    or (name in self._tasks and name in self._yaws and traveller.goal is None)
+                )
+            )
+        for name in self._tasks:
+            self._resolve(name)
+        self._traffic.decide(self._robots, LOOKAHEAD_NODES)
+        return {name: self._leg(name) for name in self._robots if name not in self._pinned}
+
+    def reserved(self, robot: str) -> frozenset[int]:
+        """The nodes of the lattice that `robot` has to itself; no two robots share one."""
+        return self._robots[robot].claims
+
+    def _release(self, traveller: Traveller) -> None:
+        x, y, _ = self._poses[traveller.name]
+        points = self._lattice.points_m
+        changed = False
+        if traveller.parked is not None and traveller.leaving:
+            node = points[traveller.track[0]]
+            if math.dist((x, y), node) <= 0.06:
+                traveller.parked, traveller.leaving = None, False
+                self._lingers.pop(traveller.name, None)
+                changed = True
+        while len(traveller.track) > 1 and passed((x, y), [points[n] for n in traveller.track[:3]]):
+            del traveller.track[0], traveller.corners[0]
+            changed = True
+        if changed:
+            traveller.recount()
+
+    def _claimed(self, *names: str) -> frozenset[int]:
+        return frozenset().union(*(self._robots[name].claims for name in names))
+
+    def _resolve(self, name: str) -> None:
+        """Choose the spot or stance to go to, or another one if somebody stands there now."""
+        task, traveller = self._tasks[name], self._robots[name]
+        if name in self._failed or name in self._pinned:
+            return
+        x, y, _ = self._poses[name]
+        if task.moved_s is None or math.dist(task.moved_at, (x, y)) > 0.1:
+            task.moved_s, task.moved_at = self._time_s, (x, y)
+        others = [other for other in self._robots.values() if other is not traveller]
+        blocked = frozenset().union(*(other.claims for other in others if other.static))
+        if traveller.goal is not None:
+            wanted = {traveller.goal} | (traveller.dock.owned if traveller.dock else frozenset())
+            if not wanted & blocked:
+                self._give_up_late(name, task, others)
+                return
+            traveller.goal = traveller.dock = None
+            self._yaws.pop(name, None)
+        elif traveller.parked is not None and not traveller.leaving and name in self._yaws:
+            return  # on its way into the stance
+        taken = set(blocked)
+        for other in others:
+            if other.goal is not None:
+                taken.add(other.goal)
+            if other.dock is not None:
+                taken |= other.dock.owned
+        around = self._lattice.field(frozenset({traveller.frontier}), blocked - traveller.claims)
+        if task.place is not None:
+            self._choose_spot(name, task, around, frozenset(taken), others)
+        else:
+            self._choose_dock(name, task, around, frozenset(taken))
+        if traveller.goal is None and name in self._tasks:
+            self._give_up_late(name, task, others)
+
+    def _choose_spot(
+        self,
+        name: str,
+        task: _Task,
+        around: list[float],
+        taken: frozenset[int],
+        others: list[Traveller],
+    ) -> None:
+        assert task.place is not None
+        traveller = self._robots[name]
+        here = traveller.frontier
+        x, y, _ = self._poses[name]
+        if (
+            traveller.parked is not None
+            and not traveller.leaving
+            and name not in self._lingers
+            and self._world.place_at(x, y) == task.place
+            and here in self._spots.waiting[task.place]
+        ):
+            self._arrive(name)
+            return
+        idle = frozenset().union(*(other.claims for other in others if other.goal is None))
+        traveller.goal = self._spots.waiting_spot(task.place, around, taken, idle)
+        traveller.since_s = self._time_s
+
+    def _choose_dock(
+        self, name: str, task: _Task, around: list[float], taken: frozenset[int]
+    ) -> None:
+        traveller = self._robots[name]
+        here = self._poses[name]
+        parked = traveller.parked
+        best: tuple[float, Dock] | None = None
+        for dock in task.docks:
+            if (
+                parked is not None
+                and not traveller.leaving
+                and math.dist(dock.point_m, here[:2]) < 0.04
+            ):
+                # It stands there already: turning on the spot needs nobody's room.
+                traveller.parked = Dock(parked.node, parked.point_m, dock.yaw_rad, parked.owned)
+                self._yaws[name] = dock.yaw_rad
+                self._lingers[name] = self._time_s + LINGER_S
+                return
+            if dock.owned & taken:
+                continue
+            cost = around[dock.node] + dock.cost_m
+            if math.isfinite(cost) and (best is None or cost < best[0]):
+                best = (cost, dock)
+        if best is not None:
+            traveller.goal, traveller.dock = best[1].node, best[1]
+            traveller.since_s = self._time_s
+            self._yaws[name] = best[1].yaw_rad
+
+    def _give_up_late(self, name: str, task: _Task, others: list[Traveller]) -> None:
+        if task.moved_s is None or self._time_s - task.moved_s < PATIENCE_S:
+            return
+        traveller = self._robots[name]
+        x, y, _ = self._poses[name]
+        near = sorted(
+            (other.name for other in others if other.static or traveller.goal is None),
+            key=lambda other: math.dist(self._poses[other][:2], (x, y)),
+        )
+        if traveller.goal is None and task.place is not None:
+            reason = f"no free spot in {task.place}"
+        else:
+            reason = f"no way to {task.what}"
+        if near:
+            reason += f": {', '.join(near)} {'stands' if len(near) == 1 else 'stand'} in the way"
+        self.cancel(name)
+        self._failed[name] = reason
+
+    def _arrive(self, name: str) -> None:
+        del self._tasks[name]
+        self._robots[name].goal = None
+
+    def _leg(self, name: str) -> Leg:
+        traveller = self._robots[name]
+        points = self._lattice.points_m
+        ahead = [(float(points[n][0]), float(points[n][1])) for n in traveller.track]
+        yaw = self._yaws.get(name)
+        parked = traveller.parked
+        if parked is not None:
+            ahead = [ahead[0] if traveller.leaving else parked.point_m]
+        at_goal = parked is not None and not traveller.leaving and traveller.goal is None
+        leg = steer(
+            self._poses[name],
+            ahead,
+            on_line=parked is None,
+            yaw_rad=yaw if at_goal else None,
+            speed_m_s=self._speeds[name],
+            failed=self._failed.get(name),
+        )
+        if name in self._tasks and leg.arrived:
+            if at_goal and yaw is not None:
+                self._lingers[name] = self._time_s + LINGER_S
+                self._arrive(name)
+            elif traveller.dock is None and traveller.goal == traveller.frontier and parked is None:
+                self._arrive(name)
+        return Leg(
+            leg.target_m,
+            leg.yaw_rad,
+            leg.speed_limit_m_s,
+            arrived=name not in self._tasks and leg.failed is None and name not in self._failed,
+            failed=leg.failed,
+        )

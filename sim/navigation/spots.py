@@ -1,0 +1,142 @@
+"""Where robots may wait, and where they may stand to reach something."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.navigation.clearance import Clearance
+from sim.navigation.lattice import PITCH_M, TRACKING_M, Lattice
+from sim.world_model import LARGEST_RADIUS_M, WorldFile
+
+DOOR_M = 0.5
+"""Waiting robots leave this much free beyond a door's own width, around its centre."""
+
+TABLE_FRONT_M = 0.9
+"""Nearer than this to a table, a waiting robot is in the way of those who work at it."""
+
+DOCK_M = 1.3
+"""Longest straight way from the lattice to a stance."""
+
+
+@dataclass(frozen=True)
+class Dock:
+    """A stance beside the lattice, and the straight way to it from `node`.
+
+    `owned` are the nodes a robot keeps to itself on that way and while it stands there.
+    """
+
+    node: int
+    point_m: tuple[float, float]
+    yaw_rad: float
+    owned: frozenset[int]
+    cost_m: float = 0.0
+
+
+class Spots:
+    """The places to stop at in one world."""
+
+    def __init__(self, world: WorldFile, lattice: Lattice, clearance: Clearance) -> None:
+        self._lattice, self._clearance = lattice, clearance
+        points = lattice.points_m
+        self.by_door = np.zeros(len(points), dtype=bool)  # (n,)
+        for door in world.doors.values():
+            gap = np.linalg.norm(points - door.center_m, axis=1)
+            self.by_door |= gap < door.width_m / 2 + DOOR_M
+        # A waiting robot must not cut the free floor in two (the way into an alcove, say).
+        self.by_door |= np.array([self._cuts(node) for node in range(len(points))], dtype=bool)
+        self.at_table = np.zeros(len(points), dtype=bool)
+        for top in world.surfaces():
+            c, s = math.cos(top.yaw_rad), math.sin(top.yaw_rad)
+            dx, dy = points[:, 0] - top.x_m, points[:, 1] - top.y_m
+            along = np.maximum(np.abs(c * dx + s * dy) - top.length_m / 2, 0.0)
+            across = np.maximum(np.abs(c * dy - s * dx) - top.width_m / 2, 0.0)
+            self.at_table |= np.hypot(along, across) < TABLE_FRONT_M
+        places = [world.place_at(x, y) for x, y in points]
+        self.waiting: dict[str, tuple[int, ...]] = {
+            name: tuple(
+                node
+                for node, place in enumerate(places)
+                if place == name and not self.by_door[node]
+            )
+            for name in world.place_entries
+        }
+        everywhere = frozenset(node for nodes in self.waiting.values() for node in nodes)
+        self.retreat = lattice.field(everywhere)
+        """Distance from each node to the nearest one where a robot may wait, m."""
+
+    def _cuts(self, node: int) -> bool:
+        around = self._lattice.neighbours[node]
+        if len(around) < 2:
+            return False
+        field = self._lattice.field(frozenset(around[:1]), frozenset({node}))
+        # Further apart than once around a block of four: a bottleneck for all practical ends.
+        return any(field[other] > 8 * PITCH_M for other in around[1:])
+
+    def waiting_spot(
+        self, place: str, field: list[float], taken: frozenset[int], disliked: frozenset[int]
+    ) -> int | None:
+        """The best free node to wait at in `place`; `field` is the distance from the robot.
+
+        `taken` are out of the question; `disliked` are those of robots that would have to move.
+        """
+        best: tuple[float, int] | None = None
+        for node in self.waiting[place]:
+            if node in taken or not math.isfinite(field[node]):
+                continue
+            crowd = sum(other in taken for other in self._lattice.neighbours[node])
+            cost = field[node] + 2.0 * bool(self.at_table[node]) + 0.5 * crowd
+            cost += 3.0 * (node in disliked)
+            if best is None or (cost, node) < best:
+                best = (cost, node)
+        return None if best is None else best[1]
+
+    def dock(self, start_m: tuple[float, float], node: int, radius_m: float, yaw: float) -> Dock:
+        """The stance at `start_m`, entered from `node`."""
+        x, y = (float(v) for v in self._lattice.points_m[node])
+        gap = radius_m + LARGEST_RADIUS_M + 2 * TRACKING_M
+        owned = self._lattice.near((x, y), start_m, gap) | {node}
+        return Dock(node, start_m, yaw, owned, math.dist((x, y), start_m))
+
+    def ways_in(
+        self, point_m: tuple[float, float], radius_m: float, reach_m: float = DOCK_M
+    ) -> list[int]:
+        """The nodes from which a robot can drive straight to `point_m`, nearest first."""
+        gaps = np.linalg.norm(self._lattice.points_m - point_m, axis=1)
+        near = np.flatnonzero(gaps <= reach_m)
+        here = float(self._clearance.at(point_m))
+        room = self._clearance.along(point_m, self._lattice.points_m[near])
+        # Who starts close to a wall may leave it, but not come closer.
+        clear = room >= min(radius_m, here - 0.01)
+        ordered = near[clear][np.argsort(gaps[near[clear]], kind="stable")]
+        return [int(node) for node in ordered]
+
+    def stances(
+        self, point_m: tuple[float, float, float], radius_m: float, reach_m: tuple[float, float]
+    ) -> list[Dock]:
+        """Where a robot can stand facing a point with it within reach, ahead of any traffic.
+
+        The reach counts from the robot's centre. There is no wall between stance and point.
+        """
+        low, high = reach_m
+        x, y, z = point_m
+        middle = (low + high) / 2
+        distances = np.linspace(low, high, max(2, round((high - low) / 0.05) + 1))
+        angles = np.radians(np.arange(0, 360, 10))
+        d, angle = (a.ravel() for a in np.meshgrid(distances, angles, indexing="ij"))
+        points = np.stack([x + d * np.cos(angle), y + d * np.sin(angle)], axis=1)
+        good = self._clearance.at(points) >= radius_m + 0.03
+        good &= self._clearance.along((x, y), points, above_m=z + 0.02) > 0.0
+        found: list[Dock] = []
+        for k in np.flatnonzero(good):
+            stance = (float(points[k, 0]), float(points[k, 1]))
+            ways = self.ways_in(stance, radius_m + 0.03)
+            if ways:
+                dock = self.dock(
+                    stance, ways[0], radius_m, math.atan2(y - stance[1], x - stance[0])
+                )
+                off = 2.0 * abs(float(d[k]) - middle) + 0.2 * len(dock.owned)
+                found.append(Dock(dock.node, stance, dock.yaw_rad, dock.owned, dock.cost_m + off))
+        return found

@@ -1,0 +1,213 @@
+"""Who owns which nodes of the lattice: PIBT, in the form that waits for nobody's clock.
+
+Priority inheritance with backtracking (Okumura et al., "Priority Inheritance with Backtracking for
+Iterative Multi-agent Path Finding", AIJ 2022) lets a robot that has waited longest push others out
+of its way, each pushed one pushing on. Here, as in its causal variant (Okumura et al., "Time-
+Independent Planning for Multiple Moving Agents", AAAI 2021), a node is entered only after it was
+given up: a robot owns every node that its body can touch, from the one it leaves to the end of the
+way it was promised, and no node has two owners. That is the whole safety argument; what is decided
+here only moves ownership, and a robot that obeys drives only where it owns.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from sim.navigation.lattice import Lattice
+from sim.navigation.spots import Dock
+
+
+@dataclass
+class Traveller:
+    """One robot as traffic sees it.
+
+    `track` are the nodes from the last one reached to the end of what is promised; `corners[k]`
+    what the step from `track[k]` to `track[k + 1]` cuts. `parked` is the stance it is at, leaves or
+    enters; `goal` the node it wants to be at, `dock` the stance it wants to enter from there. A
+    `static` one stays where it is, whoever asks.
+    """
+
+    name: str
+    radius_m: float
+    track: list[int] = field(default_factory=list)
+    corners: list[tuple[int, ...]] = field(default_factory=list)
+    parked: Dock | None = None
+    leaving: bool = False
+    goal: int | None = None
+    dock: Dock | None = None
+    since_s: float = 0.0
+    static: bool = False
+    claims: frozenset[int] = frozenset()
+
+    @property
+    def frontier(self) -> int:
+        """The last node promised to it."""
+        return self.track[-1]
+
+    def recount(self) -> None:
+        """Bring `claims` up to date after a change."""
+        owned = set(self.track)
+        for corner in self.corners:
+            owned.update(corner)
+        if self.parked is not None:
+            owned |= self.parked.owned
+        self.claims = frozenset(owned)
+
+
+class Traffic:
+    """Decides, for all robots together, who may drive on to which node."""
+
+    def __init__(self, lattice: Lattice, retreat: list[float]) -> None:
+        self._lattice, self._retreat = lattice, retreat
+
+    def decide(self, robots: dict[str, Traveller], lookahead: int) -> None:
+        """Give robots the next nodes they may enter, `lookahead` ahead of where each is.
+
+        Changes the `track` of those who got one, and `parked` of those who may enter or must leave
+        their stance.
+        """
+        self._robots = robots
+        self._owners: dict[int, list[Traveller]] = {}
+        for robot in robots.values():
+            for node in robot.claims:
+                self._owners.setdefault(node, []).append(robot)
+        self._reserved: dict[int, str] = {}
+        self._decided: dict[str, int] = {}
+        self._stack: list[str] = []
+        static = [r for r in robots.values() if r.static]
+        self._blocked = frozenset().union(*(r.claims for r in static)) if static else frozenset()
+        for robot in static:
+            self._decided[robot.name] = robot.frontier
+        order = sorted(robots.values(), key=lambda r: (r.goal is None, r.since_s, r.name))
+        for robot in order:
+            if robot.name not in self._decided and len(robot.track) <= lookahead:
+                self._decide(robot, None)
+
+    def _decide(self, robot: Traveller, parent: Traveller | None) -> bool:
+        """One robot's next node; `parent` wants the one where it will be."""
+        self._stack.append(robot.name)
+        try:
+            here = robot.frontier
+            if robot.parked is not None and robot.goal is not None:
+                robot.leaving = True
+            if parent is None and robot.goal == here and robot.dock is not None:
+                return self._enter_dock(robot)
+            distance = self._distance(robot)
+            if parent is None and self._slant(robot, distance):
+                return True
+            options = [*self._lattice.neighbours[here], here]
+            options.sort(key=lambda v: (distance[v], self._held(v, robot), v != here, v))
+            for node in options:
+                if node in self._reserved and self._reserved[node] != robot.name:
+                    continue
+                if parent is not None and node in parent.claims:
+                    continue
+                if node == here:
+                    self._reserved[here] = robot.name
+                    self._decided[robot.name] = here
+                    return True
+                if self._obtain(robot, node):
+                    return True
+            self._reserved.setdefault(here, robot.name)
+            self._decided[robot.name] = here
+            return False
+        finally:
+            self._stack.pop()
+
+    def _distance(self, robot: Traveller) -> list[float]:
+        if robot.goal is None:
+            return self._retreat
+        goals = frozenset({robot.goal})
+        around = self._lattice.field(goals, self._blocked - robot.claims)
+        if math.isfinite(around[robot.frontier]):
+            return around
+        return self._lattice.field(goals)  # no way round: go up to who stands there, and wait
+
+    def _held(self, node: int, robot: Traveller) -> bool:
+        return any(owner is not robot for owner in self._owners.get(node, ()))
+
+    def _obtain(self, robot: Traveller, node: int) -> bool:
+        """Take `node`, or see to it that it will become free."""
+        others = [owner for owner in self._owners.get(node, ()) if owner is not robot]
+        before = self._reserved.get(node)
+        self._reserved[node] = robot.name
+        for other in others:
+            if not self._will_leave(other, node, robot):
+                if before is None:
+                    # Backtracking: who could not leave has reserved what it stands on.
+                    self._reserved[node] = other.name
+                return False
+        self._decided[robot.name] = node
+        if robot.parked is not None:
+            robot.leaving = True  # first back to its node on the lattice
+        elif not others:
+            self._extend(robot, node, ())
+        return True
+
+    def _will_leave(self, other: Traveller, node: int, robot: Traveller) -> bool:
+        if other.static:
+            return False
+        if node != other.frontier:
+            # It is passing: what it was promised it can always drive to the end. Or it stands
+            # beside the lattice, and keeps the node away from others until it is back on it.
+            other.leaving = other.parked is not None
+            return True
+        if other.name in self._stack:
+            return False
+        if other.name in self._decided:
+            return self._decided[other.name] != other.frontier
+        return self._decide(other, robot)
+
+    def _slant(self, robot: Traveller, distance: list[float]) -> bool:
+        """A step across a square, if that is shorter and all of the square is free."""
+        here = robot.frontier
+        if robot.parked is not None or robot.goal is None:
+            return False
+        straight = min((distance[v] for v in self._lattice.neighbours[here]), default=math.inf)
+        best = min(self._lattice.diagonals[here], key=lambda w: (distance[w], w), default=None)
+        if best is None or not distance[best] < straight - 1e-6:
+            return False
+        square = (best, *self._lattice.diagonals[here][best])
+        if any(
+            self._held(v, robot) or self._reserved.get(v, robot.name) != robot.name for v in square
+        ):
+            return False
+        for node in square:
+            self._reserved[node] = robot.name
+        self._decided[robot.name] = best
+        self._extend(robot, best, square[1:])
+        return True
+
+    def _enter_dock(self, robot: Traveller) -> bool:
+        """All of the nodes that the way to the stance touches, or none."""
+        assert robot.dock is not None
+        self._reserved[robot.frontier] = robot.name
+        self._decided[robot.name] = robot.frontier
+        wanted = sorted(robot.dock.owned - robot.claims)
+        free = True
+        for node in wanted:
+            holder = self._reserved.setdefault(node, robot.name)
+            free &= holder == robot.name and not self._held(node, robot)
+        for node in wanted:
+            for other in self._owners.get(node, ()):
+                if other is not robot:
+                    self._will_leave(other, node, robot)
+        if free and robot.parked is None and len(robot.track) == 1:
+            robot.parked, robot.dock, robot.goal = robot.dock, None, None
+            robot.static = True
+            robot.recount()
+            self._own(robot)
+        return True
+
+    def _extend(self, robot: Traveller, node: int, corners: tuple[int, ...]) -> None:
+        robot.track.append(node)
+        robot.corners.append(corners)
+        robot.recount()
+        self._own(robot)
+
+    def _own(self, robot: Traveller) -> None:
+        for node in robot.claims:
+            owners = self._owners.setdefault(node, [])
+            if robot not in owners:
+                owners.append(robot)

@@ -1,0 +1,59 @@
+"""The process behind `robotctl router`: a Zenoh router and the durable store of its realms."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import socket
+import sys
+from pathlib import Path
+
+from fleet.stores.errors import StoreError
+from fleet.stores.sqlite import SqliteStore
+from keyexpr_schema.router import CannotListen, run_router
+
+FREE_PORT = ":0"
+
+
+def run(listen: tuple[str, ...], connect: tuple[str, ...], data_dir: Path) -> None:
+    """Be a router until SIGTERM or SIGINT; prints one line once it listens.
+
+    `listen` and `connect` are Zenoh endpoints such as `tcp/127.0.0.1:7447`; port 0 takes a free
+    one. `connect` names routers on other hosts. The store lies in `data_dir`.
+
+    Raises:
+        SystemExit: with 1 and one sentence on stderr, when it cannot start.
+    """
+    try:
+        asyncio.run(_run(tuple(with_port(endpoint) for endpoint in listen), connect, data_dir))
+    except (CannotListen, StoreError) as error:
+        print(f"error: {error}", file=sys.stderr)  # noqa: T201
+        raise SystemExit(1) from None
+
+
+async def _run(listen: tuple[str, ...], connect: tuple[str, ...], data_dir: Path) -> None:
+    loop = asyncio.get_running_loop()
+    ended = asyncio.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, ended.set)
+    with SqliteStore(data_dir) as store:
+        async with run_router(listen, connect, store):
+            print(f"router listening on {', '.join(listen)}", flush=True)  # noqa: T201
+            await ended.wait()
+
+
+def with_port(endpoint: str) -> str:
+    """`endpoint` with a free TCP port in place of port 0."""
+    if not endpoint.endswith(FREE_PORT):
+        return endpoint
+    scheme, _, address = endpoint.partition("/")
+    host = address.removesuffix(FREE_PORT)
+    family = socket.AF_INET6 if host.startswith("[") else socket.AF_INET
+    with socket.socket(family) as probe:
+        probe.bind((host.strip("[]"), 0))
+        return f"{scheme}/{host}:{probe.getsockname()[1]}"
+
+
+if __name__ == "__main__":
+    # python -m fleet.service.router_process LISTEN DATA_DIR [CONNECT...]
+    run((sys.argv[1],), tuple(sys.argv[3:]), Path(sys.argv[2]))

@@ -1,0 +1,439 @@
+"""One Zenoh session seen from asyncio: whether it is up, and calls that never block the loop.
+
+Zenoh's callbacks run on its own network threads and only hand over to the loop. Calls that may
+block (a full link, a handshake) run on one thread of their own, in the order in which they were
+made, so that a read never overtakes a write. `wire`, `link` and `router` are the only modules
+that import zenoh.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import threading
+from collections.abc import AsyncIterator, Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import zenoh
+from zenoh import handlers
+
+from keyexpr_schema.errors import Unreachable
+from keyexpr_schema.wire import Wire, read_sample, zenoh_config
+
+_T = TypeVar("_T")
+_log = logging.getLogger(__name__)
+
+OPEN_ATTEMPT_MS = 500
+"""Zenoh's own retry inside `open` cannot be interrupted, so it gets short attempts."""
+_TIMED_OUT = b"Timeout"
+"""What Zenoh puts into the error reply of a query that ran into its timeout."""
+
+
+@dataclass
+class Replies:
+    """What a query brought: values, sentences of refusal, and whether all answered in time."""
+
+    values: list[Wire] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
+    timed_out: bool = False
+
+
+@dataclass(frozen=True)
+class Request:
+    """A query to be answered with `answer` or `refuse`, once, then `close`."""
+
+    link: Link
+    query: zenoh.Query
+    keyexpr: str
+    data: bytes
+    encoding: str
+
+    async def answer(self, data: bytes, encoding: str) -> None:
+        """Send the reply and end the query."""
+        await self.link.call(self._answer, data, encoding)
+
+    def _answer(self, data: bytes, encoding: str) -> None:
+        with self.query as query:
+            query.reply(self.keyexpr, data, encoding=encoding)
+
+    async def refuse(self, sentence: str) -> None:
+        """Send an error reply and end the query."""
+        await self.link.call(self._refuse, sentence)
+
+    def _refuse(self, sentence: str) -> None:
+        with self.query as query:
+            query.reply_err(sentence.encode(), encoding="text/plain")
+
+
+class Link:
+    """A Zenoh client session; made by `open_link`.
+
+    `generation` counts how often a router came into view: what was learned in one generation
+    says nothing about the next.
+    """
+
+    def __init__(self, session: zenoh.Session, executor: ThreadPoolExecutor) -> None:
+        self._session = session
+        self._executor = executor
+        self._loop = asyncio.get_running_loop()
+        self._routers: dict[str, int] = {}
+        self._up = asyncio.Event()
+        self._listeners: list[Callable[[], None]] = []
+        self.generation = 0
+        self.up_since_s = 0.0
+        self._events = session.info.declare_transport_events_listener(
+            handlers.Callback(self._on_transport, indirect=False), history=True
+        )
+
+    # --- whether it is up ------------------------------------------------------------------------
+
+    @property
+    def up(self) -> bool:
+        """Whether a router is visible now."""
+        return self._up.is_set()
+
+    @property
+    def age_s(self) -> float:
+        """Seconds since a router came into view; 0 while there is none."""
+        return self._loop.time() - self.up_since_s if self.up else 0.0
+
+    async def wait_up(self, timeout_s: float | None = None) -> None:
+        """Wait until a router is visible.
+
+        Raises:
+            TimeoutError: none was within `timeout_s`.
+        """
+        async with asyncio.timeout(timeout_s):
+            await self._up.wait()
+
+    @contextlib.contextmanager
+    def listening(self, listener: Callable[[], None]) -> Any:
+        """Call `listener` on the loop whenever the link comes up or goes down."""
+        self._listeners.append(listener)
+        try:
+            yield
+        finally:
+            self._listeners.remove(listener)
+
+    def _on_transport(self, event: zenoh.TransportEvent) -> None:
+        if event.transport.whatami == zenoh.WhatAmI.ROUTER:
+            opened = event.kind == zenoh.SampleKind.PUT
+            self.hand_over(self._count_router, str(event.transport.zid), opened)
+
+    def _count_router(self, zid: str, opened: bool) -> None:
+        # A fast reconnection can show the new transport before the end of the old one.
+        self._routers[zid] = self._routers.get(zid, 0) + (1 if opened else -1)
+        if not self._routers[zid]:
+            del self._routers[zid]
+        if opened:
+            self.generation += 1
+            self.up_since_s = self._loop.time()
+        if any(count > 0 for count in self._routers.values()):
+            self._up.set()
+        else:
+            self._up.clear()
+        for listener in list(self._listeners):
+            listener()
+
+    # --- threads ---------------------------------------------------------------------------------
+
+    def hand_over(self, function: Callable[..., object], *args: Any) -> bool:
+        """Call `function(*args)` soon on the loop, from any thread; whether the loop still runs."""
+        try:
+            self._loop.call_soon_threadsafe(function, *args)
+        except RuntimeError:
+            return False
+        return True
+
+    async def call(self, function: Callable[..., _T], *args: Any) -> _T:
+        """Run a blocking Zenoh call on the link's thread, after those made before it."""
+        return await self._loop.run_in_executor(self._executor, function, *args)
+
+    # --- values ----------------------------------------------------------------------------------
+
+    def new_timestamp(self) -> zenoh.Timestamp:
+        """A timestamp of this session's hybrid logical clock, later than all before it."""
+        return self._session.new_timestamp()
+
+    def send_soon(self, keyexpr: str, data: bytes, encoding: str, *, block: bool) -> None:
+        """Put and forget. `block`: wait (on the link's thread) when the link is full; else drop."""
+        if not block:
+            self._session.put(
+                keyexpr,
+                data,
+                encoding=encoding,
+                congestion_control=zenoh.CongestionControl.DROP,
+            )
+            return
+        stamp = self.new_timestamp()
+        future = self._executor.submit(self._send, keyexpr, data, encoding, stamp)
+        future.add_done_callback(_log_failure)
+
+    async def send(
+        self, keyexpr: str, data: bytes | None, encoding: str, timestamp: zenoh.Timestamp
+    ) -> None:
+        """Put (`data` None: delete) and wait until it is on the link, not until it is stored."""
+        await self.call(self._send, keyexpr, data, encoding, timestamp)
+
+    def _send(
+        self, keyexpr: str, data: bytes | None, encoding: str, timestamp: zenoh.Timestamp
+    ) -> None:
+        block = zenoh.CongestionControl.BLOCK
+        if data is None:
+            self._session.delete(keyexpr, timestamp=timestamp, congestion_control=block)
+        else:
+            self._session.put(
+                keyexpr, data, encoding=encoding, timestamp=timestamp, congestion_control=block
+            )
+
+    async def query(
+        self,
+        keyexpr: str,
+        timeout_s: float,
+        data: bytes | None = None,
+        encoding: str | None = None,
+        *,
+        first: bool = False,
+    ) -> Replies:
+        """Ask everyone who answers for `keyexpr`; `first`: return with the first value."""
+        replies = Replies()
+        done: asyncio.Future[None] = self._loop.create_future()
+
+        def finish() -> None:
+            if not done.done():
+                done.set_result(None)
+
+        def collect(value: Wire | bytes) -> None:
+            if isinstance(value, Wire):
+                replies.values.append(value)
+                if first:
+                    finish()
+            elif value == _TIMED_OUT:
+                replies.timed_out = True
+            else:
+                replies.errors.append(value.decode(errors="replace"))
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                self.hand_over(collect, read_sample(reply.ok))
+            elif reply.err is not None:
+                self.hand_over(collect, reply.err.payload.to_bytes())
+
+        def ask() -> None:
+            self._session.get(
+                keyexpr,
+                handlers.Callback(on_reply, lambda: self.hand_over(finish), indirect=False),
+                target=zenoh.QueryTarget.ALL,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                timeout=timeout_s,
+                payload=data,
+                encoding=encoding,
+                congestion_control=zenoh.CongestionControl.BLOCK,
+            )
+
+        await self.call(ask)
+        await done
+        return replies
+
+    @asynccontextmanager
+    async def subscribed(
+        self, keyexpr: str, receive: Callable[[Wire], None]
+    ) -> AsyncIterator[None]:
+        """Call `receive` on the loop with every value and deletion that passes."""
+
+        def declare() -> zenoh.Subscriber[None]:
+            return self._session.declare_subscriber(
+                keyexpr,
+                handlers.Callback(  # type: ignore[arg-type]
+                    lambda sample: self.hand_over(receive, read_sample(sample)), indirect=False
+                ),
+            )
+
+        async with self._declared(declare):
+            yield
+
+    @asynccontextmanager
+    async def answering(
+        self, keyexpr: str, receive: Callable[[Request], None]
+    ) -> AsyncIterator[None]:
+        """Call `receive` on the loop with every query for `keyexpr`."""
+
+        def on_query(query: zenoh.Query) -> None:
+            data = query.payload.to_bytes() if query.payload is not None else b""
+            encoding = str(query.encoding) if query.encoding is not None else ""
+            request = Request(self, query, str(query.key_expr), data, encoding)
+            if not self.hand_over(receive, request):
+                query.drop()  # type: ignore[no-untyped-call]
+
+        def declare() -> zenoh.Queryable[None]:
+            return self._session.declare_queryable(
+                keyexpr,
+                handlers.Callback(on_query, indirect=False),
+            )
+
+        async with self._declared(declare):
+            yield
+
+    # --- liveliness ------------------------------------------------------------------------------
+
+    @asynccontextmanager
+    async def token(self, keyexpr: str) -> AsyncIterator[None]:
+        """Hold a liveliness token; Zenoh declares it again after every reconnection."""
+        async with self._declared(lambda: self._session.liveliness().declare_token(keyexpr)):
+            yield
+
+    async def tokens(self, keyexpr: str, timeout_s: float) -> Replies:
+        """The liveliness tokens there are now."""
+
+        def ask() -> list[zenoh.Reply]:
+            # A channel of the default size deadlocks past 256 tokens when the session also has
+            # a liveliness subscriber.
+            channel: handlers.FifoChannel[zenoh.Reply] = handlers.FifoChannel(100_000)
+            return list(self._session.liveliness().get(keyexpr, channel, timeout=timeout_s))
+
+        replies = Replies()
+        for reply in await asyncio.to_thread(ask):
+            if reply.ok is not None:
+                replies.values.append(read_sample(reply.ok))
+            elif reply.err is not None and reply.err.payload.to_bytes() == _TIMED_OUT:
+                replies.timed_out = True
+        return replies
+
+    @asynccontextmanager
+    async def tokens_watched(
+        self, keyexpr: str, receive: Callable[[Wire], None]
+    ) -> AsyncIterator[None]:
+        """Call `receive` on the loop with tokens that come (those there already, too) and go."""
+
+        def declare() -> zenoh.Subscriber[None]:
+            return self._session.liveliness().declare_subscriber(
+                keyexpr,
+                handlers.Callback(  # type: ignore[arg-type]
+                    lambda sample: self.hand_over(receive, read_sample(sample)), indirect=False
+                ),
+                history=True,
+            )
+
+        async with self._declared(declare):
+            yield
+
+    @asynccontextmanager
+    async def _declared(self, declare: Callable[[], Any]) -> AsyncIterator[None]:
+        future = self._executor.submit(declare)
+        try:
+            await asyncio.wrap_future(future)
+            yield
+        finally:
+            # The declaration may have happened although its waiter was cancelled.
+            future.cancel()
+
+            def undeclare() -> None:
+                if not future.cancelled() and future.exception() is None:
+                    future.result().undeclare()
+
+            with contextlib.suppress(RuntimeError):  # the session closed first, and undeclared it
+                await asyncio.shield(self.call(undeclare))
+
+    def close(self) -> None:
+        """Close the session; blocks for a moment. What was sent before goes out first."""
+        with contextlib.suppress(zenoh.ZError):
+            self._events.undeclare()  # type: ignore[no-untyped-call]
+        self._session.close()  # type: ignore[no-untyped-call]
+
+
+def _log_failure(future: Any) -> None:
+    if not future.cancelled() and future.exception() is not None:
+        _log.warning("a put was lost: %s", future.exception())
+
+
+class _Opening:
+    """`zenoh.open` on a thread, such that a session nobody waits for any more is closed."""
+
+    def __init__(self, config: zenoh.Config) -> None:
+        self._config = config
+        self._lock = threading.Lock()
+        self._abandoned = False
+        self._session: zenoh.Session | None = None
+
+    def run(self) -> zenoh.Session:
+        session = zenoh.open(self._config)
+        with self._lock:
+            self._session = session
+            abandoned = self._abandoned
+        if abandoned:
+            session.close()  # type: ignore[no-untyped-call]
+        return session
+
+    def abandon(self) -> None:
+        with self._lock:
+            self._abandoned = True
+            session = self._session
+        if session is not None:
+            session.close()  # type: ignore[no-untyped-call]
+
+
+async def _connect(
+    endpoints: Sequence[str],
+    realm: str,
+    lease_s: float,
+    timeout_s: float | None,
+    executor: ThreadPoolExecutor,
+) -> zenoh.Session:
+    loop = asyncio.get_running_loop()
+    started_s = loop.time()
+    pause_s = 0.1
+    while True:
+        left_s = None if timeout_s is None else timeout_s - (loop.time() - started_s)
+        attempt_ms = OPEN_ATTEMPT_MS if left_s is None else min(OPEN_ATTEMPT_MS, left_s * 1000)
+        config = zenoh_config(
+            "client",
+            connect=endpoints,
+            lease_s=lease_s,
+            namespace=realm,
+            connect_timeout_ms=max(50, round(attempt_ms)),
+        )
+        opening = _Opening(config)
+        try:
+            return await asyncio.shield(loop.run_in_executor(executor, opening.run))
+        except zenoh.ZError as error:
+            if timeout_s is not None and loop.time() - started_s + pause_s >= timeout_s:
+                raise Unreachable(
+                    f"no router answers at {', '.join(endpoints)}: start one with "
+                    "`robotctl router` or name another with --router"
+                ) from error
+        except asyncio.CancelledError:
+            opening.abandon()
+            raise
+        await asyncio.sleep(pause_s)
+        pause_s = min(0.5, pause_s * 2)
+
+
+@asynccontextmanager
+async def open_link(
+    endpoints: Sequence[str], realm: str, lease_s: float, connect_timeout_s: float | None
+) -> AsyncIterator[Link]:
+    """A link to the first of `endpoints` that answers; closed at the end, whatever happens.
+
+    Raises:
+        Unreachable: none answered within `connect_timeout_s`.
+    """
+    loop = asyncio.get_running_loop()
+    executor = ThreadPoolExecutor(1, "zenoh")
+    try:
+        session = await _connect(endpoints, realm, lease_s, connect_timeout_s, executor)
+        close: Callable[[], None] = session.close
+        try:
+            link = Link(session, executor)
+            close = link.close
+            with contextlib.suppress(TimeoutError):
+                await link.wait_up(1.0)
+            yield link
+        finally:
+            # Shielded: an unclosed session keeps the interpreter from ending.
+            await asyncio.shield(loop.run_in_executor(executor, close))
+    finally:
+        executor.shutdown(wait=False)

@@ -1,0 +1,154 @@
+"""What travels on a Zenoh link, in plain Python: configuration, stamps, encodings, samples.
+
+`wire`, `link` and `router` are the only modules that import zenoh.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import zenoh
+
+from keyexpr_schema.errors import UndecodablePayload
+from keyexpr_schema.key import SCHEMA_PREFIX, P, decode_payload
+
+ENCODING_PREFIX = "application/json;"
+_ID_BITS = 128
+
+
+def stamp_of_text(text: str) -> int:
+    """The integer that orders a Zenoh timestamp `<NTP64 decimal>/<id hexadecimal>`.
+
+    Time in the upper 64 bits, id in the lower 128: comparing these integers is comparing the
+    timestamps as Zenoh does, which a float or a datetime cannot (they lose the lowest bits).
+
+    Raises:
+        ValueError: `text` is not such a timestamp.
+    """
+    time, _, source = text.partition("/")
+    return int(time) << _ID_BITS | int(source, 16)
+
+
+def text_of_stamp(stamp: int) -> str:
+    """The timestamp whose integer is `stamp`, as Zenoh prints it."""
+    return f"{stamp >> _ID_BITS}/{stamp & (1 << _ID_BITS) - 1:x}"
+
+
+def timestamp_of_stamp(stamp: int) -> zenoh.Timestamp:
+    """A Zenoh timestamp near `stamp`: at most 2 ns older, never newer.
+
+    Zenoh's Python API cannot set the lowest bits of a timestamp, so exact stamps travel as text
+    in the attachment of a stored reply (see `stamp_of`). Rounding down means that a reader that
+    knows only the timestamp never prefers the stored value to a newer live one.
+    """
+    time = stamp >> _ID_BITS
+    seconds, fraction = time >> 32, time & 0xFFFF_FFFF
+    nanos = max(0, fraction * 1_000_000_000 // (1 << 32) - 1)
+    source = (stamp & (1 << _ID_BITS) - 1) or 1
+    return zenoh.Timestamp(
+        zenoh.NTP64(seconds, nanos), source.to_bytes((source.bit_length() + 7) // 8, "little")
+    )
+
+
+@dataclass(frozen=True)
+class Wire:
+    """A value or a deletion as it came over the link. `stamp` 0: it carried no timestamp."""
+
+    keyexpr: str
+    data: bytes
+    encoding: str
+    stamp: int
+    deleted: bool
+
+
+def read_sample(sample: zenoh.Sample) -> Wire:
+    """Copy `sample` out of Zenoh.
+
+    The stamp is the one in the attachment where there is one (replies of the embedded store,
+    which cannot rebuild a timestamp exactly after a restart), else the sample's timestamp (live
+    puts, and replies of a zenohd storage).
+    """
+    stamp = 0
+    if sample.attachment is not None:
+        try:
+            stamp = stamp_of_text(sample.attachment.to_string())
+        except (ValueError, UnicodeDecodeError, zenoh.ZError):
+            stamp = 0
+    if not stamp and sample.timestamp is not None:
+        stamp = stamp_of_text(str(sample.timestamp))
+    deleted = sample.kind == zenoh.SampleKind.DELETE
+    return Wire(
+        str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding), stamp, deleted
+    )
+
+
+def encoding_of(schema: str) -> str:
+    """The Zenoh encoding of JSON with this schema, e.g. `application/json;robotfleet/fact/1`."""
+    return ENCODING_PREFIX + schema
+
+
+def decode_wire(
+    data: bytes, encoding: str, kind: type[P], name: str, version: int, where: str
+) -> P:
+    """Decode `data`, found at `where`, as version `version` or older of schema `name`.
+
+    Bytes without a schema in their encoding (somebody put them by hand) are taken at their word.
+
+    Raises:
+        UndecodablePayload: another schema, a newer version, or not a payload of this type.
+    """
+    _, _, schema = encoding.partition(";")
+    if schema:
+        parts = schema.split("/")
+        if len(parts) != 3 or parts[:2] != [SCHEMA_PREFIX, name] or not parts[2].isdecimal():
+            raise UndecodablePayload(
+                f"the value at {where} says it is {schema!r}, but this key carries "
+                f"'{SCHEMA_PREFIX}/{name}/{version}'"
+            )
+        if int(parts[2]) > version:
+            raise UndecodablePayload(
+                f"the value at {where} is version {parts[2]} of {name}, but this program knows "
+                f"versions up to {version}: update it"
+            )
+    return decode_payload(kind, data, where)
+
+
+def zenoh_config(
+    mode: str,
+    *,
+    connect: Sequence[str] = (),
+    listen: Sequence[str] = (),
+    lease_s: float = 2.0,
+    namespace: str | None = None,
+    connect_timeout_ms: int | None = None,
+) -> zenoh.Config:
+    """A Zenoh configuration: no multicast, source timestamps, no shared memory, quick retries.
+
+    Shared memory is off because with it a router refuses sessions past 351.
+    """
+    values: dict[str, Any] = {
+        "mode": mode,
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": mode == "router",
+        "timestamping/enabled": True,
+        "transport/shared_memory/enabled": False,
+        "transport/link/tx/lease": round(lease_s * 1000),
+        "connect/endpoints": list(connect),
+        "connect/retry": {
+            "period_init_ms": 100,
+            "period_max_ms": 500,
+            "period_increase_factor": 2,
+        },
+        "listen/endpoints": list(listen),
+    }
+    if namespace is not None:
+        values["namespace"] = namespace
+    if connect_timeout_ms is not None:
+        values["connect/timeout_ms"] = connect_timeout_ms
+    config = zenoh.Config()
+    for path, value in values.items():
+        config.insert_json5(path, json.dumps(value))
+    return config

@@ -1,0 +1,175 @@
+"""Everything robotctl knows of a running fleet, kept current by the key-space."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from cli.errors import TooLate
+from keyexpr_schema.goals import ENDED_GOALS, Goal, GoalStatus
+from keyexpr_schema.key import Payload
+from keyexpr_schema.keyspace import (
+    GOAL_SPEC,
+    GOAL_STATUS,
+    PLAN_SPEC,
+    PLAN_STATUS,
+    REJECT,
+    ROBOT_SPEC,
+    ROBOT_STATE,
+    SIM_CLOCK,
+    SIM_CONTACTS,
+    SIM_SCENE,
+    SIM_TRUTH,
+    TASK_RECORD,
+)
+from keyexpr_schema.plans import Plan, PlanStatus
+from keyexpr_schema.robots import RobotSpec, RobotState
+from keyexpr_schema.service import Reject
+from keyexpr_schema.simulation import ContactCount, Scene, SimClock, Truth
+from keyexpr_schema.tasks import TaskRecord
+
+if TYPE_CHECKING:
+    from keyexpr_schema.session import Change, Session
+
+FLEET = (GOAL_SPEC, GOAL_STATUS, PLAN_SPEC, PLAN_STATUS, TASK_RECORD, ROBOT_SPEC, ROBOT_STATE)
+"""What any fleet has."""
+SIMULATION = (SIM_CLOCK, SIM_TRUTH, SIM_CONTACTS, SIM_SCENE)
+"""What only a simulated one has."""
+
+
+@dataclass
+class Board:
+    """The latest value of every key that matters to a person who watches; by id.
+
+    `changed` is set after each change; whoever waits clears it first (see `until`).
+    """
+
+    goals: dict[str, Goal] = field(default_factory=dict)
+    goal_status: dict[str, GoalStatus] = field(default_factory=dict)
+    plans: dict[str, Plan] = field(default_factory=dict)
+    plan_status: dict[str, PlanStatus] = field(default_factory=dict)
+    tasks: dict[tuple[str, str], TaskRecord] = field(default_factory=dict)
+    specs: dict[str, RobotSpec] = field(default_factory=dict)
+    robots: dict[str, RobotState] = field(default_factory=dict)
+    rejects: dict[str, Reject] = field(default_factory=dict)
+    truths: dict[str, Truth] = field(default_factory=dict)
+    clock: SimClock | None = None
+    contacts: ContactCount | None = None
+    scene: Scene | None = None
+    failure: Exception | None = None
+    changed: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def apply(self, change: Change[Any, Any]) -> None:
+        """Take in one change of a key."""
+        value: Payload | None = change.value
+        shelf = self._shelf(change.key.name)
+        if shelf is not None:
+            fields = change.address.__struct_fields__
+            parts = tuple(getattr(change.address, name) for name in fields)
+            where = parts if len(parts) > 1 else parts[0]
+            if value is None:
+                shelf.pop(where, None)
+            else:
+                shelf[where] = value
+        elif value is not None:
+            if isinstance(value, SimClock):
+                self.clock = value
+            elif isinstance(value, ContactCount):
+                self.contacts = value
+            elif isinstance(value, Scene):
+                self.scene = value
+        self.changed.set()
+
+    def _shelf(self, key: str) -> dict[Any, Any] | None:
+        shelves: dict[str, dict[Any, Any]] = {
+            GOAL_SPEC.name: self.goals,
+            GOAL_STATUS.name: self.goal_status,
+            PLAN_SPEC.name: self.plans,
+            PLAN_STATUS.name: self.plan_status,
+            TASK_RECORD.name: self.tasks,
+            ROBOT_SPEC.name: self.specs,
+            ROBOT_STATE.name: self.robots,
+            SIM_TRUTH.name: self.truths,
+            REJECT.name: self.rejects,
+        }
+        return shelves.get(key)
+
+    @property
+    def now_s(self) -> float | None:
+        """The fleet's clock, where a simulation publishes it; else the latest time on a key."""
+        if self.clock is not None:
+            return self.clock.time_s
+        times = [state.time_s for state in self.robots.values()]
+        times += [status.time_s for status in self.plan_status.values()]
+        return max(times, default=None)
+
+    def changed_s(self, plan: str) -> float:
+        """When a plan last changed, as far as its status says (0: no status)."""
+        status = self.plan_status.get(plan)
+        return status.time_s if status else 0.0
+
+    def ended(self, goals: tuple[str, ...]) -> bool:
+        """Whether the planner has given its last word on every one of `goals`."""
+        return all(
+            goal in self.goal_status and self.goal_status[goal].state in ENDED_GOALS
+            for goal in goals
+        )
+
+    async def until(
+        self, condition: Callable[[], bool], timeout_s: float, waiting_for: str
+    ) -> None:
+        """Return as soon as `condition` holds.
+
+        Raises:
+            TooLate: it did not within `timeout_s` [s]; the message says what was waited for.
+        """
+        try:
+            async with asyncio.timeout(timeout_s):
+                while not condition():
+                    if self.failure is not None:
+                        raise self.failure
+                    self.changed.clear()
+                    await self.changed.wait()
+        except TimeoutError:
+            raise TooLate(f"waited {timeout_s:g} s for {waiting_for}, in vain") from None
+
+    async def forever(self) -> None:
+        """Return only by cancellation, or by what goes wrong in the background."""
+        while self.failure is None:
+            self.changed.clear()
+            await self.changed.wait()
+        raise self.failure
+
+
+@asynccontextmanager
+async def following(
+    session: Session, *keys: Any, on_change: Callable[[Change[Any, Any]], None] | None = None
+) -> AsyncIterator[Board]:
+    """A board that is kept current in the background; at entry all that is stored is on it.
+
+    `on_change` hears of each change before it is on the board. An error in the background is
+    raised by `Board.until`.
+    """
+    board = Board()
+    async with session.watch(*keys) as watch:
+
+        async def follow() -> None:
+            try:
+                async for change in watch:
+                    if on_change is not None:
+                        on_change(change)
+                    board.apply(change)
+            except Exception as error:
+                board.failure = error
+                board.changed.set()
+
+        follower = asyncio.create_task(follow())
+        try:
+            await watch.synced()
+            yield board
+        finally:
+            follower.cancel()
+            await asyncio.wait([follower])

@@ -1,0 +1,183 @@
+"""What all commands share: global options in any position, a session, output, and errors.
+
+A command is a function whose first parameter is a `Call`. `@command(app)` registers it with the
+global options added, so that `robotctl robots --json` and `robotctl --json robots` are the same.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import sys
+from collections.abc import Callable, Coroutine
+from contextlib import AbstractAsyncContextManager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cli.errors import CliError
+from cli.settings import Settings, load_settings, one_line
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from keyexpr_schema.session import Session
+
+CONNECT_TIMEOUT_S = 2.0
+"""Less than the 3 s within which robotctl must say that there is no router."""
+
+RouterOption = Annotated[
+    list[str] | None,
+    typer.Option("--router", metavar="ENDPOINT", help="Zenoh router; may be repeated."),
+]
+RealmOption = Annotated[
+    str | None, typer.Option("--realm", metavar="NAME", help="Which fleet on that router.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print data as JSON on stdout.")]
+
+
+@dataclass(frozen=True)
+class GlobalFlags:
+    """Global options given before the subcommand."""
+
+    routers: tuple[str, ...] = ()
+    realm: str | None = None
+    json: bool = False
+
+
+@dataclass(frozen=True)
+class Call:
+    """One run of one command: its settings, and how it talks to the fleet and to the person."""
+
+    settings: Settings
+
+    @property
+    def json(self) -> bool:
+        """Whether data goes to stdout as JSON."""
+        return self.settings.json
+
+    def session(
+        self, connect_timeout_s: float = CONNECT_TIMEOUT_S
+    ) -> AbstractAsyncContextManager[Session]:
+        """A session on the configured router; entering raises `Unreachable` if there is none."""
+        from keyexpr_schema.session import SessionConfig, open_session
+
+        return open_session(
+            SessionConfig(
+                endpoints=self.settings.routers,
+                realm=self.settings.realm,
+                component="robotctl",
+                connect_timeout_s=connect_timeout_s,
+            )
+        )
+
+    def show(self, data: object, draw: Callable[[], RenderableType]) -> None:
+        """Print `data` (payloads, or containers of them) as JSON, or what `draw` makes of it."""
+        if self.json:
+            import msgspec
+
+            encoded = msgspec.json.encode(data, enc_hook=_encode)
+            typer.echo(msgspec.json.format(encoded, indent=2).decode())
+        else:
+            from cli.show.page import page
+
+            page().print(draw())
+
+    def say(self, sentence: str) -> None:
+        """A sentence for a person: on stdout, or on stderr where stdout carries JSON."""
+        typer.echo(sentence, err=self.json)
+
+    def warn(self, sentence: str) -> None:
+        """A sentence for a person, on stderr."""
+        typer.echo(sentence, err=True)
+
+
+Body = Callable[..., Coroutine[Any, Any, None] | None]
+
+
+def command(app: typer.Typer, name: str | None = None) -> Callable[[Body], Body]:
+    """Register `body(call, …)`, plain or async, as a command of `app` with the global options."""
+
+    def register(body: Body) -> Body:
+        signature = inspect.signature(body, eval_str=True)
+        own = list(signature.parameters.values())[1:]
+
+        @functools.wraps(body)
+        def run(
+            *,
+            ctx: typer.Context,
+            router: list[str] | None,
+            realm: str | None,
+            json: bool,
+            **arguments: object,
+        ) -> None:
+            before = ctx.obj if isinstance(ctx.obj, GlobalFlags) else GlobalFlags()
+            with one_sentence_errors():
+                settings = load_settings(
+                    list(router or before.routers), realm or before.realm, json or before.json
+                )
+                outcome = body(Call(settings), **arguments)
+                if inspect.iscoroutine(outcome):
+                    import asyncio
+
+                    asyncio.run(outcome)
+
+        keyword = inspect.Parameter.KEYWORD_ONLY
+        parameters = [
+            inspect.Parameter("ctx", keyword, annotation=typer.Context),
+            *(parameter.replace(kind=keyword) for parameter in own),
+            inspect.Parameter("router", keyword, default=None, annotation=RouterOption),
+            inspect.Parameter("realm", keyword, default=None, annotation=RealmOption),
+            inspect.Parameter("json", keyword, default=False, annotation=JsonOption),
+        ]
+        run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+        app.command(name)(run)
+        return body
+
+    return register
+
+
+class one_sentence_errors:  # noqa: N801 - used like a function, as contextlib's are
+    """What goes wrong in the domain is a sentence on stderr and exit code 1, not a traceback."""
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if error is None or isinstance(error, typer.Exit):
+            return
+        found = next((each for each in _leaves(error) if isinstance(each, _domain_errors())), None)
+        if found is not None:
+            # Some libraries print to a buffered stdout; keep what was said before the error first.
+            sys.stdout.flush()
+            typer.echo(f"Error: {one_line(found)}", err=True)
+            raise typer.Exit(1) from None
+
+
+def _leaves(error: BaseException) -> list[BaseException]:
+    """The errors inside a (nested) group, as a TaskGroup raises them."""
+    if isinstance(error, BaseExceptionGroup):
+        return [leaf for each in error.exceptions for leaf in _leaves(each)]
+    return [error]
+
+
+def _domain_errors() -> tuple[type[BaseException], ...]:
+    """Error roots of the packages that are loaded anyway; importing others would only cost time."""
+    from keyexpr_schema.errors import SchemaError
+
+    roots: list[type[BaseException]] = [CliError, SchemaError, OSError]
+    for module, root in (
+        ("fleet.errors", "FleetError"),
+        ("sim.errors", "SimError"),
+        ("workers.errors", "WorkerError"),
+    ):
+        kind = getattr(sys.modules.get(module), root, None)
+        if isinstance(kind, type) and issubclass(kind, BaseException):
+            roots.append(kind)
+    return tuple(roots)
+
+
+def _encode(value: object) -> object:
+    raise CliError(f"cannot show a {type(value).__name__} as JSON")

@@ -1,0 +1,158 @@
+"""`robotctl goal`: what people want."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.command import Call, command
+
+if TYPE_CHECKING:
+    from keyexpr_schema.goals import Goal, GoalStatus
+    from keyexpr_schema.session import Session
+
+UNDERSTANDING_S = 10.0
+"""How long the planner may take to read a goal; an LLM is slower than the grammar."""
+
+app = typer.Typer(rich_markup_mode=None, add_completion=False)
+GoalArgument = Annotated[str, typer.Argument(metavar="GOAL", help="Its name.")]
+
+
+@app.callback()
+def goal() -> None:
+    """Say what you want, in a sentence; see what became of it."""
+
+
+@command(app, "add")
+async def add(
+    call: Call,
+    text: Annotated[str, typer.Argument(metavar="TEXT", help="What you want, in a sentence.")],
+    name: Annotated[
+        str | None, typer.Option("--id", help="Name of the goal; else made from its words.")
+    ] = None,
+    priority: Annotated[int, typer.Option("--priority", help="Higher goes first.")] = 0,
+    wait: Annotated[bool, typer.Option("--wait", help="Return when the goal has ended.")] = False,
+    timeout_s: Annotated[
+        float, typer.Option("--timeout-s", min=0.0, help="Longest time to --wait.")
+    ] = 600.0,
+) -> None:
+    """Want something. The planner says at once if it cannot make sense of it (exit code 1)."""
+    from cli.board import following
+    from cli.errors import Refused
+    from cli.presence import planner_alive
+    from cli.show.fleet_tables import GoalRow
+    from keyexpr_schema.goals import ENDED_GOALS, GoalState
+    from keyexpr_schema.keyspace import GOAL_STATUS
+
+    async with call.session() as session:
+        spec = await put_goal(session, text, name, priority)
+        if not wait and not await planner_alive(session):
+            call.show(
+                GoalRow(goal=spec.goal, spec=spec, status=None),
+                lambda: (
+                    f"stored goal {spec.goal}. No planner is running: "
+                    "the goal will be read once one runs (`robotctl planner`)"
+                ),
+            )
+            return
+        async with following(session, (GOAL_STATUS, {"goal": spec.goal})) as board:
+            await board.until(
+                lambda: spec.goal in board.goal_status,
+                timeout_s if wait else UNDERSTANDING_S,
+                f"the planner to read goal {spec.goal} (it is stored)",
+            )
+            if wait:
+                await board.until(
+                    lambda: board.goal_status[spec.goal].state in ENDED_GOALS,
+                    timeout_s,
+                    f"goal {spec.goal} to end",
+                )
+            status = board.goal_status[spec.goal]
+    if status.state in (GoalState.REJECTED, GoalState.FAILED):
+        raise Refused(
+            f"goal {spec.goal} {status.state.value}: {status.reason or 'no reason given'}"
+        )
+    call.show(GoalRow(goal=spec.goal, spec=spec, status=status), lambda: _sentence(spec, status))
+
+
+async def put_goal(session: Session, text: str, name: str | None, priority: int = 0) -> Goal:
+    """Store a goal, confirmed, after all that were given before it.
+
+    Raises:
+        BadArgument: a goal of that name exists and says something else.
+    """
+    from cli.errors import BadArgument
+    from cli.naming import free_name
+    from keyexpr_schema.goals import Goal, GoalAddress
+    from keyexpr_schema.keyspace import GOAL_SPEC
+
+    stored, status = await _all(session)
+    if name in stored:
+        raise BadArgument(
+            f"there is a goal {name!r} already: “{stored[name].text}”; use another --id"
+        )
+    spec = Goal(
+        goal=name or free_name(text, [*stored, *status]),
+        text=text,
+        priority=priority,
+        ordinal=1 + max((each.ordinal for each in stored.values()), default=0),
+    )
+    await session.confirm(GOAL_SPEC, GoalAddress(spec.goal), spec)
+    return spec
+
+
+def _sentence(spec: Goal, status: GoalStatus) -> str:
+    from keyexpr_schema.goals import GoalState
+
+    means = " and ".join(str(each) for each in status.conditions)
+    meaning = f", understood as {means}" if means else ""
+    hint = ""
+    if status.state is GoalState.WAITING:
+        hint = f"; plan it with `robotctl plan create big-dag milp {spec.goal}`"
+    return f"goal {spec.goal} is {status.state.value}{meaning}{hint}"
+
+
+@command(app, "list")
+async def list_(call: Call) -> None:
+    """Every goal and how it stands."""
+    from cli.show.fleet_tables import goal_rows, goals_table
+
+    async with call.session() as session:
+        rows = goal_rows(*await _all(session))
+    call.show(rows, lambda: goals_table(rows) if rows else "No goals.")
+
+
+@command(app, "show")
+async def show(call: Call, goal: GoalArgument) -> None:
+    """One goal: its words, what they were understood to mean, how it stands."""
+    from cli.errors import check_known
+    from cli.show.fleet_tables import GoalRow, goals_table
+
+    async with call.session() as session:
+        goals, status = await _all(session)
+    check_known("goal", goal, goals, "say one with `robotctl goal add`")
+    row = GoalRow(goal=goal, spec=goals[goal], status=status.get(goal))
+    call.show(row, lambda: goals_table([row]))
+
+
+@command(app, "delete")
+async def delete(call: Call, goal: GoalArgument) -> None:
+    """Take a goal back. A plan that was made for it goes on; cancel that with `plan cancel`."""
+    from cli.errors import check_known
+    from keyexpr_schema.goals import GoalAddress
+    from keyexpr_schema.keyspace import GOAL_SPEC
+
+    async with call.session() as session:
+        goals, _ = await _all(session)
+        check_known("goal", goal, goals, "say one with `robotctl goal add`")
+        await session.delete(GOAL_SPEC, GoalAddress(goal))
+    call.show({"deleted": goal}, lambda: f"deleted goal {goal}")
+
+
+async def _all(session: Session) -> tuple[dict[str, Goal], dict[str, GoalStatus]]:
+    from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS
+
+    goals = {a.goal: spec for a, spec in (await session.list(GOAL_SPEC)).items()}
+    status = {a.goal: each for a, each in (await session.list(GOAL_STATUS)).items()}
+    return goals, status

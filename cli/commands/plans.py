@@ -1,0 +1,195 @@
+"""`robotctl plan`, `robotctl replan`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.command import Call, command
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from keyexpr_schema.requests import Control
+    from keyexpr_schema.session import Session
+
+app = typer.Typer(rich_markup_mode=None, add_completion=False)
+replan_app = typer.Typer(rich_markup_mode=None, add_completion=False)
+PlanArgument = Annotated[str, typer.Argument(metavar="PLAN", help="Its name.")]
+HOW_TO_PLAN = "make one with `robotctl plan create`"
+
+
+@app.callback()
+def plan() -> None:
+    """Make, look at, start and cancel plans."""
+
+
+@command(app, "create")
+async def create(
+    call: Call,
+    strategy: Annotated[str, typer.Argument(metavar="STRATEGY", help="Such as big-dag.")],
+    allocator: Annotated[str, typer.Argument(metavar="ALLOCATOR", help="Such as milp.")],
+    goals: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[GOAL]…", help="Which goals; else every goal that waits."),
+    ] = None,
+    planner: Annotated[str, typer.Option("--planner", help="Who plans.")] = "symbolic",
+    name: Annotated[str | None, typer.Option("--id", help="Name of the plan.")] = None,
+    no_start: Annotated[
+        bool, typer.Option("--no-start", help="Do not carry it out; see `plan start`.")
+    ] = False,
+) -> None:
+    """Have goals turned into a plan and, unless told otherwise, carried out."""
+    from cli.asking import ask_planner
+    from cli.errors import check_known
+    from cli.naming import request_name
+    from keyexpr_schema.keyspace import GOAL_SPEC, PLANNER_STATUS
+    from keyexpr_schema.requests import PlanRequest
+    from keyexpr_schema.service import PlannerAddress
+
+    async with call.session() as session:
+        known = [address.goal for address in await session.list(GOAL_SPEC)]
+        for goal in goals or ():
+            check_known("goal", goal, known, "say one with `robotctl goal add`")
+        can = await session.get(PLANNER_STATUS, PlannerAddress())
+        if can is not None:
+            # A planner that lists nothing has not said what it offers; then its answer decides.
+            for what, asked, offered in (
+                ("strategy", strategy, can.strategies),
+                ("allocator", allocator, can.allocators),
+                ("planner", planner, can.planners),
+            ):
+                if offered:
+                    check_known(what, asked, offered, "")
+        answer = await ask_planner(
+            session,
+            PlanRequest(
+                request=request_name(),
+                plan=name,
+                goals=tuple(goals or ()),
+                strategy=strategy,
+                planner=planner,
+                allocator=allocator,
+                start=not no_start,
+            ),
+        )
+    call.show(answer, lambda: answer.sentence)
+
+
+@command(app, "list")
+async def list_(call: Call) -> None:
+    """Every plan and how it stands."""
+    from cli.board import following
+    from cli.show.fleet_tables import plans_table
+    from keyexpr_schema.keyspace import PLAN_SPEC, PLAN_STATUS
+
+    async with call.session() as session, following(session, PLAN_SPEC, PLAN_STATUS) as board:
+        plans, status = board.plans, board.plan_status
+    names = sorted(set(plans) | set(status))
+    call.show(
+        [{"plan": name, "spec": plans.get(name), "status": status.get(name)} for name in names],
+        lambda: plans_table(plans, status) if names else "No plans.",
+    )
+
+
+@command(app, "show")
+async def show(
+    call: Call,
+    plan: Annotated[
+        str | None, typer.Argument(metavar="[PLAN]", help="Its name; else the latest plan.")
+    ] = None,
+) -> None:
+    """One plan as a tree: goals, tasks with what they wait for, who does them, how they stand."""
+    from cli.board import FLEET, following
+    from cli.errors import Unknown, check_known
+
+    async with call.session() as session, following(session, *FLEET) as board:
+        pass
+    names = set(board.plans) | set(board.plan_status)
+    if plan is None:
+        if not names:
+            raise Unknown(f"there is no plan yet; {HOW_TO_PLAN}")
+        plan = max(names, key=lambda n: (board.changed_s(n), n))
+    check_known("plan", plan, names, HOW_TO_PLAN)
+    name = plan
+    records = {task: record for (of, task), record in board.tasks.items() if of == name}
+    spec, status = board.plans.get(name), board.plan_status.get(name)
+
+    def draw() -> RenderableType:
+        from cli.show.fleet_tables import plans_table
+        from cli.show.plan_tree import plan_tree
+
+        if spec is None:
+            return plans_table({}, {name: status} if status else {})
+        return plan_tree(spec, status, records, board.goals, board.goal_status, board.now_s)
+
+    call.show({"plan": spec, "status": status, "tasks": list(records.values())}, draw)
+
+
+@command(app, "start")
+async def start(call: Call, plan: PlanArgument) -> None:
+    """Carry out a plan that was made with --no-start."""
+    from keyexpr_schema.requests import Control
+
+    await _control(call, Control.START, plan)
+
+
+@command(app, "cancel")
+async def cancel(call: Call, plan: PlanArgument) -> None:
+    """Stop a plan: running tasks are told to stop, no further one begins."""
+    from keyexpr_schema.requests import Control
+
+    await _control(call, Control.CANCEL, plan)
+
+
+@command(app, "delete")
+async def delete(call: Call, plan: PlanArgument) -> None:
+    """Forget a plan and its tasks."""
+    from keyexpr_schema.requests import Control
+
+    await _control(call, Control.DELETE, plan)
+
+
+@command(replan_app, "replan")
+async def replan(
+    call: Call,
+    plan: PlanArgument,
+    reason: Annotated[
+        str, typer.Option("--reason", help="Why; it is shown with the plan.")
+    ] = "a person asked for it",
+) -> None:
+    """Plan again from what is known now; what is done or running is kept."""
+    from cli.asking import ask_planner
+    from cli.naming import request_name
+    from keyexpr_schema.requests import ReplanRequest
+
+    async with call.session() as session:
+        await check_plan(session, plan)
+        answer = await ask_planner(
+            session, ReplanRequest(request=request_name(), plan=plan, reason=reason)
+        )
+    call.show(answer, lambda: answer.sentence)
+
+
+async def check_plan(session: Session, plan: str) -> None:
+    """Raise `Unknown` unless there is a plan of that name."""
+    from cli.errors import check_known
+    from keyexpr_schema.keyspace import PLAN_SPEC, PLAN_STATUS
+
+    known = {address.plan for address in await session.list(PLAN_SPEC)}
+    known |= {address.plan for address in await session.list(PLAN_STATUS)}
+    check_known("plan", plan, known, HOW_TO_PLAN)
+
+
+async def _control(call: Call, control: Control, plan: str) -> None:
+    from cli.asking import ask_planner
+    from cli.naming import request_name
+    from keyexpr_schema.requests import ControlRequest
+
+    async with call.session() as session:
+        await check_plan(session, plan)
+        answer = await ask_planner(
+            session, ControlRequest(request=request_name(), control=control, plan=plan)
+        )
+    call.show(answer, lambda: answer.sentence)

@@ -1,0 +1,163 @@
+"""`robotctl router`, `planner`, `worker`, `sim`, `record`: the processes a fleet is made of.
+
+Each is a thin wrapper: it imports the process's own package when it is called, and runs it until
+SIGINT or SIGTERM.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cli.command import Call, command
+
+router_app = typer.Typer(rich_markup_mode=None, add_completion=False)
+planner_app = typer.Typer(rich_markup_mode=None, add_completion=False)
+worker_app = typer.Typer(rich_markup_mode=None, add_completion=False)
+sim_app = typer.Typer(rich_markup_mode=None, add_completion=False)
+record_app = typer.Typer(rich_markup_mode=None, add_completion=False)
+
+DataOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--data", metavar="DIR", help="Where it keeps what must last; else in ~/.local/share."
+    ),
+]
+
+
+@command(router_app)
+def router(
+    call: Call,
+    listen: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--listen", metavar="ENDPOINT", help="Default: where robotctl looks for a router."
+        ),
+    ] = None,
+    connect: Annotated[
+        list[str] | None,
+        typer.Option("--connect", metavar="ENDPOINT", help="Other routers to link with."),
+    ] = None,
+    data: DataOption = None,
+) -> None:
+    """Run a Zenoh router with the fleet's durable store in it."""
+    from cli.running import end_with_parent
+    from fleet.service import router_process
+
+    end_with_parent()
+    router_process.run(
+        listen=tuple(listen or call.settings.routers[:1]),
+        connect=tuple(connect or ()),
+        data_dir=_data(data, "router"),
+    )
+
+
+@command(planner_app)
+def planner(call: Call, data: DataOption = None) -> None:
+    """Run the planner: it turns goals into plans and has them carried out."""
+    from cli.running import end_with_parent
+    from fleet.service import planner_process
+
+    end_with_parent()
+    planner_process.run(
+        endpoints=call.settings.routers,
+        realm=call.settings.realm,
+        data_dir=_data(data, "planner"),
+    )
+
+
+@command(worker_app)
+def worker(
+    call: Call,
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Which registered robot.")],
+    data: DataOption = None,
+    embodiment: Annotated[
+        str, typer.Option("--embodiment", help="What drives the robot; `sim` or a plug-in's name.")
+    ] = "sim",
+) -> None:
+    """Run one robot's worker: it takes orders and carries them out."""
+    from cli.embodiments import embodiment_factory
+    from cli.running import end_with_parent
+    from workers import process
+
+    end_with_parent()
+    process.run(
+        robot=robot,
+        endpoints=call.settings.routers,
+        realm=call.settings.realm,
+        data_dir=_data(data, f"worker-{robot}"),
+        embodiment_factory=embodiment_factory(embodiment),
+    )
+
+
+@command(sim_app)
+def sim(
+    call: Call,
+    mission: Annotated[
+        str, typer.Argument(metavar="MISSION", help="A mission's file, or name as two-cups.")
+    ],
+    backend: Annotated[
+        str, typer.Option("--backend", help="mujoco (physics) or kinematic (fast, no physics).")
+    ] = "mujoco",
+    speed: Annotated[
+        str, typer.Option("--speed", help="Simulated seconds a second, or max.")
+    ] = "1",
+) -> None:
+    """Run a simulated world with a mission's robots in it."""
+    from cli.running import end_with_parent
+    from sim import process
+
+    end_with_parent()
+    process.run(
+        mission=mission,
+        endpoints=call.settings.routers,
+        realm=call.settings.realm,
+        backend=backend,
+        speed=parse_speed(speed),
+    )
+
+
+@command(record_app)
+def record(
+    call: Call,
+    out: Annotated[Path, typer.Argument(metavar="OUT.rrd", help="The recording.")],
+    view: Annotated[bool, typer.Option("--view", help="Show it live in Rerun, too.")] = False,
+) -> None:
+    """Record everything that happens for Rerun."""
+    from cli.running import end_with_parent
+    from fleet.timeline import process
+
+    end_with_parent()
+    process.run(endpoints=call.settings.routers, realm=call.settings.realm, out=out, view=view)
+
+
+def parse_speed(written: str) -> float | None:
+    """`max` (`None`) or a number above 0.
+
+    Raises:
+        BadArgument: it is neither.
+    """
+    import math
+
+    from cli.errors import BadArgument
+
+    if written == "max":
+        return None
+    try:
+        speed = float(written)
+    except ValueError:
+        speed = math.nan
+    if not (math.isfinite(speed) and speed > 0.0):
+        raise BadArgument(f"speed {written!r} is neither 'max' nor a number above 0")
+    return speed
+
+
+def _data(given: Path | None, name: str) -> Path:
+    import os
+
+    if given is not None:
+        return given
+    home = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
+    return Path(home) / "robotfleet" / name

@@ -1,0 +1,71 @@
+"""`robotctl register`, `unregister`, `robots`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from cli.command import Call, command
+
+register_app = typer.Typer(rich_markup_mode=None, add_completion=False)
+unregister_app = typer.Typer(rich_markup_mode=None, add_completion=False)
+robots_app = typer.Typer(rich_markup_mode=None, add_completion=False)
+
+
+@command(register_app)
+async def register(
+    call: Call,
+    files: Annotated[
+        list[str], typer.Argument(metavar="FILE…", help="Robot files; see configs/robots.")
+    ],
+) -> None:
+    """Declare robots from YAML files; declaring one again replaces what was said of it."""
+    from keyexpr_schema.keyspace import ROBOT_SPEC
+    from keyexpr_schema.robots import RobotAddress
+    from sim.world_file import load_robot
+
+    specs = [load_robot(file) for file in files]
+    async with call.session() as session:
+        for spec in specs:
+            await session.confirm(ROBOT_SPEC, RobotAddress(spec.robot), spec)
+    call.show(
+        specs,
+        lambda: "\n".join(f"registered {s.robot}, which can {', '.join(s.skills)}" for s in specs),
+    )
+
+
+@command(unregister_app)
+async def unregister(
+    call: Call, robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Its name.")]
+) -> None:
+    """Forget a robot: it gets no further tasks."""
+    from cli.errors import check_known
+    from keyexpr_schema.keyspace import ROBOT_SPEC
+    from keyexpr_schema.robots import RobotAddress
+
+    async with call.session() as session:
+        specs = await session.list(ROBOT_SPEC)
+        check_known(
+            "robot", robot, (a.robot for a in specs), "declare one with `robotctl register FILE`"
+        )
+        await session.delete(ROBOT_SPEC, RobotAddress(robot))
+    call.show({"unregistered": robot}, lambda: f"unregistered {robot}")
+
+
+@command(robots_app)
+async def robots(call: Call) -> None:
+    """Every robot: what it can do, whether it is connected, where it is, what it does."""
+    from cli.presence import robots_alive
+    from cli.show.fleet_tables import robot_row, robots_table
+    from keyexpr_schema.keyspace import ROBOT_SPEC, ROBOT_STATE
+
+    async with call.session() as session:
+        specs = {a.robot: spec for a, spec in (await session.list(ROBOT_SPEC)).items()}
+        states = {a.robot: state for a, state in (await session.list(ROBOT_STATE)).items()}
+        alive = await robots_alive(session)
+    rows = [
+        robot_row(name, specs.get(name), states.get(name), name in alive)
+        for name in sorted(set(specs) | alive)
+    ]
+    call.show(rows, lambda: robots_table(rows) if rows else "No robots are registered.")

@@ -1,0 +1,151 @@
+"""`robotctl task`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.command import Call, command
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+app = typer.Typer(rich_markup_mode=None, add_completion=False)
+PlanArgument = Annotated[str, typer.Argument(metavar="PLAN", help="Name of the plan.")]
+
+
+@app.callback()
+def task() -> None:
+    """Look at tasks, or add one to a plan."""
+
+
+@command(app, "list")
+async def list_(
+    call: Call,
+    plan: Annotated[
+        str | None, typer.Argument(metavar="[PLAN]", help="Of one plan; else of all.")
+    ] = None,
+) -> None:
+    """Tasks and how they stand."""
+    from cli.board import FLEET, following
+    from cli.errors import check_known
+    from cli.show.fleet_tables import tasks_table
+
+    async with call.session() as session, following(session, *FLEET) as board:
+        pass
+    if plan is not None:
+        check_known(
+            "plan",
+            plan,
+            set(board.plans) | set(board.plan_status),
+            "make one with `robotctl plan create`",
+        )
+    records = [record for (of, _), record in sorted(board.tasks.items()) if plan in (None, of)]
+    call.show(records, lambda: tasks_table(records, board.now_s) if records else "No tasks.")
+
+
+@command(app, "show")
+async def show(
+    call: Call,
+    plan: PlanArgument,
+    task: Annotated[str, typer.Argument(metavar="TASK", help="Name of the task.")],
+) -> None:
+    """One task: its orders, every try of every attempt, and what was learned on the way."""
+    from cli.commands.plans import check_plan
+    from cli.errors import check_known
+    from keyexpr_schema.keyspace import ORDER, REPORT, TASK_RECORD
+
+    async with call.session() as session:
+        await check_plan(session, plan)
+        records = {a.task: r for a, r in (await session.list(TASK_RECORD, plan=plan)).items()}
+        check_known("task", task, records, "the plan has no tasks yet")
+        orders = list((await session.list(ORDER, plan=plan, task=task)).values())
+        reports = list((await session.list(REPORT, plan=plan, task=task)).values())
+    record = records[task]
+    reports.sort(key=lambda report: report.attempt)
+
+    def draw() -> RenderableType:
+        from rich.console import Group
+
+        from cli.show.fleet_tables import reports_table, tasks_table
+
+        parts: list[RenderableType] = [tasks_table([record])]
+        if reports:
+            parts += ["", reports_table(reports)]
+        return Group(*parts)
+
+    call.show({"task": record, "orders": orders, "reports": reports}, draw)
+
+
+@command(app, "add")
+async def add(
+    call: Call,
+    plan: PlanArgument,
+    skill: Annotated[str, typer.Argument(metavar="SKILL", help="Such as navigate.")],
+    args: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME=VALUE]…", help="Its parameters, such as place=kitchen."),
+    ] = None,
+    after: Annotated[
+        list[str] | None,
+        typer.Option("--after", metavar="TASK", help="Only when this is done; repeatable."),
+    ] = None,
+    robot: Annotated[
+        str | None, typer.Option("--robot", help="Who shall do it; else it is allocated.")
+    ] = None,
+) -> None:
+    """Add a task to a plan; the planner checks it like any other."""
+    from cli.asking import ask_planner
+    from cli.commands.plans import check_plan
+    from cli.errors import check_known
+    from cli.naming import request_name
+    from keyexpr_schema.keyspace import PLAN_SPEC, PLANNER_STATUS, ROBOT_SPEC
+    from keyexpr_schema.plans import PlanAddress
+    from keyexpr_schema.requests import Control, ControlRequest
+    from keyexpr_schema.service import PlannerAddress
+
+    given = parse_args(args or [])
+    async with call.session() as session:
+        await check_plan(session, plan)
+        spec = await session.get(PLAN_SPEC, PlanAddress(plan))
+        for name in after or ():
+            check_known("task", name, (t.task for t in spec.tasks) if spec else (), "")
+        if robot is not None:
+            robots = [address.robot for address in await session.list(ROBOT_SPEC)]
+            check_known("robot", robot, robots, "declare one with `robotctl register FILE`")
+        can = await session.get(PLANNER_STATUS, PlannerAddress())
+        if can is not None and can.skills:
+            check_known("skill", skill, can.skills, "")
+        answer = await ask_planner(
+            session,
+            ControlRequest(
+                request=request_name(),
+                control=Control.ADD_TASK,
+                plan=plan,
+                skill=skill,
+                args=given,
+                after=tuple(after or ()),
+                robot=robot,
+            ),
+        )
+    call.show(answer, lambda: answer.sentence)
+
+
+def parse_args(written: list[str]) -> dict[str, str]:
+    """`["place=kitchen"]` as `{"place": "kitchen"}`.
+
+    Raises:
+        BadArgument: an entry is not NAME=VALUE, or a name comes twice.
+    """
+    from cli.errors import BadArgument
+
+    given: dict[str, str] = {}
+    for entry in written:
+        name, equals, value = entry.partition("=")
+        if not (name and equals and value):
+            raise BadArgument(f"{entry!r} is not NAME=VALUE, such as place=kitchen")
+        if name in given:
+            raise BadArgument(f"parameter {name!r} is given twice")
+        given[name] = value
+    return given

@@ -1,0 +1,235 @@
+"""`robotctl world`: places, objects, facts, statements."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.command import Call, command
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rich.console import RenderableType
+
+    from keyexpr_schema.session import Session
+    from keyexpr_schema.world import Fact, Object, Place, Statement, Value
+
+app = typer.Typer(rich_markup_mode=None, add_completion=False)
+
+
+@app.callback()
+def world() -> None:
+    """Places, objects, facts and statements: what the fleet is told of its world."""
+
+
+@command(app, "load")
+async def load(
+    call: Call, file: Annotated[str, typer.Argument(metavar="FILE", help="See configs/worlds.")]
+) -> None:
+    """Tell the fleet the places and objects of a world file (not where the objects are)."""
+    from sim.world_file import load_world
+
+    told = load_world(file)
+    places, objects = told.places(), told.objects()
+    async with call.session() as session:
+        await put_world(session, places, objects)
+    call.show(
+        {"places": places, "objects": objects},
+        lambda: (
+            f"loaded {told.world}: places {', '.join(p.place for p in places)}; "
+            f"objects {', '.join(o.object for o in objects) or 'none'}"
+        ),
+    )
+
+
+async def put_world(session: Session, places: Iterable[Place], objects: Iterable[Object]) -> None:
+    """Store places and objects, confirmed."""
+    from keyexpr_schema.keyspace import OBJECT, PLACE
+    from keyexpr_schema.world import ObjectAddress, PlaceAddress
+
+    for place in places:
+        await session.confirm(PLACE, PlaceAddress(place.place), place)
+    for thing in objects:
+        await session.confirm(OBJECT, ObjectAddress(thing.object), thing)
+
+
+@command(app, "add")
+async def add(
+    call: Call,
+    words: Annotated[
+        list[str],
+        typer.Argument(metavar="STATEMENT", help="A sentence; or RELATION SUBJECT VALUE."),
+    ],
+    fact: Annotated[
+        bool, typer.Option("--fact", help="The words are a fact: RELATION SUBJECT VALUE.")
+    ] = False,
+    name: Annotated[
+        str | None, typer.Option("--id", help="Name of the statement; else made from its words.")
+    ] = None,
+) -> None:
+    """Say something of the world, in a sentence or as a fact (`--fact at cup_1 kitchen`)."""
+    from cli.errors import BadArgument
+
+    if fact and len(words) != 3:
+        raise BadArgument(
+            f"a fact is RELATION SUBJECT VALUE, such as 'at cup_1 kitchen'; got {len(words)} words"
+        )
+    async with call.session() as session:
+        if fact:
+            said = await add_fact(session, *words)
+            call.show(
+                said, lambda: f"stored {said.relation}({said.subject}) = {_words(said.value)}"
+            )
+        else:
+            told = await add_statement(session, " ".join(words), name)
+            call.show(told, lambda: f"stored statement {told.statement}: “{told.text}”")
+
+
+async def add_statement(session: Session, text: str, name: str | None = None) -> Statement:
+    """Store a sentence, confirmed, under `name` or one made from its words."""
+    from cli.naming import free_name
+    from keyexpr_schema.keyspace import STATEMENT
+    from keyexpr_schema.world import Statement, StatementAddress
+
+    if name is None:
+        stored = await session.list(STATEMENT)
+        same = [a.statement for a, said in stored.items() if said.text == text]
+        name = same[0] if same else free_name(text, (a.statement for a in stored))
+    said = Statement(statement=name, text=text)
+    await session.confirm(STATEMENT, StatementAddress(name), said)
+    return said
+
+
+async def add_fact(session: Session, relation: str, subject: str, written: str) -> Fact:
+    """Store a fact, confirmed.
+
+    Raises:
+        Unknown: `at` of something that is no object or robot, or of a place that is none.
+    """
+    from cli.errors import check_known
+    from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, ROBOT_SPEC
+    from keyexpr_schema.world import Fact, FactAddress
+
+    address = FactAddress(subject, relation)
+    value = parse_value(written)
+    if relation == "at":
+        how = "load a world with `robotctl world load FILE`"
+        robots = [a.robot for a in await session.list(ROBOT_SPEC)]
+        objects = [a.object for a in await session.list(OBJECT)]
+        check_known("object or robot", subject, [*objects, *robots], how)
+        if value is not None:
+            places = [a.place for a in await session.list(PLACE)]
+            check_known("place or robot", written, [*places, *robots], how)
+    fact = Fact(subject=subject, relation=relation, value=value, source="person")
+    await session.confirm(FACT, address, fact)
+    return fact
+
+
+def parse_value(written: str) -> Value:
+    """`unknown`, `true`, `false`, a number, or the word itself."""
+    words: dict[str, Value] = {"unknown": None, "true": True, "false": False}
+    if written in words:
+        return words[written]
+    for kind in (int, float):
+        try:
+            return kind(written)
+        except ValueError:
+            continue
+    return written
+
+
+def _words(value: Value) -> str:
+    from cli.show.words import value as in_words
+
+    return in_words(value)
+
+
+@command(app, "list")
+async def list_(call: Call) -> None:
+    """Everything that is known of the world."""
+    from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, STATEMENT
+
+    async with call.session() as session:
+        places = sorted((await session.list(PLACE)).values(), key=lambda each: each.place)
+        objects = sorted((await session.list(OBJECT)).values(), key=lambda each: each.object)
+        facts = sorted(
+            (await session.list(FACT)).values(), key=lambda each: (each.relation, each.subject)
+        )
+        statements = sorted(
+            (await session.list(STATEMENT)).values(), key=lambda each: each.statement
+        )
+
+    def draw() -> RenderableType:
+        from rich.console import Group
+
+        from cli.show import fleet_tables
+
+        parts = [
+            fleet_tables.places_table(places) if places else "No places: load a world file.",
+            fleet_tables.objects_table(objects) if objects else "No objects.",
+            fleet_tables.facts_table(facts) if facts else "No facts.",
+            fleet_tables.statements_table(statements) if statements else "No statements.",
+        ]
+        return Group(*(part for each in parts for part in (each, "")))
+
+    call.show(
+        {"places": places, "objects": objects, "facts": facts, "statements": statements}, draw
+    )
+
+
+@command(app, "delete")
+async def delete(
+    call: Call,
+    words: Annotated[
+        list[str],
+        typer.Argument(metavar="NAME", help="A place, object or statement; or RELATION SUBJECT."),
+    ],
+) -> None:
+    """Forget a statement, object or place by its name, or a fact by its relation and subject."""
+    from cli.errors import BadArgument
+
+    if len(words) > 2:
+        raise BadArgument("give one name, or a fact's RELATION and SUBJECT, such as 'at cup_1'")
+    async with call.session() as session:
+        if len(words) == 2:
+            gone = await _delete_fact(session, *words)
+        else:
+            gone = await _delete_named(session, words[0])
+    call.show({"deleted": gone}, lambda: f"deleted {gone}")
+
+
+async def _delete_fact(session: Session, relation: str, subject: str) -> str:
+    from cli.errors import check_known
+    from keyexpr_schema.keyspace import FACT
+    from keyexpr_schema.world import FactAddress
+
+    facts = [f"{a.relation} {a.subject}" for a in await session.list(FACT)]
+    check_known("fact", f"{relation} {subject}", facts, "see `robotctl world add --fact`")
+    await session.delete(FACT, FactAddress(subject, relation))
+    return f"{relation}({subject})"
+
+
+async def _delete_named(session: Session, name: str) -> str:
+    from cli.errors import check_known
+    from keyexpr_schema.keyspace import OBJECT, PLACE, STATEMENT
+    from keyexpr_schema.world import ObjectAddress, PlaceAddress, StatementAddress
+
+    statements = [a.statement for a in await session.list(STATEMENT)]
+    objects = [a.object for a in await session.list(OBJECT)]
+    places = [a.place for a in await session.list(PLACE)]
+    check_known(
+        "statement, object or place",
+        name,
+        [*statements, *objects, *places],
+        "load a world with `robotctl world load FILE`",
+    )
+    if name in statements:
+        await session.delete(STATEMENT, StatementAddress(name))
+        return f"statement {name}"
+    if name in objects:
+        await session.delete(OBJECT, ObjectAddress(name))
+        return f"object {name}"
+    await session.delete(PLACE, PlaceAddress(name))
+    return f"place {name}"

@@ -1,0 +1,1 @@
+"""`robotctl demo`: a whole mission as separate processes, judged by the physics."""

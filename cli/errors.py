@@ -1,0 +1,59 @@
+"""Errors of the command line: each is one sentence for a person, and ends robotctl with 1."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class CliError(Exception):
+    """Root of every error this package raises. The message is one sentence for a person."""
+
+
+class BadSettings(CliError):
+    """A configuration file or an environment variable says something that makes no sense."""
+
+
+class BadFile(CliError):
+    """A file that was named cannot be read or is not what it should be."""
+
+
+class BadArgument(CliError):
+    """An argument is well-formed for the shell but cannot mean anything here."""
+
+
+class Unknown(CliError):
+    """A name that nobody has declared; the message lists the ones that were."""
+
+
+class NotRunning(CliError):
+    """A part of the fleet that this command needs is not there."""
+
+
+class Refused(CliError):
+    """The planner answered no; the message is its reason."""
+
+
+class ProcessDied(CliError):
+    """A process of a demo ended by itself; the message names it and its log."""
+
+
+class TooLate(CliError):
+    """Something was waited for and did not happen before the deadline."""
+
+
+def check_known(what: str, name: str, known: Iterable[str], how_to_add: str) -> None:
+    """Do nothing if `name` is one of `known`.
+
+    Raises:
+        Unknown: it is not; the message suggests a near miss, lists the valid names, or says how to
+            declare the first one.
+    """
+    names = sorted(set(known))
+    if name in names:
+        return
+    if not names:
+        raise Unknown(f"there is no {what} {name!r}: none is known yet; {how_to_add}")
+    near = get_close_matches(name, names, n=1)
+    hint = f" (did you mean {near[0]!r}?)" if near else ""
+    raise Unknown(f"there is no {what} {name!r}{hint}; known are: {', '.join(names)}")

@@ -1,0 +1,92 @@
+"""`robotctl`: the command line of the fleet.
+
+Only typer is imported here, and a subcommand's module only when it is called: that keeps
+`robotctl --help` instant.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import typer
+import typer.core
+import typer.main
+
+from cli.command import GlobalFlags, JsonOption, RealmOption, RouterOption
+
+COMMANDS: dict[str, tuple[str, str]] = {
+    "status": ("cli.commands.overview:status_app", "The whole fleet on one page."),
+    "watch": ("cli.commands.overview:watch_app", "Follow goals, plans and tasks as they change."),
+    "goal": ("cli.commands.goals:app", "Say what you want, in a sentence; see what became of it."),
+    "plan": ("cli.commands.plans:app", "Make, look at, start and cancel plans."),
+    "task": ("cli.commands.tasks:app", "Look at tasks, or add one to a plan."),
+    "replan": ("cli.commands.plans:replan_app", "Plan again from what is known now."),
+    "world": ("cli.commands.world:app", "Places, objects, facts and statements."),
+    "robots": ("cli.commands.robots:robots_app", "Every robot: what it can do, and is doing."),
+    "register": ("cli.commands.robots:register_app", "Declare robots from YAML files."),
+    "unregister": ("cli.commands.robots:unregister_app", "Forget a robot."),
+    "journal": ("cli.commands.overview:journal_app", "What changed, in the order it was stored."),
+    "demo": ("cli.commands.demo:app", "Run a whole mission here, judged by the physics."),
+    "router": ("cli.commands.processes:router_app", "Run a Zenoh router with the fleet's store."),
+    "planner": ("cli.commands.processes:planner_app", "Run the planner."),
+    "worker": ("cli.commands.processes:worker_app", "Run one robot's worker."),
+    "sim": ("cli.commands.processes:sim_app", "Run a simulated world."),
+    "record": ("cli.commands.processes:record_app", "Record everything for Rerun."),
+}
+"""Name of each command: where its typer app is, and its line in `robotctl --help`."""
+
+
+class LazyGroup(typer.core.TyperGroup):
+    """Knows its commands by name and help line, and imports one when it is about to run."""
+
+    def __init__(self, **attrs: Any) -> None:
+        super().__init__(**attrs)
+        for name, (_, line) in COMMANDS.items():
+            self.add_command(
+                typer.core.TyperCommand(name=name, help=line, rich_markup_mode=None, callback=None)
+            )
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Put the real command in the place of its help line, then resolve as usual."""
+        if args and args[0] in COMMANDS:
+            module, _, attribute = COMMANDS[args[0]][0].partition(":")
+            app = getattr(importlib.import_module(module), attribute)
+            self.commands[args[0]] = typer.main.get_command(app)
+        return super().resolve_command(ctx, args)
+
+
+app = typer.Typer(
+    cls=LazyGroup,
+    name="robotctl",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@app.callback()
+def root(
+    ctx: typer.Context,
+    router: RouterOption = None,
+    realm: RealmOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Command a mixed fleet of robots in plain language, over Zenoh.
+
+    --router, --realm and --json go before or after the command. Their values come from the flag,
+    else from ROBOTFLEET_ROUTER and ROBOTFLEET_REALM, else from robotctl.yaml, else from the
+    defaults (tcp/127.0.0.1:7447, robotfleet). Exit codes: 0 done, 1 it failed (one sentence on
+    stderr says why), 2 the command line is wrong.
+    """
+    ctx.obj = GlobalFlags(routers=tuple(router or ()), realm=realm, json=json)
+
+
+def main() -> None:
+    """Entry point of the `robotctl` script."""
+    app(prog_name="robotctl")
+
+
+if __name__ == "__main__":
+    main()

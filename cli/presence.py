@@ -1,0 +1,58 @@
+"""Who is there right now, by liveliness tokens."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING, Any
+
+from keyexpr_schema.errors import Unreachable
+from keyexpr_schema.key import A, Key
+from keyexpr_schema.keyspace import PLANNER_ALIVE, ROBOT_ALIVE
+
+if TYPE_CHECKING:
+    from keyexpr_schema.session import Session
+
+SYNC_S = 3.0
+"""Longest time for the router to list the tokens it knows."""
+SECOND_LOOK_S = 0.5
+"""A link that is new may show no token at first although there are some."""
+
+
+async def planner_alive(session: Session) -> bool:
+    """Whether a planner is connected."""
+    return bool(await _present(session, PLANNER_ALIVE))
+
+
+async def robots_alive(session: Session) -> set[str]:
+    """The robots whose workers are connected."""
+    return {address.robot for address in await _present(session, ROBOT_ALIVE)}
+
+
+async def _present(session: Session, key: Key[A, Any]) -> set[A]:
+    seen: set[A] = set()
+    anyone = asyncio.Event()
+    async with session.watch_tokens(key) as watch:
+
+        async def collect() -> None:
+            async for change in watch:
+                (seen.add if change.alive else seen.discard)(change.address)
+                anyone.set()
+
+        collecting = asyncio.create_task(collect())
+        try:
+            async with asyncio.timeout(SYNC_S):
+                await watch.synced()
+        except TimeoutError:
+            raise Unreachable(
+                f"the router did not say within {SYNC_S:g} s who is connected"
+            ) from None
+        else:
+            try:
+                async with asyncio.timeout(SECOND_LOOK_S):
+                    await anyone.wait()
+            except TimeoutError:
+                pass
+        finally:
+            collecting.cancel()
+            await asyncio.wait([collecting])
+    return seen

@@ -1,0 +1,150 @@
+"""What happens, as it happens: a picture that is redrawn on a terminal, else a line a change."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING, Any
+
+import typer
+from rich.console import Group, RenderableType
+from rich.live import Live
+
+from cli.show.page import page, table
+from cli.show.plan_tree import plan_tree
+from cli.show.words import call, carried, doing, seconds, value
+from keyexpr_schema.goals import GoalStatus
+from keyexpr_schema.plans import PlanStatus
+from keyexpr_schema.tasks import TaskRecord, TaskState
+from keyexpr_schema.world import Fact
+
+if TYPE_CHECKING:
+    from cli.board import Board
+    from keyexpr_schema.session import Change
+
+REDRAW_S = 0.2
+"""How often the picture is redrawn, so that running tasks count up."""
+
+
+class Ticker:
+    """Tells each change of a goal, plan or task in a line, where nothing draws a picture.
+
+    `to_stderr` keeps stdout for data.
+    """
+
+    def __init__(self, to_stderr: bool) -> None:
+        self._to_stderr = to_stderr
+        self._told: dict[str, str] = {}
+        self.silent = False
+
+    @property
+    def draws(self) -> bool:
+        """Whether there is a terminal to draw on."""
+        return (sys.stderr if self._to_stderr else sys.stdout).isatty()
+
+    @property
+    def to_stderr(self) -> bool:
+        """Whether stdout is kept for data."""
+        return self._to_stderr
+
+    def hear(self, change: Change[Any, Any]) -> None:
+        """Take in a change; say it if it is worth a line and was not said."""
+        line = tell(change.value)
+        if line is None or self.silent:
+            return
+        where = change.key.build(change.address)
+        if self._told.get(where) != line:
+            self._told[where] = line
+            typer.echo(line, err=self._to_stderr)
+
+
+def tell(what: object) -> str | None:
+    """A payload as a line of what happened; `None` if it is not worth one."""
+    if isinstance(what, TaskRecord):
+        reason = f": {what.reason}" if what.reason else ""
+        at = {
+            TaskState.ORDERED: what.ordered_s,
+            TaskState.RUNNING: what.started_s,
+        }.get(what.state, what.ended_s)
+        time = f"{at:8.1f} s  " if at is not None else " " * 12
+        attempt = f" (attempt {what.attempt})" if what.attempt > 1 else ""
+        doer = what.robot or what.actor
+        return (
+            f"{time}{what.plan}/{what.task} {call(what.skill, what.args, what.robot)} "
+            f"{doer}: {what.state.value}{attempt}{reason}"
+        )
+    if isinstance(what, GoalStatus):
+        reason = f": {what.reason}" if what.reason else ""
+        return f"{what.time_s:8.1f} s  goal {what.goal} is {what.state.value}{reason}"
+    if isinstance(what, PlanStatus):
+        who = ", ".join(f"{actor}→{robot}" for actor, robot in what.allocation.items())
+        reason = f": {what.reason}" if what.reason else ""
+        return (
+            f"{what.time_s:8.1f} s  plan {what.plan} revision {what.revision} is "
+            f"{what.state.value}{f' ({who})' if who else ''}{reason}"
+        )
+    if isinstance(what, Fact):
+        return f"{what.time_s:8.1f} s  {what.relation}({what.subject}) = {value(what.value)}"
+    return None
+
+
+def picture(board: Board, only: str | None = None) -> RenderableType:
+    """Plans as trees and robots as a table."""
+    parts: list[RenderableType] = []
+    clock = board.now_s
+    if clock is not None:
+        parts.append(f"[bold]{seconds(clock)}[/bold] on the fleet's clock")
+    for name in sorted(board.plans):
+        if only not in (None, name):
+            continue
+        records = {task: record for (of, task), record in board.tasks.items() if of == name}
+        parts.append(
+            plan_tree(
+                board.plans[name],
+                board.plan_status.get(name),
+                records,
+                board.goals,
+                board.goal_status,
+                clock,
+            )
+        )
+    if not board.plans:
+        waiting = ", ".join(board.goals) or "none"
+        parts.append(f"No plan yet; goals: {waiting}")
+    parts.append(
+        table(
+            ["robot", "activity", "place", "holding", "task"],
+            (
+                (s.robot, s.activity.value, s.place, carried(s), doing(s))
+                for _, s in sorted(board.robots.items())
+            ),
+        )
+    )
+    return Group(*parts)
+
+
+@asynccontextmanager
+async def showing(board: Board, ticker: Ticker, plan: str | None = None) -> AsyncIterator[None]:
+    """Redraw `board` on the terminal during the block; without one the ticker tells the changes."""
+    if not ticker.draws:
+        yield
+        return
+    ticker.silent = True
+    console = page(sys.stderr if ticker.to_stderr else sys.stdout)
+    with Live(console=console, auto_refresh=False, transient=False) as live:
+
+        async def redraw() -> None:
+            while True:
+                live.update(picture(board, plan), refresh=True)
+                await asyncio.sleep(REDRAW_S)
+
+        task = asyncio.create_task(redraw())
+        try:
+            yield
+        finally:
+            task.cancel()
+            await asyncio.wait([task])
+            live.update(picture(board, plan), refresh=True)
+            ticker.silent = False

@@ -1,0 +1,72 @@
+"""The fleet on one page, and the store's journal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+
+from cli.show.fleet_tables import (
+    GoalRow,
+    RobotRow,
+    goals_table,
+    plans_table,
+    rejects_table,
+    robots_table,
+)
+from cli.show.page import table
+from keyexpr_schema.service import PlannerStatus, Reject, StoreJournal
+
+if TYPE_CHECKING:
+    from cli.board import Board
+
+VALUE_WIDTH = 120
+"""Characters of a value shown in the journal; `--json` shows all of it."""
+
+
+def status_page(
+    routers: Sequence[str],
+    realm: str,
+    planner: PlannerStatus | None,
+    planning: bool,
+    robots: Sequence[RobotRow],
+    goals: Sequence[GoalRow],
+    board: Board,
+    rejects: Sequence[Reject],
+) -> Group:
+    """One page; a part with nothing in it is one short line."""
+    plans = set(board.plans) | set(board.plan_status)
+    unreadable: list[RenderableType] = ["", rejects_table(rejects)] if rejects else []
+    return Group(
+        f"router   {', '.join(routers)}, realm {realm}",
+        f"planner  {_planner(planner, planning)}",
+        "",
+        robots_table(robots) if robots else "No robots are registered.",
+        "",
+        goals_table(goals) if goals else "No goals.",
+        "",
+        plans_table(board.plans, board.plan_status) if plans else "No plans.",
+        *unreadable,
+    )
+
+
+def _planner(planner: PlannerStatus | None, planning: bool) -> str:
+    if not planning:
+        return "not running (start one with `robotctl planner`)"
+    if planner is None:
+        return "running"
+    offers = ", ".join([*planner.planners, *planner.strategies, *planner.allocators])
+    return f"running, epoch {planner.epoch}" + (f": {offers}" if offers else "")
+
+
+def journal_table(journal: StoreJournal) -> Table:
+    """One line a change."""
+    rows = []
+    for entry in journal.entries:
+        at = datetime.fromtimestamp(entry.wall_time_s).strftime("%H:%M:%S.%f")[:-3]
+        value = "deleted" if entry.deleted else entry.value or ""
+        rows.append((entry.number, at, entry.keyexpr, value[:VALUE_WIDTH]))
+    return table(["number", "at", "key", "value"], rows)

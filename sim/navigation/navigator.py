@@ -169,7 +169,7 @@ class Navigator:
                     or (name in self._tasks and name in self._yaws and traveller.goal is None)
                 )
             )
-        for name in self._tasks:
+        for name in list(self._tasks):
             self._resolve(name)
         self._traffic.decide(self._robots, LOOKAHEAD_NODES)
         return {name: self._leg(name) for name in self._robots if name not in self._pinned}

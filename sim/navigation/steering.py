@@ -55,7 +55,7 @@ def passed(here_m: XY, track: Sequence[Sequence[float]]) -> bool:
     length = math.hypot(dx, dy)
     rx, ry = here_m[0] - node[0], here_m[1] - node[1]
     along, across = (rx * dx + ry * dy) / length, abs(ry * dx - rx * dy) / length
-    return along > 0.0 and across < NEAR_M
+    return along > 0.0 and across <= CUT_M
 
 
 def steer(

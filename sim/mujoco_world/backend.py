@@ -1,0 +1,239 @@
+"""`MujocoBackend`: the shared world of `sim.backend` with physics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from keyexpr_schema.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
+from keyexpr_schema.robots import PoseMRad, RobotSpec
+from keyexpr_schema.simulation import ContactCount, Frame, Scene, Truth
+from sim.backend import Backend
+from sim.mujoco_world.assemble import STEP_S, compile_world
+from sim.mujoco_world.collisions import Collisions
+from sim.mujoco_world.description import load_description
+from sim.mujoco_world.drawing import draw_frame, draw_scene
+from sim.mujoco_world.drives import PERIOD_S
+from sim.mujoco_world.driving import approach, fold, go_to, look
+from sim.mujoco_world.handling import grasp, release, release_in_basket
+from sim.mujoco_world.observer import Observer
+from sim.mujoco_world.robot_body import RobotBody
+from sim.mujoco_world.stage import Act, CannotDo, Ending, Stage, Steps
+from sim.navigation import Navigator
+from sim.world_model import WorldFile
+
+STEPS = round(PERIOD_S / STEP_S)
+WATCH_EVERY = 2
+"""Contacts are looked at every so many physics steps: 10 ms; a touch between bodies lasts longer."""
+
+SETTLE_PERIODS = 6
+"""Control periods before the clock starts: wheels and objects come to rest on what they stand on."""
+
+MOTIONS: dict[MotionKind, Callable[[Stage, Act, Motion], Steps]] = {
+    MotionKind.GO_TO: go_to,
+    MotionKind.LOOK: look,
+    MotionKind.APPROACH: approach,
+    MotionKind.GRASP: grasp,
+    MotionKind.RELEASE: release,
+    MotionKind.RELEASE_IN_BASKET: release_in_basket,
+    MotionKind.STOW: fold,
+}
+
+
+@dataclass
+class _Run:
+    """A robot's latest motion. `ended` is `None` while it runs."""
+
+    motion: Motion
+    began_s: float
+    steps: Steps
+    act: Act
+    ended: MotionOutcome | None = None
+
+
+class MujocoBackend(Backend):
+    """Robots, objects and a building in one MuJoCo model.
+
+    The same commands at the same simulated times give the same run, to the last bit.
+
+    Args:
+        world: the building and its objects.
+        robots: who is in it, each with its start (x [m], y [m], yaw [rad]).
+        seed: for the noise of the cameras.
+        model_folders: where to look for robot models before the package's own.
+
+    Raises:
+        BadFile: a robot's model is missing or wrong.
+    """
+
+    def __init__(
+        self,
+        world: WorldFile,
+        robots: Sequence[tuple[RobotSpec, PoseMRad]],
+        seed: int = 0,
+        model_folders: Sequence[Path] = (),
+    ) -> None:
+        import mujoco
+
+        super().__init__(world, tuple(spec.robot for spec, _ in robots))
+        models = [load_description(spec.model, model_folders) for spec, _ in robots]
+        self._model = compile_world(
+            world, [(spec.robot, found) for (spec, _), found in zip(robots, models, strict=True)]
+        )
+        self._data = mujoco.MjData(self._model)
+        self._bodies = {
+            spec.robot: RobotBody(self._model, self._data, spec, found, start)
+            for (spec, start), found in zip(robots, models, strict=True)
+        }
+        navigator = Navigator(world)
+        for (spec, start), found in zip(robots, models, strict=True):
+            navigator.add_robot(
+                spec.robot, start, found.description.clearance_m, spec.capabilities["drive"]
+            )
+        observer = Observer(self._model, self._data, world, self._bodies, seed)
+        self._stage = Stage(world, self._bodies, navigator, observer, lambda: self.time_s)
+        self._collisions = Collisions(self._model, self._data, self._bodies)
+        self._runs: dict[str, _Run] = {}
+        self._ctrl = self._data.ctrl.copy()
+        self._scene = draw_scene(self._model, world.world, self.robots)
+        mujoco.mj_forward(self._model, self._data)
+        for _ in range(SETTLE_PERIODS):
+            self._physics()
+        self.time_s = 0.0
+        for body in self._bodies.values():
+            body.drive.halt()
+
+    def truths(self) -> tuple[Truth, ...]:
+        """Where every object really is, in the order of the world file."""
+        return self._stage.observer.truths(self.time_s)
+
+    def contacts(self) -> ContactCount:
+        """Collisions since the start, each touch counted once."""
+        return ContactCount(
+            time_s=self.time_s,
+            robot_robot=self._collisions.robot_robot,
+            robot_wall=self._collisions.robot_wall,
+        )
+
+    @property
+    def collision_log(self) -> tuple[tuple[float, str, str], ...]:
+        """Every counted touch: (time in s, robot, what it touched)."""
+        return tuple(self._collisions.log)
+
+    def scene(self) -> Scene:
+        """The shapes of everything."""
+        return self._scene
+
+    def frame(self) -> Frame:
+        """Where everything that moves is now."""
+        return draw_frame(self._model, self._data, self._scene, self.time_s)
+
+    def _begin(self, robot: str, motion: Motion) -> None:
+        act = Act(self._bodies[robot])
+        steps = MOTIONS[motion.kind](self._stage, act, motion)
+        self._runs[robot] = _Run(motion, self.time_s, steps, act)
+
+    def _stop(self, robot: str) -> None:
+        run = self._runs.get(robot)
+        if run is not None and run.ended is None:
+            self._end(robot, run, MotionState.STOPPED, f"stopped while {run.act.phase}")
+
+    def _advance(self) -> None:
+        stage = self._stage
+        pinned = set()
+        for robot, run in self._runs.items():
+            if run.ended is None:
+                if run.act.manual or run.act.handling:
+                    pinned.add(robot)
+                if run.act.guest_of is not None:
+                    pinned.add(run.act.guest_of)
+        for robot in self.robots:
+            stage.navigator.pin(robot, robot in pinned)
+        poses = {name: body.pose() for name, body in self._bodies.items()}
+        stage.legs = stage.navigator.tick(self.time_s, poses)
+        for robot, run in self._runs.items():
+            if run.ended is None:
+                self._resume(robot, run)
+        for robot, body in self._bodies.items():
+            self._steer(robot, body)
+        self._physics()
+
+    def _resume(self, robot: str, run: _Run) -> None:
+        try:
+            next(run.steps)
+        except StopIteration as stop:
+            ending = stop.value
+            assert isinstance(ending, Ending)
+            self._end(robot, run, MotionState.SUCCEEDED, None, ending)
+            return
+        except CannotDo as error:
+            self._end(robot, run, MotionState.FAILED, str(error))
+            return
+        if self.time_s - run.began_s >= run.motion.timeout_s:
+            reason = (
+                f"{run.motion.kind.value} took longer than {run.motion.timeout_s:g} s; "
+                f"it was {run.act.phase}"
+            )
+            self._end(robot, run, MotionState.FAILED, reason)
+
+    def _end(
+        self,
+        robot: str,
+        run: _Run,
+        state: MotionState,
+        reason: str | None,
+        ending: Ending = Ending(),
+    ) -> None:
+        run.steps.close()
+        self._stage.navigator.cancel(robot)
+        self._bodies[robot].freeze()
+        run.ended = MotionOutcome(
+            state=state, senses=self._senses(robot), reason=reason, detections=ending.detections
+        )
+
+    def _steer(self, robot: str, body: RobotBody) -> None:
+        """Follow the navigator, unless the robot's motion drives the base itself."""
+        run = self._runs.get(robot)
+        if run is not None and run.ended is None and run.act.manual:
+            return
+        leg = self._stage.legs.get(robot)
+        if leg is not None:
+            body.drive.drive(*leg.target_m, leg.yaw_rad, leg.speed_limit_m_s)
+
+    def _physics(self) -> None:
+        import mujoco
+
+        old = self._ctrl.copy()
+        for body in self._bodies.values():
+            body.tick(self._ctrl)
+        change = (self._ctrl - old) / STEPS
+        acts = {name: run.act for name, run in self._runs.items() if run.ended is None}
+        for step in range(1, STEPS + 1):
+            # A setpoint that moves smoothly does not shake what the hand holds.
+            self._data.ctrl[:] = old + change * step
+            mujoco.mj_step(self._model, self._data)
+            if step % WATCH_EVERY == 0:
+                self._collisions.watch(self.time_s, acts)
+        self.time_s = round(self.time_s + PERIOD_S, 6)
+
+    def _outcome(self, robot: str) -> MotionOutcome | None:
+        run = self._runs.get(robot)
+        if run is None:
+            return None
+        if run.ended is not None:
+            return run.ended
+        return MotionOutcome(state=MotionState.RUNNING, senses=self._senses(robot))
+
+    def _senses(self, robot: str) -> Senses:
+        body = self._bodies[robot]
+        x, y, yaw = body.pose()
+        return Senses(
+            robot=robot,
+            time_s=self.time_s,
+            pose_m_rad=(x, y, yaw),
+            place=self.world.place_at(x, y),
+            holding=body.held,
+            basket=self._stage.observer.basket(body),
+            moving=body.moving(),
+        )

@@ -1,0 +1,230 @@
+"""Reads the physical world: who touches what, where things rest, what a camera sees."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from keyexpr_schema.motions import Detection
+from keyexpr_schema.simulation import Truth
+from sim.mujoco_world.robot_body import RobotBody
+from sim.world_model import FLOOR, WorldFile
+
+SETTLED_M_S = 0.02
+SETTLED_RAD_S = 0.3
+VISIBLE_SHARE = 0.3
+"""A thing is recognised when this share of the points looked for on it can be seen."""
+
+NOISE_M = 0.003
+"""Standard deviation of a seen point, each axis in the plane: what an RGB-D camera gives at 2 m."""
+
+
+class Observer:
+    """Truths, and what the robots' sensors get of them. `seed` makes the cameras' noise."""
+
+    def __init__(
+        self,
+        model: Any,
+        data: Any,
+        world: WorldFile,
+        robots: Mapping[str, RobotBody],
+        seed: int,
+    ) -> None:
+        import numpy as np
+
+        self._model, self._data, self._world, self._robots = model, data, world, robots
+        self._random = np.random.default_rng(seed)
+        self._objects = {
+            name: int(model.body(f"object/{name}").id) for name in world.object_entries
+        }
+        self._of_geom: dict[int, tuple[str, str]] = {}
+        self._pads = {pad: robot.name for robot in robots.values() for pad in robot.pads}
+        for geom in range(model.ngeom):
+            body = str(model.body(int(model.geom_bodyid[geom])).name)
+            head, _, tail = body.partition("/")
+            if head == "object":
+                self._of_geom[geom] = ("object", tail)
+            elif head == "furniture":
+                self._of_geom[geom] = ("surface", tail)
+            elif body == "floor":
+                self._of_geom[geom] = ("surface", FLOOR)
+            elif head in robots:
+                self._of_geom[geom] = ("robot", head)
+            else:
+                self._of_geom[geom] = ("other", body)
+
+    def base_point(self, object: str) -> tuple[float, float, float]:
+        """The centre of an object's base, world frame."""
+        x, y, z = (float(v) for v in self._data.xpos[self._objects[object]])
+        return (x, y, z)
+
+    def height_m(self, object: str) -> float:
+        """How high an object is when it stands."""
+        entry = self._world.object_entries[object]
+        return self._world.object_kinds[entry.kind].extent_m[2]
+
+    def opening_rad(self, object: str) -> float | None:
+        """The heading along which fingers shall open around it; `None` for a round thing."""
+        entry = self._world.object_entries[object]
+        kind = self._world.object_kinds[entry.kind]
+        if kind.shape != "box":
+            return None
+        frame = self._data.xmat[self._objects[object]].reshape(3, 3)
+        length, width, _ = kind.extent_m
+        axis = frame[:, 1] if width <= length else frame[:, 0]
+        return math.atan2(float(axis[1]), float(axis[0]))
+
+    def basket(self, robot: RobotBody) -> tuple[str, ...]:
+        """What lies in a robot's basket, as its sensor says, in the order of the world file."""
+        if robot.basket < 0:
+            return ()
+        return tuple(
+            name for name, body in self._objects.items() if robot.in_basket(self._data.xpos[body])
+        )
+
+    def touching(self) -> dict[str, set[tuple[str, str]]]:
+        """What each object touches: `("pad", robot)`, `("robot", r)`, `("surface", s)`, …
+
+        Two pads of one hand are two entries, `("pad", "hsr:0")` and `("pad", "hsr:1")`.
+        """
+        found: dict[str, set[tuple[str, str]]] = {name: set() for name in self._objects}
+        for one, two in self._data.contact.geom[: self._data.ncon].tolist():
+            for geom, other in ((one, two), (two, one)):
+                kind, name = self._of_geom[geom]
+                if kind != "object":
+                    continue
+                if other in self._pads:
+                    robot = self._pads[other]
+                    number = self._robots[robot].pads.index(other)
+                    found[name].add(("pad", f"{robot}:{number}"))
+                else:
+                    found[name].add(self._of_geom[other])
+        return found
+
+    def truths(self, time_s: float) -> tuple[Truth, ...]:
+        """Where every object really is."""
+        touching = self.touching()
+        baskets = {
+            object: robot.name for robot in self._robots.values() for object in self.basket(robot)
+        }
+        found = []
+        for name, body in self._objects.items():
+            x, y, z = self.base_point(name)
+            address = int(self._model.body_dofadr[body])
+            speed = self._data.qvel[address : address + 6]
+            support = _support(touching[name], baskets.get(name), touching)
+            found.append(
+                Truth(
+                    object=name,
+                    kind=self._world.object_entries[name].kind,
+                    time_s=time_s,
+                    point_m=(x, y, z),
+                    place=self._world.place_at(x, y),
+                    support=support,
+                    held_by=self._holder(touching[name]) if support is None else None,
+                    settled=math.hypot(*speed[:3]) < SETTLED_M_S
+                    and math.hypot(*speed[3:]) < SETTLED_RAD_S,
+                )
+            )
+        return tuple(found)
+
+    def _holder(self, touches: set[tuple[str, str]]) -> str | None:
+        for name, robot in self._robots.items():
+            pads = len(robot.pads)
+            if pads and all(("pad", f"{name}:{number}") in touches for number in range(pads)):
+                return name
+        return None
+
+    def sees(self, robot: RobotBody, object: str) -> bool:
+        """Whether a robot's camera sees an object now: in range, in its field of view, not hidden.
+
+        Rays go from the camera to points around the object's upper and lower half.
+        """
+        import mujoco
+        import numpy as np
+
+        camera = robot.description.camera
+        if camera is None:
+            return False
+        eye = np.array(self._data.site_xpos[robot.camera])
+        ahead = self._data.site_xmat[robot.camera].reshape(3, 3)[:, 0]
+        base = np.array(self.base_point(object))
+        length, width, height = self._extent(object)
+        to = base + (0.0, 0.0, height / 2) - eye
+        if np.linalg.norm(to) > robot.spec.capabilities.get("see", 0.0):
+            return False
+        bearing = math.atan2(
+            ahead[0] * to[1] - ahead[1] * to[0], ahead[0] * to[0] + ahead[1] * to[1]
+        )
+        if abs(bearing) > math.radians(camera.fov_deg) / 2:
+            return False
+        side = np.array([-to[1], to[0], 0.0]) / max(math.hypot(to[0], to[1]), 1e-6)
+        half = 0.4 * min(length, width)
+        frame = self._data.xmat[self._objects[object]].reshape(3, 3)
+        own_head = int(self._model.site_bodyid[robot.camera])
+        geom = np.zeros(1, dtype=np.int32)
+        hits = 0
+        points = [(up, across) for up in (0.15, 0.5, 0.85) for across in (-1.0, 0.0, 1.0)]
+        for up, across in points:
+            point = base + frame @ (0.0, 0.0, up * height) + across * half * side
+            ray = point - eye
+            mujoco.mj_ray(self._model, self._data, eye, ray, None, 1, own_head, geom)
+            if self._of_geom.get(int(geom[0])) == ("object", object):
+                hits += 1
+        return hits >= VISIBLE_SHARE * len(points)
+
+    def detect(self, robot: RobotBody, object: str) -> Detection:
+        """What the camera tells of an object that it sees (see `sees`)."""
+        x, y, z = self.base_point(object)
+        dx, dy = (float(v) for v in self._random.normal(0.0, NOISE_M, 2))
+        x, y = x + dx, y + dy
+        entry = self._world.object_entries[object]
+        return Detection(
+            object=object,
+            kind=entry.kind,
+            point_m=(x, y, z),
+            place=self._world.place_at(x, y),
+            support=self._seen_support(object, x, y, z),
+        )
+
+    def _seen_support(self, object: str, x: float, y: float, z: float) -> str:
+        for other in self._robots.values():
+            if other.in_basket(self._data.xpos[self._objects[object]]) or other.held == object:
+                return other.name
+        for surface in self._world.surfaces():
+            c, s = math.cos(surface.yaw_rad), math.sin(surface.yaw_rad)
+            dx, dy = x - surface.x_m, y - surface.y_m
+            inside = (
+                abs(c * dx + s * dy) <= surface.length_m / 2
+                and abs(c * dy - s * dx) <= surface.width_m / 2
+            )
+            if inside and abs(z - surface.z_m) < 0.06:
+                return surface.surface
+        return FLOOR
+
+    def _extent(self, object: str) -> tuple[float, float, float]:
+        return self._world.object_kinds[self._world.object_entries[object].kind].extent_m
+
+
+def _support(
+    touches: set[tuple[str, str]],
+    basket: str | None,
+    touching: Mapping[str, set[tuple[str, str]]],
+) -> str | None:
+    """What carries an object: a basket it lies in, a surface, or what carries one that it is on."""
+    if basket is not None:
+        return basket if ("robot", basket) in touches or _on_other(touches) else None
+    surfaces = sorted(name for kind, name in touches if kind == "surface")
+    if surfaces:
+        return surfaces[0]
+    for kind, name in sorted(touches):
+        if kind == "object":
+            below = sorted(n for k, n in touching[name] if k == "surface")
+            if below:
+                return below[0]
+    return None
+
+
+def _on_other(touches: set[tuple[str, str]]) -> bool:
+    return any(kind == "object" for kind, _ in touches)

@@ -1,0 +1,117 @@
+"""One robot in the physical world: its base, arm, hand, basket and what it feels."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from keyexpr_schema.robots import PoseMRad, RobotSpec
+from sim.errors import BadFile
+from sim.mujoco_world.arm import Arm, Gripper
+from sim.mujoco_world.description import RobotModel
+from sim.mujoco_world.drives import PERIOD_S, make_drive
+
+LOST_AFTER_S = 0.3
+"""A hand that feels nothing for this long is empty: a pad can lose touch for a moment on a jolt."""
+
+
+class RobotBody:
+    """Handles on one robot's joints, motors and sensors.
+
+    Raises:
+        BadFile: the description names a part that the MJCF lacks.
+    """
+
+    def __init__(
+        self, model: Any, data: Any, spec: RobotSpec, found: RobotModel, start: PoseMRad
+    ) -> None:
+        self.name = spec.robot
+        self.spec = spec
+        self.description = found.description
+        self.prefix = f"{spec.robot}/"
+        self._data = data
+        self.held: str | None = None
+        self.grip_above_base_m = 0.0
+        """How far above the held object's base the hand took it."""
+        self._untouched_s = 0.0
+        about = found.description
+        try:
+            self.drive = make_drive(
+                model, data, self.prefix, about, spec.capabilities.get("drive", 0.3)
+            )
+            self.arm = Arm(model, data, self.prefix, about.arm) if about.arm else None
+            self.gripper = (
+                Gripper(model, data, self.prefix, about.gripper) if about.gripper else None
+            )
+            self.camera = (
+                int(model.site(self.prefix + about.camera.site).id) if about.camera else -1
+            )
+            self.basket = (
+                int(model.site(self.prefix + about.basket.site).id) if about.basket else -1
+            )
+            self.basket_body = (
+                int(model.body(self.prefix + about.basket.body).id) if about.basket else -1
+            )
+            self.pads = tuple(
+                int(model.geom(self.prefix + name).id)
+                for name in (about.gripper.pads if about.gripper else ())
+            )
+            self.hand_bodies = frozenset(
+                int(model.body(self.prefix + name).id) for name in about.hand_bodies
+            )
+        except KeyError as error:
+            part = str(error.args[0]).replace(self.prefix, "")
+            raise BadFile(
+                f"{found.mjcf.with_suffix('.yaml')} names what {found.mjcf.name} lacks: {part}"
+            ) from None
+        self.basket_half_m = tuple(
+            float(v) for v in (model.site_size[self.basket] if self.basket >= 0 else (0, 0, 0))
+        )
+        self.drive.put(start)
+        if self.arm is not None:
+            self.arm.put_stowed()
+
+    def pose(self) -> PoseMRad:
+        """(x, y, yaw), world frame."""
+        return self.drive.pose()
+
+    def moving(self) -> bool:
+        """Whether the base is on the move."""
+        speed, rate = self.drive.speed()
+        return speed > 0.02 or rate > 0.05
+
+    def freeze(self) -> None:
+        """Halt base and arm; the hand keeps what it has."""
+        self.drive.halt()
+        if self.arm is not None:
+            self.arm.freeze()
+
+    def tick(self, ctrl: Any) -> None:
+        """Read the hand's sensors, write all commands for the next control period."""
+        self.drive.tick(ctrl)
+        if self.arm is not None:
+            self.arm.tick(ctrl)
+        if self.gripper is not None:
+            self.gripper.tick(ctrl)
+            self._untouched_s = 0.0 if self.gripper.feels() else self._untouched_s + PERIOD_S
+            if self.held is not None and self._untouched_s > LOST_AFTER_S:
+                self.held = None
+
+    def in_basket(self, point_m: Any) -> bool:
+        """Whether a point lies within the volume of the basket."""
+        if self.basket < 0:
+            return False
+        frame = self._data.site_xmat[self.basket].reshape(3, 3)
+        local = frame.T @ (point_m - self._data.site_xpos[self.basket])
+        return all(
+            abs(float(v)) <= half + 0.003  # contacts give way by a fraction of this
+            for v, half in zip(local, self.basket_half_m, strict=True)
+        )
+
+    def basket_point(self, x_m: float, y_m: float) -> tuple[float, float, float]:
+        """A point of the basket's floor, given from its centre, in the world frame."""
+        frame = self._data.site_xmat[self.basket].reshape(3, 3)
+        x, y, z = (
+            float(v)
+            for v in self._data.site_xpos[self.basket] + frame @ (x_m, y_m, -self.basket_half_m[2])
+        )
+        return (x, y, z)

@@ -1,0 +1,145 @@
+"""`SkillContext`: what a skill may use: a body, the known world, a clock, and words for it."""
+
+from __future__ import annotations
+
+import logging
+
+from keyexpr_schema.motions import (
+    Detection,
+    Motion,
+    MotionKind,
+    MotionOutcome,
+    MotionState,
+    PointM,
+    Senses,
+)
+from keyexpr_schema.robots import PoseMRad, RobotSpec, RobotState
+from keyexpr_schema.world import NOTHING, Fact, FactAddress, Value
+from workers.embodiment import Embodiment
+from workers.errors import SkillFailed
+from workers.worldview import WorldView
+
+
+class SkillContext:
+    """One attempt's view of robot and world.
+
+    What is learned is kept over all tries of the attempt, the later word in place of the earlier,
+    and goes out as facts just before the final report.
+    """
+
+    def __init__(self, spec: RobotSpec, body: Embodiment, world: WorldView) -> None:
+        self.robot: str = spec.robot
+        self.spec = spec
+        self.body = body
+        self.world = world
+        self._learned: dict[FactAddress, Fact] = {}
+        self._log = logging.getLogger(f"robotfleet.worker.{spec.robot}")
+
+    @property
+    def now_s(self) -> float:
+        """Seconds on the fleet's clock."""
+        return self.body.now_s()
+
+    @property
+    def learned(self) -> tuple[Fact, ...]:
+        """Everything learned in this attempt so far."""
+        return tuple(self._learned.values())
+
+    def learn(self, relation: str, subject: str, value: Value) -> None:
+        """Note that `relation(subject)` is `value` now; `None` says that it is unknown."""
+        self._learned[FactAddress(subject, relation)] = Fact(
+            subject=subject,
+            relation=relation,
+            value=value,
+            source=self.robot,
+            time_s=self.now_s,
+        )
+
+    def taught(self, failure: SkillFailed) -> None:
+        """Learn the facts that a failure brought."""
+        for relation, subject, value in failure.facts:
+            self.learn(relation, subject, value)
+
+    def log(self, sentence: str) -> None:
+        """Tell the person who watches this worker's output."""
+        self._log.info("%s", sentence)
+
+    def robot_state(self, robot: str) -> RobotState | None:
+        """What another robot's worker last said of it; `None` if it never spoke."""
+        return self.world.robots.get(robot)
+
+    def robot_pose(self, robot: str) -> PoseMRad | None:
+        """Another robot's `(x [m], y [m], yaw [rad])`, world frame, as its worker last said."""
+        state = self.robot_state(robot)
+        return None if state is None else state.pose_m_rad
+
+    async def do(
+        self,
+        kind: MotionKind,
+        *,
+        place: str | None = None,
+        object: str | None = None,
+        robot: str | None = None,
+        point_m: PointM | None = None,
+        timeout_s: float = 120.0,
+    ) -> MotionOutcome:
+        """Perform one motion; returns when it has succeeded.
+
+        Raises:
+            SkillFailed: it failed or was stopped; retryable, with the driver's own sentence.
+        """
+        motion = Motion(
+            kind=kind,
+            place=place,
+            object=object,
+            robot=robot,
+            point_m=point_m,
+            timeout_s=timeout_s,
+        )
+        outcome = await self.body.perform(motion)
+        if outcome.state is not MotionState.SUCCEEDED:
+            raise SkillFailed(
+                outcome.reason or f"{kind.value} {outcome.state.value} without a reason"
+            )
+        return outcome
+
+    async def look(self) -> tuple[Detection, ...]:
+        """Look around. What is seen elsewhere than the facts say is learned.
+
+        Raises:
+            SkillFailed: the camera gave nothing.
+        """
+        seen = (await self.do(MotionKind.LOOK)).detections
+        for detection in seen:
+            where = self.world.whereabouts(detection)
+            if where is not None and self._believed(detection.object) != where:
+                self.learn("at", detection.object, where)
+        return seen
+
+    async def holding(self) -> str | None:
+        """The object in the hand, by the hand's own sensor; what it says is learned."""
+        held = (await self.body.senses()).holding
+        self.learn("holding", self.robot, NOTHING if held is None else held)
+        if held is not None:
+            self.learn("at", held, self.robot)
+        return held
+
+    async def be_in(self, place: str) -> Senses:
+        """Make sure that the robot stands in `place`; drives there if it does not.
+
+        A robot that waits may be pushed aside by traffic, over a border even, so that a plan's
+        `at(robot) = place` does not hold any more when its next task starts.
+
+        Raises:
+            SkillFailed: the way is not open.
+        """
+        senses = await self.body.senses()
+        if senses.place != place:
+            self.log(f"is in {senses.place or 'no place'}, not in {place}: goes there first")
+            senses = (await self.do(MotionKind.GO_TO, place=place)).senses
+        self.learn("at", self.robot, place)
+        return senses
+
+    def _believed(self, object: str) -> Value:
+        fact = self._learned.get(FactAddress(object, "at"))
+        return fact.value if fact is not None else self.world.belief("at", object)

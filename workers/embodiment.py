@@ -1,0 +1,76 @@
+"""`Embodiment`: the one thing to write to put another robot, simulated or real, behind a worker.
+
+A worker owns exactly one embodiment and drives one motion at a time. Everything above it (skills,
+retries, the journal, reports) is the same for every robot; everything below it (navigation,
+control, perception) is the embodiment's own business. Behind it may stand a simulator, a ROS 2
+action client, or a vendor's API.
+
+To put a real robot behind it, map each `MotionKind` to what the robot offers (`GO_TO` and
+`APPROACH` to its navigation, `LOOK` to its detector, `GRASP`, `RELEASE`, `RELEASE_IN_BASKET` and
+`STOW` to its arm), and answer a kind that the robot does not have with a `FAILED` outcome whose
+`reason` says so. Then pass a factory of it to `workers.process.run`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
+
+from keyexpr_schema.motions import Motion, MotionOutcome, Senses
+from keyexpr_schema.robots import RobotSpec
+from keyexpr_schema.session import Session
+
+
+@runtime_checkable
+class Embodiment(Protocol):
+    """A robot's body, as a worker drives it.
+
+    Metres and radians in the world frame (x east, y north, z up); seconds on the fleet's clock.
+    All methods are called from one asyncio event loop and must not block it.
+    """
+
+    @property
+    def robot(self) -> str:
+        """The robot's id."""
+        ...
+
+    async def perform(self, motion: Motion) -> MotionOutcome:
+        """Carry out `motion` and return when it has ended.
+
+        What goes wrong in the world (no path, nothing in the hand, `motion.timeout_s` over) is a
+        value: an outcome with state `FAILED` and a sentence in `reason`. The state is never
+        `RUNNING`. A motion must be carried out at most once even if the link to the driver
+        stutters, and the robot must be at rest when an outcome is returned.
+
+        Being cancelled (`asyncio.CancelledError`) stops the motion: the robot comes to rest and
+        keeps in its hand what it holds.
+
+        Raises:
+            BodyUnreachable: the driver does not answer; whether the robot moved is unknown.
+        """
+        ...
+
+    async def senses(self) -> Senses:
+        """What the robot knows of itself without looking. Callable while a motion runs.
+
+        Raises:
+            BodyUnreachable: the driver does not answer.
+        """
+        ...
+
+    async def stop(self) -> None:
+        """Bring the robot to rest, whatever it is doing, without opening its hand.
+
+        Raises:
+            BodyUnreachable: the driver does not answer.
+        """
+        ...
+
+    def now_s(self) -> float:
+        """Seconds on the fleet's clock: simulated time, or a clock that all robots share."""
+        ...
+
+
+EmbodimentFactory = Callable[[Session, RobotSpec, str], Embodiment]
+"""`(session, spec, incarnation) -> Embodiment`. `incarnation` names this run of the worker: a
+driver that is told of a new one stops what an older one had begun."""

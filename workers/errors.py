@@ -1,0 +1,52 @@
+"""Errors of the workers: what a caller of this package may have to handle."""
+
+from __future__ import annotations
+
+from keyexpr_schema.world import Value
+
+Learned = tuple[str, str, Value]
+"""One thing learned: `(relation, subject, value)`, e.g. `("at", "cup_1", None)` for *unknown*."""
+
+
+class WorkerError(Exception):
+    """Root of every error this package raises. The message is one sentence for a person."""
+
+
+class SkillFailed(WorkerError):
+    """A skill could not do what it was asked to, for a reason that lies in the world.
+
+    `reason` is a sentence; `retryable` says whether trying again here and now could help;
+    `facts` is what the failure taught, beside what `SkillContext.learn` was told.
+    """
+
+    def __init__(
+        self, reason: str, *, retryable: bool = True, facts: tuple[Learned, ...] = ()
+    ) -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self.retryable = retryable
+        self.facts = facts
+
+
+class BodyUnreachable(WorkerError):
+    """The driver of the robot does not answer. Raised by embodiments; a try fails of it."""
+
+
+class BadArguments(WorkerError):
+    """The arguments of an order do not fit the parameters of its skill."""
+
+
+class UnknownSkill(WorkerError):
+    """No skill of that name; the message lists those there are."""
+
+
+class BadSkill(WorkerError):
+    """Something that was offered as a skill (say, by an entry point) is not one."""
+
+
+class JournalBusy(WorkerError):
+    """Another process has the journal open: two workers for one robot must not be."""
+
+
+class JournalUnreadable(WorkerError):
+    """The journal's file is not a journal that this version can read."""

@@ -1,0 +1,96 @@
+"""What a worker does before it takes orders: find out how it left the world, and say so."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+
+from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.motions import Motion, MotionKind, Senses
+from keyexpr_schema.tasks import Order, ReportState
+from keyexpr_schema.world import Fact
+from workers.context import SkillContext
+from workers.embodiment import Embodiment
+from workers.errors import BodyUnreachable, SkillFailed
+from workers.intake import Ledger, Phase
+
+SAFE_S = 60.0
+"""Wall seconds that bringing the body to rest may take before the worker goes on without."""
+DRIVER_S = 1.0
+"""Wall seconds between two questions to a driver that does not answer yet."""
+
+OBJECT_ARGUMENT = "object"
+"""The argument of an order that names the thing it handles, if it handles one."""
+
+_log = logging.getLogger("robotfleet.worker.recovery")
+
+
+async def make_safe(body: Embodiment) -> None:
+    """Bring the robot to rest with its arm folded, keeping what it holds.
+
+    What goes wrong is logged and nothing more: this runs after a failure, which is what the
+    report is about.
+    """
+    try:
+        async with asyncio.timeout(SAFE_S):
+            await body.stop()
+            outcome = await body.perform(Motion(kind=MotionKind.STOW))
+        if outcome.reason is not None:
+            _log.info("%s: stow: %s", body.robot, outcome.reason)
+    except (BodyUnreachable, SchemaError, TimeoutError) as error:
+        _log.warning("%s could not be brought to rest: %s", body.robot, error or "no answer")
+
+
+async def first_senses(body: Embodiment) -> Senses:
+    """The first reading of the sensors, however long the driver takes to come up."""
+    told = False
+    while True:
+        try:
+            return await body.senses()
+        except (BodyUnreachable, SchemaError) as error:
+            if not told:
+                _log.warning("%s waits for the driver of its robot: %s", body.robot, error)
+            told = True
+            await asyncio.sleep(DRIVER_S)
+
+
+async def self_knowledge(ctx: SkillContext) -> None:
+    """Learn what the robot knows of itself: where it is, what is in its hand and its basket."""
+    senses = await first_senses(ctx.body)
+    if senses.place is not None:
+        ctx.learn("at", ctx.robot, senses.place)
+    await ctx.holding()
+    for thing in senses.basket:
+        ctx.learn("at", thing, ctx.robot)
+
+
+def stopped_half_way(ledger: Ledger) -> bool:
+    """Whether the last attempt ended with its worker, which left the arm wherever it was."""
+    entries = list(ledger.entries.values())
+    if any(entry.phase is Phase.STARTED for entry in entries):
+        return True
+    last = entries[-1].report if entries else None
+    return last is not None and last.state is ReportState.INTERRUPTED
+
+
+async def look_about(ctx: SkillContext, order: Order) -> tuple[Fact, ...]:
+    """Look around after a crash in the middle of `order`, and learn.
+
+    The order's object is where the hand or the eyes say; if neither does, it is unknown.
+    """
+    await self_knowledge(ctx)
+    seen: dict[str, str | None] = {}
+    try:
+        seen = {d.object: ctx.world.whereabouts(d) for d in await ctx.look()}
+    except (SkillFailed, BodyUnreachable, SchemaError) as error:
+        ctx.log(f"could not look around: {error}")
+    thing = order.args.get(OBJECT_ARGUMENT)
+    senses = await first_senses(ctx.body)
+    for name, where in seen.items():
+        if where is not None and name != senses.holding:
+            ctx.learn("at", name, where)
+    if thing is not None and thing != senses.holding and seen.get(thing) is None:
+        believed = ctx.world.belief("at", thing)
+        if believed == ctx.robot or believed == senses.place:
+            ctx.learn("at", thing, None)
+    return ctx.learned

@@ -1,0 +1,149 @@
+"""The retry machine: up to three tries of a skill in an attempt, under a deadline, cancellable.
+
+It knows nothing of Zenoh, of orders or of robots: it is given one try to run, a clock, and a way
+to bring the robot to a safe state.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+
+from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.tasks import ReportState, Try
+from workers.errors import BodyUnreachable, SkillFailed
+
+MOST_TRIES = 3
+CLOCK_S = 0.05
+"""Wall seconds between two looks at the fleet's clock, of which nobody tells us that it ticks."""
+
+_log = logging.getLogger("robotfleet.worker.retry")
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How an attempt ended. Times on the fleet's clock; `reason` is `None` where it succeeded."""
+
+    state: ReportState
+    tries: tuple[Try, ...]
+    reason: str | None
+    retryable: bool
+    started_s: float
+    ended_s: float
+
+
+@dataclass(frozen=True)
+class _Failure:
+    state: ReportState
+    reason: str
+    retryable: bool
+    again: bool
+    """Whether the machine itself may try once more."""
+
+
+async def run_attempt(
+    name: str,
+    once: Callable[[], Awaitable[None]],
+    *,
+    now_s: Callable[[], float],
+    make_safe: Callable[[], Awaitable[None]],
+    deadline_s: float,
+    cancelled: asyncio.Event,
+    on_failure: Callable[[SkillFailed], None] = lambda failure: None,
+    most_tries: int = MOST_TRIES,
+) -> Ended:
+    """Run `once` until it returns, but at most `most_tries` times.
+
+    A try ends by returning (success), by `SkillFailed`, by any other exception (a bug in the
+    skill: no further try), at the deadline (`deadline_s` fleet seconds after the start of the
+    attempt), or when `cancelled` is set. After every try that did not succeed, and so before the
+    next one, `make_safe` is awaited. `on_failure` hears of every `SkillFailed`.
+
+    Being cancelled itself, it stops the try and passes `CancelledError` on.
+    """
+    started_s = now_s()
+    due_s = started_s + deadline_s
+    tries: list[Try] = []
+    while True:
+        began_s = now_s()
+        failure = await _one_try(
+            name,
+            once,
+            now_s=now_s,
+            due_s=due_s,
+            deadline_s=deadline_s,
+            cancelled=cancelled,
+            on_failure=on_failure,
+        )
+        ended_s = now_s()
+        tries.append(
+            Try(
+                number=len(tries) + 1,
+                started_s=began_s,
+                ended_s=ended_s,
+                reason=None if failure is None else failure.reason,
+            )
+        )
+        if failure is None:
+            return Ended(ReportState.SUCCEEDED, tuple(tries), None, True, started_s, ended_s)
+        await make_safe()
+        if not failure.again or len(tries) >= most_tries:
+            return Ended(
+                failure.state, tuple(tries), failure.reason, failure.retryable, started_s, now_s()
+            )
+
+
+async def _one_try(
+    name: str,
+    once: Callable[[], Awaitable[None]],
+    *,
+    now_s: Callable[[], float],
+    due_s: float,
+    deadline_s: float,
+    cancelled: asyncio.Event,
+    on_failure: Callable[[SkillFailed], None],
+) -> _Failure | None:
+    running = asyncio.ensure_future(once())
+    cancel = asyncio.ensure_future(cancelled.wait())
+    late = False
+    try:
+        while not running.done() and not cancelled.is_set():
+            if late := now_s() >= due_s:
+                break
+            await asyncio.wait(
+                {running, cancel}, timeout=CLOCK_S, return_when=asyncio.FIRST_COMPLETED
+            )
+    finally:
+        cancel.cancel()
+        running.cancel()
+        await asyncio.wait({running, cancel})
+    if not running.cancelled() and (error := running.exception()) is None:
+        return None
+    if cancelled.is_set():
+        return _Failure(ReportState.CANCELLED, "the order was cancelled", True, again=False)
+    if late:
+        return _Failure(
+            ReportState.FAILED,
+            f"{name} was not done within its deadline of {deadline_s:g} s",
+            True,
+            again=False,
+        )
+    if running.cancelled():
+        reason = f"unexpected error in skill {name}: it cancelled itself"
+        return _Failure(ReportState.FAILED, reason, False, again=False)
+    return _of(name, error, on_failure)
+
+
+def _of(
+    name: str, error: BaseException | None, on_failure: Callable[[SkillFailed], None]
+) -> _Failure:
+    if isinstance(error, SkillFailed):
+        on_failure(error)
+        return _Failure(ReportState.FAILED, error.reason, error.retryable, again=error.retryable)
+    if isinstance(error, (BodyUnreachable, SchemaError)):
+        return _Failure(ReportState.FAILED, str(error), True, again=True)
+    _log.error("unexpected error in skill %s", name, exc_info=error)
+    reason = f"unexpected error in skill {name}: {type(error).__name__}: {error}"
+    return _Failure(ReportState.FAILED, reason, False, again=False)

@@ -1,0 +1,310 @@
+"""`Worker`: takes a robot's orders, carries them out one at a time, and reports."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import deque
+
+from msgspec.structs import replace
+
+from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.keyspace import ORDER, REPORT, ROBOT_ALIVE
+from keyexpr_schema.robots import AliveAddress, RobotActivity, RobotSpec
+from keyexpr_schema.session import Session, Watch
+from keyexpr_schema.tasks import Order, OrderAddress, Report, ReportState
+from keyexpr_schema.world import Fact
+from workers.context import SkillContext
+from workers.embodiment import Embodiment
+from workers.errors import BadArguments, UnknownSkill
+from workers.intake import (
+    Accept,
+    AttemptName,
+    Cancel,
+    Phase,
+    Refuse,
+    Renew,
+    Repeat,
+    attempt_name,
+    decide,
+    superseded,
+)
+from workers.journal import Journal
+from workers.outbox import Outbox
+from workers.presence import Presence
+from workers.recovery import (
+    first_senses,
+    look_about,
+    make_safe,
+    self_knowledge,
+    stopped_half_way,
+)
+from workers.reports import report_address, report_on
+from workers.retry import run_attempt
+from workers.skill import SkillRegistry
+from workers.worldview import WORLD_KEYS, WorldView
+
+LAST_WORD_S = 3.0
+"""Wall seconds that a worker which is told to end spends on getting its last report out."""
+
+
+class Worker:
+    """One robot's worker. The journal must be open; `run` ends by being cancelled."""
+
+    def __init__(
+        self,
+        session: Session,
+        spec: RobotSpec,
+        embodiment: Embodiment,
+        journal: Journal,
+        registry: SkillRegistry,
+        incarnation: str,
+    ) -> None:
+        self.spec = spec
+        self.incarnation = incarnation
+        self._session = session
+        self._body = embodiment
+        self._journal = journal
+        self._registry = registry
+        self._world = WorldView()
+        self._presence = Presence(session, embodiment, incarnation)
+        self._outbox = Outbox(session, journal, embodiment.now_s)
+        self._inbox: asyncio.Queue[tuple[OrderAddress, Order | None]] = asyncio.Queue()
+        self._queue: deque[AttemptName] = deque()
+        self._queued = asyncio.Event()
+        self._running: AttemptName | None = None
+        self._cancelled = asyncio.Event()
+        self._ready = asyncio.Event()
+        self._log = logging.getLogger(f"robotfleet.worker.{spec.robot}")
+
+    async def ready(self) -> None:
+        """Wait until the worker has recovered and takes orders."""
+        await self._ready.wait()
+
+    async def run(self) -> None:
+        """Recover, then serve until cancelled.
+
+        A cancelled worker brings the robot to rest and reports the attempt that ran as
+        interrupted.
+        """
+        robot = self.spec.robot
+        watched = self._session.watch(*WORLD_KEYS, (ORDER, {"robot": robot}))
+        alive = self._session.token(ROBOT_ALIVE, AliveAddress(robot, self.incarnation))
+        sending = asyncio.create_task(self._outbox.run())
+        try:
+            async with watched as watch, alive, asyncio.TaskGroup() as group:
+                group.create_task(self._follow(watch))
+                await first_senses(self._body)
+                group.create_task(self._presence.run())
+                await watch.synced()
+                await self._recover()
+                group.create_task(self._take_in())
+                group.create_task(self._execute())
+                group.create_task(_passing_on(sending))
+                self._ready.set()
+        finally:
+            await self._last_word()
+            sending.cancel()
+            await asyncio.gather(sending, return_exceptions=True)
+
+    async def _last_word(self) -> None:
+        self._outbox.wake()
+        try:
+            self._presence.doing(RobotActivity.STOPPED)
+            async with asyncio.timeout(LAST_WORD_S):
+                await self._outbox.emptied()
+        except (SchemaError, TimeoutError):
+            self._log.warning("not everything was reported; the rest goes out at the next start")
+
+    # --- what comes in ---------------------------------------------------------------------------
+
+    async def _follow(self, watch: Watch) -> None:
+        async for change in watch:
+            if change.key is ORDER:
+                self._inbox.put_nowait((change.address, change.value))
+            else:
+                self._world.apply(change)
+
+    async def _take_in(self) -> None:
+        while True:
+            address, order = await self._inbox.get()
+            if order is None:
+                self._withdraw(address)
+            elif OrderAddress(order.robot, order.plan, order.task) != address:
+                await self._refuse_misplaced(address, order)
+            else:
+                await self._take(order)
+
+    def _withdraw(self, address: OrderAddress) -> None:
+        for name in [n for n in self._queue if n[:2] == (address.plan, address.task)]:
+            self._queue.remove(name)
+            self._journal.dropped(name)
+
+    async def _refuse_misplaced(self, address: OrderAddress, order: Order) -> None:
+        said = OrderAddress(order.robot, order.plan, order.task)
+        reason = (
+            f"the order at {ORDER.build(address)} says that it is the one at {ORDER.build(said)}"
+        )
+        placed = replace(order, robot=address.robot, plan=address.plan, task=address.task)
+        if attempt_name(placed) not in self._journal.ledger.entries:
+            await self._say(
+                report_on(
+                    placed, self.incarnation, ReportState.REFUSED, reason=reason, retryable=False
+                )
+            )
+
+    async def _take(self, order: Order) -> None:
+        decision = decide(self._journal.ledger, order)
+        name = attempt_name(order)
+        if isinstance(decision, Accept):
+            for older in superseded(self._journal.ledger, order):
+                self._cancel(older, "a later attempt was ordered")
+            self._journal.queued(order)
+            self._queue.append(name)
+            self._queued.set()
+        elif isinstance(decision, Renew):
+            self._journal.renewed(order)
+        elif isinstance(decision, Cancel):
+            if name in self._journal.ledger.entries:
+                self._journal.renewed(order)
+                self._cancel(name)
+            else:
+                self._end_unstarted(order, "the order was cancelled before it started")
+        elif isinstance(decision, Repeat):
+            await self._say(decision.report)
+        elif isinstance(decision, Refuse):
+            self._log.warning("refuses %s of %s: %s", order.task, order.plan, decision.reason)
+            refusal = report_on(
+                order, self.incarnation, ReportState.REFUSED, reason=decision.reason
+            )
+            await self._say(refusal)
+
+    def _cancel(self, name: AttemptName, why: str = "the order was cancelled") -> None:
+        if name == self._running:
+            self._cancelled.set()
+        elif name in self._queue:
+            self._queue.remove(name)
+            order = self._journal.ledger.entries[name].order
+            self._end_unstarted(order, f"{why} before it started")
+
+    def _end_unstarted(self, order: Order, reason: str) -> None:
+        self._end(order, report_on(order, self.incarnation, ReportState.CANCELLED, reason=reason))
+
+    async def _say(self, report: Report) -> None:
+        """Report what is no news to the journal, unless it stands there already."""
+        address = report_address(report)
+        try:
+            stored = await self._session.get(REPORT, address)
+        except SchemaError as error:
+            self._log.info("cannot see whether %s is known: %s", REPORT.build(address), error)
+            stored = None
+        if stored is None or replace(stored, incarnation=report.incarnation) != report:
+            self._journal.send(report)
+            self._outbox.wake()
+
+    # --- what is done ----------------------------------------------------------------------------
+
+    async def _recover(self) -> None:
+        self._presence.doing(RobotActivity.RECOVERING)
+        ledger = self._journal.ledger
+        ctx = self._context()
+        if stopped_half_way(ledger):
+            await make_safe(self._body)
+        await self_knowledge(ctx)
+        self._journal.send(*ctx.learned)
+        for entry in ledger.phases(Phase.STARTED):
+            ctx = self._context()
+            facts = await look_about(ctx, entry.order)
+            reason = f"the worker of {self.spec.robot} went down while it did this"
+            self._interrupted(entry.order, reason, facts)
+        self._outbox.wake()
+
+    def _context(self) -> SkillContext:
+        return SkillContext(self.spec, self._body, self._world)
+
+    def _interrupted(
+        self, order: Order, reason: str, facts: tuple[Fact, ...], started_s: float | None = None
+    ) -> None:
+        report = report_on(
+            order,
+            self.incarnation,
+            ReportState.INTERRUPTED,
+            reason=reason,
+            facts=facts,
+            started_s=started_s,
+            ended_s=self._body.now_s(),
+        )
+        self._end(order, report, facts)
+
+    async def _execute(self) -> None:
+        while True:
+            self._presence.doing(RobotActivity.IDLE)
+            while not self._queue:
+                self._queued.clear()
+                await self._queued.wait()
+            name = self._queue.popleft()
+            order = self._journal.ledger.entries[name].order
+            self._running = name
+            self._cancelled.clear()
+            try:
+                await self._carry_out(order)
+            finally:
+                self._running = None
+
+    async def _carry_out(self, order: Order) -> None:
+        try:
+            skill = self._registry.get(order.skill, self.spec.skills)
+            arguments = skill.bind(order.args, self.spec.robot, self._world)
+        except (UnknownSkill, BadArguments) as error:
+            refusal = report_on(
+                order,
+                self.incarnation,
+                ReportState.REFUSED,
+                reason=str(error),
+                retryable=False,
+            )
+            self._end(order, refusal)
+            return
+        ctx = self._context()
+        started_s = self._body.now_s()
+        start = report_on(order, self.incarnation, ReportState.STARTED, started_s=started_s)
+        self._journal.started(order, start)  # before anything moves
+        self._outbox.wake()
+        self._presence.doing(RobotActivity.BUSY, order)
+        try:
+            ended = await run_attempt(
+                order.skill,
+                lambda: skill(ctx, **arguments),
+                now_s=self._body.now_s,
+                make_safe=lambda: make_safe(self._body),
+                deadline_s=order.deadline_s,
+                cancelled=self._cancelled,
+                on_failure=ctx.taught,
+            )
+        except asyncio.CancelledError:
+            reason = f"the worker of {self.spec.robot} was stopped while it did this"
+            self._interrupted(order, reason, ctx.learned, started_s)
+            raise
+        await self._presence.feel()  # others may go by the state as soon as they have the report
+        report = report_on(
+            order,
+            self.incarnation,
+            ended.state,
+            tries=ended.tries,
+            facts=ctx.learned,
+            reason=ended.reason,
+            retryable=ended.retryable,
+            started_s=ended.started_s,
+            ended_s=ended.ended_s,
+        )
+        self._end(order, report, ctx.learned)
+
+    def _end(self, order: Order, report: Report, facts: tuple[Fact, ...] = ()) -> None:
+        """Write the end of an attempt into the journal; its facts and report go out from there."""
+        self._journal.ended(order, report, facts)
+        self._outbox.wake()
+
+
+async def _passing_on(task: asyncio.Task[None]) -> None:
+    """Wait for a task, so that what it raises is raised here, and leave it alone when cancelled."""
+    await asyncio.shield(task)

@@ -1,0 +1,1 @@
+"""The household skills: one file each; `household.py` lists them."""

@@ -1,0 +1,63 @@
+"""`pick(robot, object, place)`: take an object that lies in a place."""
+
+from __future__ import annotations
+
+from contextlib import aclosing
+
+from keyexpr_schema.motions import Detection, MotionKind
+from keyexpr_schema.world import NOTHING
+from workers.context import SkillContext
+from workers.errors import SkillFailed
+from workers.skill import Kind, skill
+from workers.skills.finding import looks
+from workers.skills.viewing import Viewing
+
+LEAST_LOOKS = 2
+"""A thing is not to be seen only after looks from two spots: furniture hides things."""
+
+
+@skill("pick", parameters={"object": Kind.OBJECT, "place": Kind.PLACE})
+async def pick(ctx: SkillContext, object: str, place: str) -> None:
+    """Take an object into the hand."""
+    held = await ctx.holding()
+    if held == object:
+        return  # an earlier try went as far as the grasp
+    if held is not None:
+        raise SkillFailed(
+            f"{ctx.robot} holds {held} already, one hand cannot take {object} too", retryable=False
+        )
+    await ctx.be_in(place)
+    seen = await _find(ctx, object, place)
+    await ctx.do(MotionKind.APPROACH, point_m=seen.point_m)
+    # From close by the point is known better than from across the room.
+    near = next((d for d in await ctx.look() if d.object == object), seen)
+    await ctx.do(MotionKind.GRASP, object=object, point_m=near.point_m)
+    await ctx.do(MotionKind.STOW)
+    if await ctx.holding() != object:
+        ctx.learn("at", object, None)
+        raise SkillFailed(f"{object} was grasped in {place} but slipped out of the hand")
+    ctx.learn("holding", ctx.robot, object)
+    ctx.learn("at", object, ctx.robot)
+
+
+async def _find(ctx: SkillContext, object: str, place: str) -> Detection:
+    """The object, seen lying in the place."""
+    viewing = Viewing.of(ctx.world.places[place], ctx.spec)
+    async with aclosing(looks(ctx, viewing)) as every:
+        async for seen in every:
+            if (found := seen.get(object)) is not None:
+                where = ctx.world.whereabouts(found)
+                if where in (place, None):
+                    return found
+                raise SkillFailed(
+                    f"{object} is at {where}, not in {place}",
+                    retryable=False,
+                    facts=(("at", object, where),),
+                )
+            if viewing.complete and viewing.looks >= LEAST_LOOKS:
+                break
+    raise SkillFailed(
+        f"{object} is not to be seen in {place}",
+        retryable=False,
+        facts=(("at", object, None), ("holding", ctx.robot, NOTHING)),
+    )

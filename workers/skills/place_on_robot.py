@@ -1,0 +1,97 @@
+"""`place_on_robot(robot, object, carrier, place)`: put the held object into a carrier's basket."""
+
+from __future__ import annotations
+
+from math import dist
+
+from keyexpr_schema.motions import MotionKind, PointM
+from keyexpr_schema.world import NOTHING
+from workers.context import SkillContext
+from workers.errors import SkillFailed
+from workers.skill import Kind, skill
+
+WORD_S = 10.0
+"""Wall seconds to wait for the carrier's worker to say where it stands or what it carries."""
+FIRST_WORD_S = 1.0
+"""Wall seconds to wait for it before looking into the basket oneself."""
+STOOD_STILL_M = 0.05
+MOST_APPROACHES = 3
+
+
+@skill(
+    "place_on_robot",
+    parameters={"object": Kind.OBJECT, "carrier": Kind.ROBOT, "place": Kind.PLACE},
+)
+async def place_on_robot(ctx: SkillContext, object: str, carrier: str, place: str) -> None:
+    """Put the held object into the basket of a robot that stands in the same place."""
+    held = await ctx.holding()
+    if held != object:
+        if _in_basket(ctx, object, carrier):  # an earlier try let it down
+            ctx.learn("at", object, carrier)
+            return
+        raise SkillFailed(
+            f"{ctx.robot} holds {held or NOTHING}, not {object}, so it cannot give it to {carrier}",
+            retryable=False,
+        )
+    await ctx.be_in(place)
+    point = await _stand_beside(ctx, carrier, place)
+    await ctx.do(MotionKind.RELEASE_IN_BASKET, object=object, robot=carrier, point_m=point)
+    still = await ctx.holding()
+    await ctx.do(MotionKind.STOW)
+    if still == object:
+        raise SkillFailed(f"the hand was opened over {carrier} but still holds {object}")
+    if not await _arrived(ctx, object, carrier):
+        raise SkillFailed(f"{object} was let down over {carrier} but is not in its basket")
+    ctx.learn("at", object, carrier)
+
+
+async def _stand_beside(ctx: SkillContext, carrier: str, place: str) -> PointM:
+    """Stand where the hand reaches over the carrier; the point where it stands."""
+    for _ in range(MOST_APPROACHES):
+        point = await _stands_at(ctx, carrier, place)
+        await ctx.do(MotionKind.APPROACH, robot=carrier, point_m=point)
+        if dist(point, await _stands_at(ctx, carrier, place)) <= STOOD_STILL_M:
+            return point
+        ctx.log(f"{carrier} has moved: goes after it")
+    raise SkillFailed(f"{carrier} does not stand still in {place}")
+
+
+async def _stands_at(ctx: SkillContext, carrier: str, place: str) -> PointM:
+    """Where the carrier stands, by its own worker's word."""
+
+    def there() -> bool:
+        state = ctx.robot_state(carrier)
+        return state is not None and state.pose_m_rad is not None and state.place == place
+
+    if not await ctx.world.until(there, WORD_S):
+        state = ctx.robot_state(carrier)
+        if state is None or state.pose_m_rad is None:
+            raise SkillFailed(f"{carrier} does not say where it is: is its worker running?")
+        where = state.place
+        raise SkillFailed(
+            f"{carrier} is in {where or 'no place'}, not in {place}",
+            facts=() if where is None else (("at", carrier, where),),
+        )
+    pose = ctx.robot_pose(carrier)
+    assert pose is not None  # `there` held, and nothing has run since
+    return pose[0], pose[1], 0.0
+
+
+async def _arrived(ctx: SkillContext, object: str, carrier: str) -> bool:
+    """Whether the object is in the basket: by the carrier's sensor, or by one's own eyes."""
+    if await ctx.world.until(lambda: _in_basket(ctx, object, carrier), FIRST_WORD_S):
+        return True
+    seen = {d.object: d for d in await ctx.look()}.get(object)
+    if seen is not None:
+        where = ctx.world.whereabouts(seen)
+        ctx.learn("at", object, where)
+        return where == carrier
+    if await ctx.world.until(lambda: _in_basket(ctx, object, carrier), WORD_S):
+        return True
+    ctx.learn("at", object, None)
+    return False
+
+
+def _in_basket(ctx: SkillContext, object: str, carrier: str) -> bool:
+    state = ctx.robot_state(carrier)
+    return state is not None and object in state.basket

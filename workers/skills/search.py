@@ -1,0 +1,36 @@
+"""`search(robot, place)`: look all over a place."""
+
+from __future__ import annotations
+
+from contextlib import aclosing
+
+from workers.context import SkillContext
+from workers.skill import Kind, skill
+from workers.skills.finding import looks
+from workers.skills.viewing import Viewing
+
+
+@skill("search", parameters={"place": Kind.PLACE})
+async def search(ctx: SkillContext, place: str) -> None:
+    """Look all over a place and learn what lies in it.
+
+    What was believed to lie here and was not seen becomes *unknown*, but only if every part of
+    the place came into the camera's range.
+    """
+    await ctx.be_in(place)
+    viewing = Viewing.of(ctx.world.places[place], ctx.spec)
+    believed = set(ctx.world.believed_at(place))
+    found: dict[str, str | None] = {}
+    async with aclosing(looks(ctx, viewing)) as every:
+        async for seen in every:
+            found.update((o, ctx.world.whereabouts(d)) for o, d in seen.items())
+            if viewing.complete:
+                break
+    for thing, where in found.items():
+        if where is not None:
+            ctx.learn("at", thing, where)
+    if viewing.complete:
+        for missing in sorted(believed - set(found)):
+            ctx.learn("at", missing, None)
+    await ctx.be_in(place)
+    ctx.learn("searched", place, True)

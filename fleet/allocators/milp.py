@@ -6,7 +6,7 @@ from fleet.allocators.base import AllocationProblem, Allocator, NotAllocated
 from keyexpr_schema.plans import Violation
 
 TIME_LIMIT_S = 20.0
-"""Wall time given to the solver, s; the best answer so far is taken, since every answer is checked."""
+"""Wall time given to the solver, s; the best answer so far is taken: every answer is checked."""
 
 
 class MilpAllocator(Allocator):

@@ -447,7 +447,7 @@ class _Flow:
             )
 
     def _final_facts(self) -> dict[Variable, Value]:
-        """Every variable's value at the end; unknown where the order of the last writers is open."""
+        """Every variable at the end; unknown where the order of its last writers is open."""
         final: dict[Variable, Value] = dict(self._world.facts)
         for variable, rows in self._writers.items():
             final[variable] = _agreed(

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from fleet.core.skills import Action, SkillModel, Variable
+from fleet.core.skills import Action, Literal, SkillModel, Variable
 from keyexpr_schema.goals import Condition
 from keyexpr_schema.robots import RobotSpec
 from keyexpr_schema.world import NOTHING, Fact, Object, Place, Value
@@ -138,3 +138,30 @@ def condition_holds(facts: Mapping[Variable, Value], condition: Condition) -> bo
         and facts.get(Variable("at", value)) == condition.value
         and facts.get(Variable("holding", value), NOTHING) != condition.subject
     )
+
+
+def known_value(variable: Variable, facts: Mapping[Variable, Value], world: WorldModel) -> Value:
+    """The value of a variable in `facts`; the hand of a robot that has none holds nothing."""
+    value = facts.get(variable)
+    if value is None and variable.relation == "holding" and variable.subject in world.robots:
+        return None if world.capability(variable.subject, "grip") else NOTHING
+    return value
+
+
+def first_unmet(
+    action: Action, facts: Mapping[Variable, Value], world: WorldModel
+) -> Literal | None:
+    """The first precondition of the action that does not hold in `facts`; baskets aside."""
+    for literal in action.before:
+        if known_value(literal.variable, facts, world) != literal.value:
+            return literal
+    return None
+
+
+def room_left(robot: str, facts: Mapping[Variable, Value], world: WorldModel) -> int:
+    """How many more objects go into a robot's basket."""
+    inside = sum(
+        facts.get(Variable("at", thing)) == robot and facts.get(Variable("holding", robot)) != thing
+        for thing in world.objects
+    )
+    return int(world.capability(robot, "basket") or 0) - inside

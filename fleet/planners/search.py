@@ -11,9 +11,9 @@ from heapq import heappop, heappush
 from itertools import count, product
 
 from fleet.core.skills import Action, Variable
-from fleet.core.world_model import WorldModel, condition_holds
+from fleet.core.world_model import WorldModel, condition_holds, first_unmet, room_left
 from keyexpr_schema.goals import Condition
-from keyexpr_schema.world import NOTHING, Value
+from keyexpr_schema.world import Value
 
 MAX_EXPANSIONS = 200_000
 """States looked at before the search gives up."""
@@ -104,22 +104,9 @@ def cheapest(
 
 def applicable(action: Action, facts: Mapping[Variable, Value], world: WorldModel) -> bool:
     """Whether the action's preconditions hold in `facts`, room in baskets included."""
-    for literal in action.before:
-        has = facts.get(literal.variable)
-        if has is None and literal.variable.relation == "holding":
-            robot = literal.variable.subject
-            has = None if world.capability(robot, "grip") else NOTHING
-        if has != literal.value:
-            return False
-    for carrier in action.space_in:
-        inside = sum(
-            facts.get(Variable("at", thing)) == carrier
-            and facts.get(Variable("holding", carrier)) != thing
-            for thing in world.objects
-        )
-        if inside + 1 > (world.capability(carrier, "basket") or 0):
-            return False
-    return True
+    return first_unmet(action, facts, world) is None and all(
+        room_left(carrier, facts, world) > 0 for carrier in action.space_in
+    )
 
 
 def _path(

@@ -28,7 +28,7 @@ ALTERNATIVES = 4
 REUSE_CHARGE_S = 200.0
 """What an action costs more for each strand that already uses it; more than any task takes."""
 MAX_COMBINATIONS = 64
-"""Up to this many combinations of strands are all tried; beyond, one strand is changed at a time."""
+"""Up to this many combinations are all tried; beyond, one strand is changed at a time."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,193 @@
+"""What the planner wants done: derived from how the state changed, never ordered by hand.
+
+Every document that the planner writes is a function of its state. So the effects of an event are
+the difference between two views, and after a crash the whole view of the replayed state puts right
+whatever was lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fleet.core.state import OUTSTANDING, Job, PlanBook, State
+from keyexpr_schema.goals import GoalAddress
+from keyexpr_schema.key import Address, Key, Payload
+from keyexpr_schema.keyspace import (
+    ANSWER,
+    FACT,
+    GOAL_STATUS,
+    ORDER,
+    PLAN_SPEC,
+    PLAN_STATUS,
+    TASK_RECORD,
+)
+from keyexpr_schema.plans import PlanAddress, PlanStatus
+from keyexpr_schema.requests import RequestAddress
+from keyexpr_schema.tasks import Order, OrderAddress, TaskAddress, TaskRecord
+from keyexpr_schema.world import FactAddress
+
+PLANNER_SOURCE = "planner"
+"""`source` of facts that the planner concludes itself; statements add a colon and their id."""
+
+DEADLINE_FACTOR = 6.0
+DEADLINE_MARGIN_S = 180.0
+"""An attempt may take this many times its predicted duration, and this long [s] besides: enough for
+three tries and for waiting at doors, little enough that a stuck robot is noticed."""
+
+
+@dataclass(frozen=True)
+class Publish:
+    """Make the value at a key this one, for good."""
+
+    key: Key[Any, Any]
+    address: Address
+    payload: Payload
+
+
+@dataclass(frozen=True)
+class Retract:
+    """Delete the value at a key, for good."""
+
+    key: Key[Any, Any]
+    address: Address
+
+
+@dataclass(frozen=True)
+class MakePlan:
+    """Do this planning job, and say how it ended as an event."""
+
+    job: Job
+
+
+Effect = Publish | Retract | MakePlan
+
+
+def effects_between(old: State, new: State) -> tuple[Effect, ...]:
+    """What to do so that keys and planning jobs follow the state from `old` to `new`."""
+    return (*_documents(old, new), *_told_facts(old, new), *_jobs(old, new))
+
+
+def effects_of(state: State) -> tuple[Effect, ...]:
+    """What to do so that keys and planning jobs are as `state` wants them, whatever they are now.
+
+    Facts are left out: other writers may have newer ones.
+    """
+    empty = State()
+    return (*_documents(empty, state), *_jobs(empty, state))
+
+
+def _documents(old: State, new: State) -> Iterator[Effect]:
+    if old.goal_states is not new.goal_states:
+        yield from _difference(
+            GOAL_STATUS,
+            {GoalAddress(goal): status for goal, status in old.goal_states.items()},
+            {GoalAddress(goal): status for goal, status in new.goal_states.items()},
+        )
+    if old.answers is not new.answers:
+        yield from _difference(
+            ANSWER,
+            {RequestAddress(name): answer for name, answer in old.answers.items()},
+            {RequestAddress(name): answer for name, answer in new.answers.items()},
+        )
+    for plan in {**old.plans, **new.plans}:
+        before, after = old.plans.get(plan), new.plans.get(plan)
+        if before is after and old.epoch == new.epoch:
+            continue
+        yield from _plan_documents(plan, before, after, old.epoch, new.epoch)
+
+
+def _plan_documents(
+    plan: str, before: PlanBook | None, after: PlanBook | None, old_epoch: int, epoch: int
+) -> Iterator[Effect]:
+    address = PlanAddress(plan)
+    yield from _difference(
+        PLAN_SPEC,
+        {address: before.plan} if before and before.plan.tasks else {},
+        {address: after.plan} if after and after.plan.tasks else {},
+    )
+    yield from _difference(
+        PLAN_STATUS,
+        {address: status_of(before)} if before else {},
+        {address: status_of(after)} if after else {},
+    )
+    old_records = before.records if before else {}
+    new_records = after.records if after else {}
+    yield from _difference(
+        TASK_RECORD,
+        {TaskAddress(plan, task): record for task, record in old_records.items()},
+        {TaskAddress(plan, task): record for task, record in new_records.items()},
+    )
+    yield from _difference(ORDER, _orders(before, old_epoch), _orders(after, epoch))
+
+
+def _difference(
+    key: Key[Any, Any], old: Mapping[Any, Payload], new: Mapping[Any, Payload]
+) -> Iterator[Effect]:
+    for address in old:
+        if address not in new:
+            yield Retract(key, address)
+    for address, payload in new.items():
+        if old.get(address) != payload:
+            yield Publish(key, address, payload)
+
+
+def status_of(book: PlanBook) -> PlanStatus:
+    """What is published of a plan."""
+    return PlanStatus(
+        plan=book.plan.plan,
+        revision=book.plan.revision,
+        state=book.state,
+        goals=book.plan.goals,
+        allocation=book.allocation,
+        sequence=book.sequence,
+        made_by=book.plan.made_by,
+        allocator=book.plan.allocator,
+        predicted_makespan_s=book.makespan_s,
+        planning_time_s=book.planning_time_s,
+        reason=book.replan_reason or book.reason,
+        violations=book.violations,
+        time_s=book.changed_s,
+    )
+
+
+def _orders(book: PlanBook | None, epoch: int) -> dict[OrderAddress, Order]:
+    if book is None:
+        return {}
+    return {
+        OrderAddress(record.robot, record.plan, record.task): _order(record, book, epoch)
+        for record in book.records.values()
+        if record.state in OUTSTANDING and record.robot is not None
+    }
+
+
+def _order(record: TaskRecord, book: PlanBook, epoch: int) -> Order:
+    assert record.robot is not None
+    return Order(
+        robot=record.robot,
+        plan=record.plan,
+        revision=record.revision,
+        task=record.task,
+        attempt=record.attempt,
+        epoch=epoch,
+        skill=record.skill,
+        args=record.args,
+        deadline_s=DEADLINE_FACTOR * record.duration_s + DEADLINE_MARGIN_S,
+        cancelled=book.cancelling,
+    )
+
+
+def _told_facts(old: State, new: State) -> Iterator[Effect]:
+    if old.facts is new.facts:
+        return
+    for name, fact in new.facts.items():
+        if fact is not old.facts.get(name) and fact.source.startswith(PLANNER_SOURCE):
+            yield Publish(FACT, FactAddress(fact.subject, fact.relation), fact)
+
+
+def _jobs(old: State, new: State) -> Iterator[Effect]:
+    for plan, book in new.plans.items():
+        before = old.plans.get(plan)
+        if book.job is not None and (before is None or before.job != book.job):
+            yield MakePlan(book.job)

@@ -1,0 +1,223 @@
+"""Everything that can happen to the planner. Events are journaled, and a journal replays."""
+
+from __future__ import annotations
+
+import msgspec
+
+from keyexpr_schema.goals import Goal, GoalStatus
+from keyexpr_schema.plans import Plan, Violation
+from keyexpr_schema.requests import Answer, ControlRequest, PlanRequest, ReplanRequest
+from keyexpr_schema.robots import RobotSpec
+from keyexpr_schema.tasks import Report
+from keyexpr_schema.world import Fact, Object, Place, Statement
+
+
+class Event(msgspec.Struct, frozen=True, kw_only=True, tag_field="event", tag=True):
+    """Base of every event: when it happened on the fleet's clock [s] and in Unix time [s]."""
+
+    time_s: float
+    wall_time_s: float
+
+
+class PlannerStarted(Event, frozen=True, kw_only=True):
+    """A run of the planner begins; its epoch is higher than that of any run before."""
+
+    epoch: int
+    incarnation: str
+
+
+class GoalTold(Event, frozen=True, kw_only=True):
+    """A goal was put."""
+
+    goal: Goal
+
+
+class GoalForgotten(Event, frozen=True, kw_only=True):
+    """A goal was deleted."""
+
+    goal: str
+
+
+class FactTold(Event, frozen=True, kw_only=True):
+    """A fact was put."""
+
+    fact: Fact
+
+
+class FactForgotten(Event, frozen=True, kw_only=True):
+    """A fact was deleted."""
+
+    subject: str
+    relation: str
+
+
+class StatementTold(Event, frozen=True, kw_only=True):
+    """A statement was put."""
+
+    statement: Statement
+
+
+class StatementForgotten(Event, frozen=True, kw_only=True):
+    """A statement was deleted."""
+
+    statement: str
+
+
+class PlaceTold(Event, frozen=True, kw_only=True):
+    """A place was put."""
+
+    place: Place
+
+
+class PlaceForgotten(Event, frozen=True, kw_only=True):
+    """A place was deleted."""
+
+    place: str
+
+
+class ObjectTold(Event, frozen=True, kw_only=True):
+    """An object was put."""
+
+    object: Object
+
+
+class ObjectForgotten(Event, frozen=True, kw_only=True):
+    """An object was deleted."""
+
+    object: str
+
+
+class RobotTold(Event, frozen=True, kw_only=True):
+    """A robot was registered."""
+
+    spec: RobotSpec
+
+
+class RobotForgotten(Event, frozen=True, kw_only=True):
+    """A robot was unregistered."""
+
+    robot: str
+
+
+class RobotSeen(Event, frozen=True, kw_only=True):
+    """A run of a robot's worker is connected."""
+
+    robot: str
+    incarnation: str
+
+
+class RobotGone(Event, frozen=True, kw_only=True):
+    """A run of a robot's worker is no longer connected."""
+
+    robot: str
+    incarnation: str
+
+
+class ReportTold(Event, frozen=True, kw_only=True):
+    """A worker said something of an attempt."""
+
+    report: Report
+
+
+class PlanAsked(Event, frozen=True, kw_only=True):
+    """Someone wants a plan."""
+
+    request: PlanRequest
+
+
+class ReplanAsked(Event, frozen=True, kw_only=True):
+    """Someone wants a plan made again."""
+
+    request: ReplanRequest
+
+
+class ControlAsked(Event, frozen=True, kw_only=True):
+    """Someone wants a plan started, cancelled, deleted or extended."""
+
+    request: ControlRequest
+
+
+class PlanProposed(Event, frozen=True, kw_only=True):
+    """Someone put a plan of their own."""
+
+    plan: Plan
+
+
+class PlanMade(Event, frozen=True, kw_only=True):
+    """A planning job ended with a checked and allocated plan.
+
+    `durations_s` and `extra_after` are by task, `sequence` lists each robot's actors in order.
+    """
+
+    job: int
+    plan: Plan
+    allocation: dict[str, str]
+    sequence: dict[str, tuple[str, ...]]
+    extra_after: dict[str, tuple[str, ...]]
+    durations_s: dict[str, float]
+    makespan_s: float
+    planning_time_s: float
+
+
+class PlanNotMade(Event, frozen=True, kw_only=True):
+    """A planning job ended without a plan."""
+
+    job: int
+    reason: str
+    violations: tuple[Violation, ...] = ()
+    planning_time_s: float = 0.0
+
+
+class Remembered(Event, frozen=True, kw_only=True):
+    """What an earlier planner left in the store, told to one that has no journal of it."""
+
+    answers: tuple[Answer, ...] = ()
+    goals: tuple[GoalStatus, ...] = ()
+    plans: tuple[str, ...] = ()
+
+
+class TimePassed(Event, frozen=True, kw_only=True):
+    """A timer that the state asked for has run out."""
+
+
+AnyEvent = (
+    PlannerStarted
+    | GoalTold
+    | GoalForgotten
+    | FactTold
+    | FactForgotten
+    | StatementTold
+    | StatementForgotten
+    | PlaceTold
+    | PlaceForgotten
+    | ObjectTold
+    | ObjectForgotten
+    | RobotTold
+    | RobotForgotten
+    | RobotSeen
+    | RobotGone
+    | ReportTold
+    | PlanAsked
+    | ReplanAsked
+    | ControlAsked
+    | PlanProposed
+    | PlanMade
+    | PlanNotMade
+    | Remembered
+    | TimePassed
+)
+
+
+def encode_event(event: Event) -> bytes:
+    """An event as one line of JSON."""
+    return msgspec.json.encode(event)
+
+
+def decode_event(data: bytes) -> Event:
+    """The event in a line of JSON.
+
+    Raises:
+        msgspec.ValidationError: it is not one.
+    """
+    event: Event = msgspec.json.decode(data, type=AnyEvent)
+    return event

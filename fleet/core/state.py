@@ -1,0 +1,130 @@
+"""The planner's whole state: a value. `step` makes the next one; nothing else changes it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TypeVar
+
+import msgspec
+
+from fleet.core.language import Vocabulary
+from fleet.core.skills import SkillModel
+from fleet.core.world_model import WorldModel
+from keyexpr_schema.goals import Goal, GoalStatus
+from keyexpr_schema.plans import ENDED_PLANS, Plan, PlanState, Task, Violation
+from keyexpr_schema.requests import Answer
+from keyexpr_schema.robots import RobotSpec
+from keyexpr_schema.tasks import TaskRecord, TaskState
+from keyexpr_schema.world import Fact, Object, Place, Statement
+
+T = TypeVar("T")
+
+OUTSTANDING = frozenset({TaskState.ORDERED, TaskState.RUNNING})
+
+
+class Job(msgspec.Struct, frozen=True, kw_only=True):
+    """Planning to be done outside the core: for goals, or of a plan that someone proposed."""
+
+    job: int
+    plan: str
+    revision: int
+    goals: tuple[str, ...]
+    strategy: str
+    planner: str
+    allocator: str
+    first_task: int
+    proposal: Plan | None = None
+    request: str | None = None
+
+
+class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
+    """A plan with everything the planner keeps about it.
+
+    `records` hold the tasks of every revision; `plan` only those of the current one.
+    `replan_reason` set means: order nothing more, and plan again when nothing is outstanding.
+    """
+
+    plan: Plan
+    state: PlanState
+    planner: str = "symbolic"
+    start: bool = True
+    records: dict[str, TaskRecord] = {}
+    extra_after: dict[str, tuple[str, ...]] = {}
+    allocation: dict[str, str] = {}
+    sequence: dict[str, tuple[str, ...]] = {}
+    job: Job | None = None
+    replan_reason: str | None = None
+    amendment: Task | None = None
+    replans: int = 0
+    cancelling: bool = False
+    reason: str | None = None
+    violations: tuple[Violation, ...] = ()
+    makespan_s: float | None = None
+    planning_time_s: float | None = None
+    changed_s: float = 0.0
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing will happen to this plan any more."""
+        return self.state in ENDED_PLANS
+
+    def current(self) -> Iterator[TaskRecord]:
+        """The records of the current revision's tasks."""
+        return (self.records[task.task] for task in self.plan.tasks if task.task in self.records)
+
+    def outstanding(self) -> list[TaskRecord]:
+        """Tasks that a robot has been told to do and has not ended."""
+        return [record for record in self.records.values() if record.state in OUTSTANDING]
+
+
+class State(msgspec.Struct, frozen=True, kw_only=True):
+    """What the planner knows. `facts` are keyed by `subject/relation`."""
+
+    epoch: int = 0
+    incarnation: str = "none"
+    time_s: float = 0.0
+    wall_time_s: float = 0.0
+    goals: dict[str, Goal] = {}
+    goal_states: dict[str, GoalStatus] = {}
+    statements: dict[str, Statement] = {}
+    understood: dict[str, bool] = {}
+    places: dict[str, Place] = {}
+    objects: dict[str, Object] = {}
+    robots: dict[str, RobotSpec] = {}
+    facts: dict[str, Fact] = {}
+    alive: dict[str, tuple[str, ...]] = {}
+    gone_since: dict[str, float] = {}
+    """Unix time [s] at which the last worker of a robot went away."""
+    plans: dict[str, PlanBook] = {}
+    past_plans: tuple[str, ...] = ()
+    answers: dict[str, Answer] = {}
+    jobs: int = 0
+
+    def vocabulary(self) -> Vocabulary:
+        """The names that sentences can use."""
+        return Vocabulary(self.places, self.objects, self.robots)
+
+    def world(self, skills: Mapping[str, SkillModel]) -> WorldModel:
+        """The world as believed now."""
+        return WorldModel.of(
+            skills,
+            self.places.values(),
+            self.objects.values(),
+            self.robots.values(),
+            self.facts.values(),
+            available=[robot for robot, runs in self.alive.items() if runs],
+        )
+
+    def fact(self, relation: str, subject: str) -> Fact | None:
+        """The fact about a variable, if there is one."""
+        return self.facts.get(f"{subject}/{relation}")
+
+
+def put(mapping: Mapping[str, T], key: str, value: T) -> dict[str, T]:
+    """A copy of `mapping` with one entry set."""
+    return {**mapping, key: value}
+
+
+def without(mapping: Mapping[str, T], key: str) -> dict[str, T]:
+    """A copy of `mapping` with one entry left out."""
+    return {name: value for name, value in mapping.items() if name != key}

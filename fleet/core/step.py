@@ -1,0 +1,78 @@
+"""The pure heart of the planner: `step(state, event, skills)` gives the next state and effects.
+
+It is total: whatever the outside world sends, it returns. It asks no clock and opens no socket;
+time comes in with the events. So a journal of events replays to the same state and effects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from msgspec.structs import replace
+
+from fleet.core import events, planning, telling, working
+from fleet.core.effects import Effect, effects_between
+from fleet.core.events import Event
+from fleet.core.state import State
+from fleet.core.working import Skills
+
+_NEWS: dict[type[Event], Callable[[State, Any], State]] = {
+    events.GoalTold: telling.goal_told,
+    events.GoalForgotten: telling.goal_forgotten,
+    events.FactTold: telling.fact_told,
+    events.FactForgotten: telling.fact_forgotten,
+    events.StatementTold: telling.statement_told,
+    events.StatementForgotten: telling.statement_forgotten,
+    events.PlaceTold: telling.place_told,
+    events.PlaceForgotten: telling.place_forgotten,
+    events.ObjectTold: telling.object_told,
+    events.ObjectForgotten: telling.object_forgotten,
+    events.RobotTold: telling.robot_told,
+    events.RobotForgotten: telling.robot_forgotten,
+    events.RobotSeen: telling.robot_seen,
+    events.RobotGone: telling.robot_gone,
+    events.Remembered: telling.remembered,
+    events.PlanAsked: planning.plan_asked,
+    events.ReplanAsked: planning.replan_asked,
+    events.ControlAsked: planning.control_asked,
+    events.PlanProposed: planning.plan_proposed,
+    events.PlanMade: planning.plan_made,
+    events.PlanNotMade: planning.plan_not_made,
+}
+
+
+def step(state: State, event: Event, skills: Skills) -> tuple[State, tuple[Effect, ...]]:
+    """The state after an event, and what is to be done about it.
+
+    An event that changes nothing gives back the very same state and no effects.
+    """
+    now = replace(
+        state,
+        time_s=max(state.time_s, event.time_s),
+        wall_time_s=max(state.wall_time_s, event.wall_time_s),
+    )
+    told = _take_in(now, event, skills)
+    settled = working.advance(told, skills)
+    if settled is now:
+        return state, ()
+    return settled, effects_between(state, settled)
+
+
+def _take_in(state: State, event: Event, skills: Skills) -> State:
+    match event:
+        case events.PlannerStarted():
+            return replace(state, epoch=event.epoch, incarnation=event.incarnation)
+        case events.ReportTold():
+            return working.report_told(state, event, skills)
+        case events.TimePassed():
+            return state
+    return _NEWS[type(event)](state, event)
+
+
+def replay(journal: Iterable[Event], skills: Skills, state: State | None = None) -> State:
+    """The state after all events of a journal."""
+    now = State() if state is None else state
+    for event in journal:
+        now, _ = step(now, event, skills)
+    return now

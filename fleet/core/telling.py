@@ -1,0 +1,273 @@
+"""What the planner makes of news about goals, robots and the world."""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from fleet.core import events
+from fleet.core.effects import PLANNER_SOURCE
+from fleet.core.language import goal_conditions, statement_facts
+from fleet.core.state import State, put, without
+from fleet.errors import NotUnderstood
+from keyexpr_schema.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
+from keyexpr_schema.plans import PlanState
+from keyexpr_schema.world import Fact, Value
+
+
+def goal_told(state: State, event: events.GoalTold) -> State:
+    """Keep the goal and say what it is understood to mean; a goal that has ended begins anew."""
+    goal = event.goal
+    if state.goals.get(goal.goal) == goal:
+        return state
+    state = replace(state, goals=put(state.goals, goal.goal, goal))
+    return set_goal(state, _understand(state, goal))
+
+
+def goal_forgotten(state: State, event: events.GoalForgotten) -> State:
+    """Drop the goal; a plan that works on it is made again without it."""
+    if event.goal not in state.goals:
+        return state
+    state = replace(
+        state,
+        goals=without(state.goals, event.goal),
+        goal_states=without(state.goal_states, event.goal),
+    )
+    for plan, book in state.plans.items():
+        if event.goal in book.plan.goals and not book.ended:
+            rest = tuple(goal for goal in book.plan.goals if goal != event.goal)
+            conditions = tuple(
+                c
+                for goal in rest
+                if goal in state.goal_states
+                for c in state.goal_states[goal].conditions
+            )
+            book = replace(
+                book,
+                plan=replace(book.plan, goals=rest, conditions=conditions),
+                replan_reason=f"goal {event.goal} was deleted",
+                cancelling=book.cancelling or not rest,
+            )
+            state = replace(state, plans=put(state.plans, plan, book))
+    return state
+
+
+def _understand(state: State, goal: Goal) -> GoalStatus:
+    try:
+        conditions = goal.conditions or goal_conditions(goal.text, state.vocabulary())
+        for condition in conditions:
+            _check_names(state, condition.subject, condition.value)
+    except NotUnderstood as error:
+        return GoalStatus(
+            goal=goal.goal, state=GoalState.REJECTED, reason=str(error), time_s=state.time_s
+        )
+    return GoalStatus(
+        goal=goal.goal, state=GoalState.WAITING, conditions=conditions, time_s=state.time_s
+    )
+
+
+def _check_names(state: State, subject: str, value: Value) -> None:
+    known = {**state.places, **state.objects, **state.robots}
+    for name in (subject, value):
+        if isinstance(name, str) and name not in known and name != "nothing":
+            raise NotUnderstood(
+                f"{name!r} is nothing that is known; known are {', '.join(sorted(known)) or 'none'}"
+            )
+
+
+def set_goal(state: State, status: GoalStatus) -> State:
+    """Change what is said of a goal."""
+    return replace(state, goal_states=put(state.goal_states, status.goal, status))
+
+
+def mark_goals(
+    state: State,
+    goals: tuple[str, ...],
+    to: GoalState,
+    plan: str | None,
+    reason: str | None = None,
+) -> State:
+    """Move those goals that have not ended to another state."""
+    for goal in goals:
+        status = state.goal_states.get(goal)
+        if (
+            status is None
+            or status.state in ENDED_GOALS
+            or (status.state is to and status.reason == reason and status.plan == plan)
+        ):
+            continue
+        state = set_goal(
+            state, replace(status, state=to, plan=plan, reason=reason, time_s=state.time_s)
+        )
+    return state
+
+
+def fact_told(state: State, event: events.FactTold) -> State:
+    """Believe the fact: its key always holds the latest word."""
+    return believe(state, event.fact)
+
+
+def believe(state: State, fact: Fact) -> State:
+    """Believe a fact, whatever was known of its variable."""
+    name = f"{fact.subject}/{fact.relation}"
+    if state.facts.get(name) == fact:
+        return state
+    return replace(state, facts=put(state.facts, name, fact))
+
+
+def believe_if_newer(state: State, fact: Fact) -> State:
+    """Believe a fact that came on another way than its key, unless a newer one is known."""
+    known = state.fact(fact.relation, fact.subject)
+    return state if known is not None and fact.time_s < known.time_s else believe(state, fact)
+
+
+def fact_forgotten(state: State, event: events.FactForgotten) -> State:
+    """No longer believe anything of that variable."""
+    name = f"{event.subject}/{event.relation}"
+    return replace(state, facts=without(state.facts, name)) if name in state.facts else state
+
+
+def statement_told(state: State, event: events.StatementTold) -> State:
+    """Keep the statement, and believe the facts that can be read out of it."""
+    statement = event.statement
+    if state.statements.get(statement.statement) == statement:
+        return state
+    state = replace(
+        state,
+        statements=put(state.statements, statement.statement, statement),
+        understood=put(state.understood, statement.statement, False),
+    )
+    return _read_statement(state, statement.statement)
+
+
+def statement_forgotten(state: State, event: events.StatementForgotten) -> State:
+    """Drop the statement. Facts once read out of it stay: they may have been confirmed since."""
+    if event.statement not in state.statements:
+        return state
+    return replace(
+        state,
+        statements=without(state.statements, event.statement),
+        understood=without(state.understood, event.statement),
+    )
+
+
+def _read_statement(state: State, name: str) -> State:
+    try:
+        facts = statement_facts(state.statements[name].text, state.vocabulary())
+    except NotUnderstood:
+        return state
+    for relation, subject, value in facts:
+        state = believe(
+            state,
+            Fact(
+                subject=subject,
+                relation=relation,
+                value=value,
+                source=f"{PLANNER_SOURCE}:{name}",
+                time_s=state.time_s,
+            ),
+        )
+    return replace(state, understood=put(state.understood, name, True))
+
+
+def place_told(state: State, event: events.PlaceTold) -> State:
+    """Know the place."""
+    if state.places.get(event.place.place) == event.place:
+        return state
+    return _words_changed(replace(state, places=put(state.places, event.place.place, event.place)))
+
+
+def place_forgotten(state: State, event: events.PlaceForgotten) -> State:
+    """Forget the place."""
+    return replace(state, places=without(state.places, event.place))
+
+
+def object_told(state: State, event: events.ObjectTold) -> State:
+    """Know the object."""
+    if state.objects.get(event.object.object) == event.object:
+        return state
+    return _words_changed(
+        replace(state, objects=put(state.objects, event.object.object, event.object))
+    )
+
+
+def object_forgotten(state: State, event: events.ObjectForgotten) -> State:
+    """Forget the object."""
+    return replace(state, objects=without(state.objects, event.object))
+
+
+def robot_told(state: State, event: events.RobotTold) -> State:
+    """Know the robot."""
+    if state.robots.get(event.spec.robot) == event.spec:
+        return state
+    return _words_changed(replace(state, robots=put(state.robots, event.spec.robot, event.spec)))
+
+
+def robot_forgotten(state: State, event: events.RobotForgotten) -> State:
+    """Forget the robot; what it was doing is as with a robot that went away."""
+    if event.robot not in state.robots:
+        return state
+    return replace(
+        state,
+        robots=without(state.robots, event.robot),
+        alive=without(state.alive, event.robot),
+        gone_since=put(state.gone_since, event.robot, float("-inf")),
+    )
+
+
+def robot_seen(state: State, event: events.RobotSeen) -> State:
+    """A worker is connected; plans that waited for robots are looked at again."""
+    runs = state.alive.get(event.robot, ())
+    if event.incarnation in runs:
+        return state
+    return replace(
+        state,
+        alive=put(state.alive, event.robot, (*runs, event.incarnation)),
+        gone_since=without(state.gone_since, event.robot),
+    )
+
+
+def robot_gone(state: State, event: events.RobotGone) -> State:
+    """A worker is gone; a new one has some time to come before its robot counts as lost."""
+    runs = state.alive.get(event.robot, ())
+    if event.incarnation not in runs:
+        return state
+    rest = tuple(run for run in runs if run != event.incarnation)
+    state = replace(state, alive=put(state.alive, event.robot, rest))
+    if rest:
+        return state
+    return replace(state, gone_since=put(state.gone_since, event.robot, event.wall_time_s))
+
+
+def remembered(state: State, event: events.Remembered) -> State:
+    """Take over what an earlier planner left, so that nothing is done a second time."""
+    answers = {answer.request: answer for answer in event.answers}
+    goals = {status.goal: status for status in event.goals if status.state in ENDED_GOALS}
+    return replace(
+        state,
+        answers={**answers, **state.answers},
+        goal_states={**goals, **state.goal_states},
+        past_plans=(*state.past_plans, *(p for p in event.plans if p not in state.plans)),
+    )
+
+
+def _words_changed(state: State) -> State:
+    """Try again to understand what was not, now that there are other names."""
+    for goal in state.goals.values():
+        if state.goal_states[goal.goal].state is GoalState.REJECTED:
+            status = _understand(state, goal)
+            if status.state is not GoalState.REJECTED or (
+                status.reason != state.goal_states[goal.goal].reason
+            ):
+                state = set_goal(state, status)
+    for name, understood in state.understood.items():
+        if not understood:
+            state = _read_statement(state, name)
+    return state
+
+
+def active_plan_of(state: State, goal: str) -> str | None:
+    """The plan that works on a goal and has not ended."""
+    for plan, book in state.plans.items():
+        if goal in book.plan.goals and not book.ended and book.state is not PlanState.REJECTED:
+            return plan
+    return None

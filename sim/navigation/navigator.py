@@ -160,13 +160,14 @@ class Navigator:
         self._poses.update(poses)
         for name, traveller in self._robots.items():
             self._release(traveller)
-            busy = traveller.parked is not None and not traveller.leaving
-            lingers = time_s < self._lingers.get(name, -math.inf)
             traveller.static = name in self._pinned or (
-                busy
+                traveller.parked is not None
+                and not traveller.leaving
+                and traveller.goal is None
                 and (
-                    lingers
-                    or (name in self._tasks and name in self._yaws and traveller.goal is None)
+                    name in self._yaws  # on its way into a stance
+                    if name in self._tasks
+                    else time_s < self._lingers.get(name, -math.inf)
                 )
             )
         for name in list(self._tasks):

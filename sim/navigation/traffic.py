@@ -67,7 +67,7 @@ class Traffic:
         Changes the `track` of those who got one, and `parked` of those who may enter or must leave
         their stance.
         """
-        self._robots = robots
+        self._lookahead = lookahead
         self._owners: dict[int, list[Traveller]] = {}
         for robot in robots.values():
             for node in robot.claims:
@@ -81,7 +81,7 @@ class Traffic:
             self._decided[robot.name] = robot.frontier
         order = sorted(robots.values(), key=lambda r: (r.goal is None, r.since_s, r.name))
         for robot in order:
-            if robot.name not in self._decided and len(robot.track) <= lookahead:
+            if robot.name not in self._decided:
                 self._decide(robot, None)
 
     def _decide(self, robot: Traveller, parent: Traveller | None) -> bool:
@@ -107,7 +107,7 @@ class Traffic:
                     self._reserved[here] = robot.name
                     self._decided[robot.name] = here
                     return True
-                if self._obtain(robot, node):
+                if self._obtain(robot, node, wished=parent is None):
                     return True
             self._reserved.setdefault(here, robot.name)
             self._decided[robot.name] = here
@@ -127,7 +127,7 @@ class Traffic:
     def _held(self, node: int, robot: Traveller) -> bool:
         return any(owner is not robot for owner in self._owners.get(node, ()))
 
-    def _obtain(self, robot: Traveller, node: int) -> bool:
+    def _obtain(self, robot: Traveller, node: int, *, wished: bool) -> bool:
         """Take `node`, or see to it that it will become free."""
         others = [owner for owner in self._owners.get(node, ()) if owner is not robot]
         before = self._reserved.get(node)
@@ -141,9 +141,16 @@ class Traffic:
         self._decided[robot.name] = node
         if robot.parked is not None:
             robot.leaving = True  # first back to its node on the lattice
-        elif not others:
+        elif not others and (len(robot.track) == 1 or (wished and self._may_promise(robot, node))):
             self._extend(robot, node, ())
         return True
+
+    def _may_promise(self, robot: Traveller, node: int) -> bool:
+        """Ahead of where it is, a robot is promised what it wishes for, not what it is pushed to.
+
+        It may no longer be pushed when it gets there; promised early, it would go to and fro.
+        """
+        return len(robot.track) <= self._lookahead and node not in robot.claims
 
     def _will_leave(self, other: Traveller, node: int, robot: Traveller) -> bool:
         if other.static:
@@ -162,7 +169,7 @@ class Traffic:
     def _slant(self, robot: Traveller, distance: list[float]) -> bool:
         """A step across a square, if that is shorter and all of the square is free."""
         here = robot.frontier
-        if robot.parked is not None or robot.goal is None:
+        if robot.parked is not None or robot.goal is None or len(robot.track) > self._lookahead:
             return False
         straight = min((distance[v] for v in self._lattice.neighbours[here]), default=math.inf)
         best = min(self._lattice.diagonals[here], key=lambda w: (distance[w], w), default=None)

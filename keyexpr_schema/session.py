@@ -284,7 +284,7 @@ class Session:
 
     def reject(self, keyexpr: str, data: bytes, reason: str) -> None:
         """Report a value that did not decode, once for each distinct bad value of a key."""
-        value = hashlib.sha256(data).hexdigest()
+        value = hashlib.sha256(reason.encode() + b"\0" + data).hexdigest()
         last, count = self._rejects.get(keyexpr, ("", 0))
         if last == value:
             return

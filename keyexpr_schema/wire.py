@@ -17,6 +17,7 @@ from keyexpr_schema.key import SCHEMA_PREFIX, P, decode_payload
 
 ENCODING_PREFIX = "application/json;"
 _ID_BITS = 128
+_ID_MASK = (1 << _ID_BITS) - 1
 
 
 def stamp_of_text(text: str) -> int:
@@ -24,33 +25,38 @@ def stamp_of_text(text: str) -> int:
 
     Time in the upper 64 bits, id in the lower 128: comparing these integers is comparing the
     timestamps as Zenoh does, which a float or a datetime cannot (they lose the lowest bits).
+    Zenoh prints an id as a little-endian number and orders ids by their bytes, hence the swap.
 
     Raises:
         ValueError: `text` is not such a timestamp.
     """
     time, _, source = text.partition("/")
-    return int(time) << _ID_BITS | int(source, 16)
+    try:
+        return int(time) << _ID_BITS | _swap(int(source, 16))
+    except OverflowError:
+        raise ValueError(f"{text!r} is not a timestamp") from None
 
 
 def text_of_stamp(stamp: int) -> str:
     """The timestamp whose integer is `stamp`, as Zenoh prints it."""
-    return f"{stamp >> _ID_BITS}/{stamp & (1 << _ID_BITS) - 1:x}"
+    return f"{stamp >> _ID_BITS}/{_swap(stamp & _ID_MASK):x}"
 
 
 def timestamp_of_stamp(stamp: int) -> zenoh.Timestamp:
-    """A Zenoh timestamp near `stamp`: at most 2 ns older, never newer.
+    """A Zenoh timestamp near `stamp`: at most 5 ns older, never newer.
 
     Zenoh's Python API cannot set the lowest bits of a timestamp, so exact stamps travel as text
-    in the attachment of a stored reply (see `stamp_of`). Rounding down means that a reader that
+    in the attachment of a stored reply (see `read_sample`). Rounding down means that a reader that
     knows only the timestamp never prefers the stored value to a newer live one.
     """
     time = stamp >> _ID_BITS
     seconds, fraction = time >> 32, time & 0xFFFF_FFFF
     nanos = max(0, fraction * 1_000_000_000 // (1 << 32) - 1)
-    source = (stamp & (1 << _ID_BITS) - 1) or 1
-    return zenoh.Timestamp(
-        zenoh.NTP64(seconds, nanos), source.to_bytes((source.bit_length() + 7) // 8, "little")
-    )
+    return zenoh.Timestamp(zenoh.NTP64(seconds, nanos), (stamp & _ID_MASK or 1).to_bytes(16, "big"))
+
+
+def _swap(source: int) -> int:
+    return int.from_bytes(source.to_bytes(16, "little"), "big")
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ async def test_a_confirmed_value_is_read_back_listed_and_deleted(session_config)
 
 async def test_without_a_router_opening_fails_with_one_sentence_and_in_time():
     started_s = time.monotonic()
-    with pytest.raises(Unreachable, match="no router answers at tcp/127.0.0.1:9: start one with"):
+    with pytest.raises(Unreachable, match=r"no router answers at tcp/127.0.0.1:9: start one with"):
         async with open_session(SessionConfig(endpoints=("tcp/127.0.0.1:9",))):
             pass
     assert time.monotonic() - started_s < 3.5

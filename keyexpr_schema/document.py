@@ -1,0 +1,116 @@
+"""Writes docs/keyspace.md from the key-space: `python -m keyexpr_schema.document`."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from keyexpr_schema.key import Key
+from keyexpr_schema.keyspace import KEYSPACE
+
+DEFAULT_PATH = Path("docs/keyspace.md")
+_PREAMBLE = """\
+<!-- Written by `python -m keyexpr_schema.document` from keyexpr_schema/keyspace.py. -->
+
+# The key-space
+
+Every value is JSON, and its Zenoh encoding names schema and version:
+`application/json;robotfleet/<name>/<version>`. A value without a schema is read, too, so
+`{"goal": "g1", "text": "bring the first cup to the hallway"}` can be put by hand.
+
+The realm (a site or a tenant) is the Zenoh session's `namespace`: on the wire `goals/g1/spec` of
+realm `robotfleet` is `robotfleet/goals/g1/spec`. Ids are 1 to 63 ASCII letters, digits, `_`, `.`
+or `-`, the first a letter or a digit.
+
+What becomes of a value: *stored* values are kept by the store, the latest by Zenoh timestamp wins,
+and a deletion leaves a tombstone; of *stored, latest matters* values a slow reader may miss all but
+the last; *not stored* values reach whoever listens; a *liveliness token* is there while its owner
+is connected; *query and reply* keys are asked with a payload and answer with another.
+"""
+
+
+def document() -> str:
+    """The page, in Markdown."""
+    lines = [
+        _PREAMBLE,
+        "| key | payload | writer | readers | kept |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for key in KEYSPACE:
+        payload = _link(key.payload) if key.payload.__struct_fields__ else "-"
+        if key.reply is not None:
+            payload += f" → {_link(key.reply)}"
+        lines.append(
+            f"| `{key.template}` | {payload} | {key.writer} | {key.readers} | {key.kept.value} |"
+        )
+    lines.append("\n## Keys\n")
+    lines += [f"- `{key.template}` (`{_schema(key)}`): {key.about}" for key in KEYSPACE]
+    lines.append("\n## Payloads")
+    for kind in _payloads():
+        lines.append(f"\n### {kind.__name__}\n\n{inspect.cleandoc(kind.__doc__ or '')}\n")
+        lines += ["| field | type | default |", "| --- | --- | --- |"]
+        for field in msgspec.structs.fields(kind):
+            lines.append(f"| `{field.name}` | {_type(field.type)} | {_default(field)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _schema(key: Key[Any, Any]) -> str:
+    return key.schema
+
+
+def _link(kind: type[Any]) -> str:
+    return f"[{kind.__name__}](#{kind.__name__.lower()})"
+
+
+def _payloads() -> list[type[msgspec.Struct]]:
+    """Every struct that a key carries, each once, with those inside it after it."""
+    found: list[type[msgspec.Struct]] = []
+
+    def visit(kind: Any) -> None:
+        if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+            if kind in found or not kind.__struct_fields__:
+                return
+            found.append(kind)
+            for field in msgspec.structs.fields(kind):
+                visit(field.type)
+        for inner in getattr(kind, "__args__", ()):
+            visit(inner)
+
+    for key in KEYSPACE:
+        visit(key.payload)
+        visit(key.reply)
+    return found
+
+
+def _type(kind: Any) -> str:
+    text = re.sub(r"typing\.Annotated\[str, msgspec\.Meta\([^)]*\)\]", "Id", str(kind))
+    text = re.sub(r"typing\.Optional\[(\w+)\]", r"\1 | None", text)
+    text = re.sub(r"<(?:class|enum) '([\w.]+)'>", r"\1", text)
+    text = re.sub(r"\b(?:\w+\.)+(\w+)", r"\1", text)
+    return f"`{text}`".replace("|", "\\|")
+
+
+def _default(field: msgspec.structs.FieldInfo) -> str:
+    if field.default_factory is not msgspec.NODEFAULT:
+        return f"`{field.default_factory()!r}`"
+    return "required" if field.default is msgspec.NODEFAULT else f"`{_plain(field.default)!r}`"
+
+
+def _plain(value: Any) -> Any:
+    return msgspec.to_builtins(value) if not isinstance(value, tuple) else value
+
+
+def main() -> None:
+    """Write the page to the path given, or to docs/keyspace.md."""
+    path = Path(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT_PATH
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(document(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,22 @@
+"""docs/keyspace.md is what the code says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from keyexpr_schema.document import document
+from keyexpr_schema.keyspace import KEYSPACE
+
+PAGE = Path(__file__).parents[2] / "docs" / "keyspace.md"
+
+
+def test_the_page_is_up_to_date():
+    assert PAGE.read_text(encoding="utf-8") == document(), "run python -m keyexpr_schema.document"
+
+
+def test_the_page_shows_every_key_and_no_module_paths():
+    page = document()
+    for key in KEYSPACE:
+        assert page.count(f"`{key.template}`") == 2
+    assert "keyexpr_schema." not in page.split("# The key-space")[1]
+    assert "msgspec" not in page

@@ -17,7 +17,7 @@ from workers.errors import BadArguments, BadSkill, UnknownSkill
 from workers.worldview import WorldView
 
 ENTRY_POINTS = "robotfleet.skills"
-"""Entry-point group: each entry is a `Skill`, or an iterable of them."""
+"""Entry-point group: each entry is a `Skill`, or a tuple or list of them."""
 
 ROBOT_ARGUMENT = "robot"
 """The argument of every order that names the robot itself; skills get it as `ctx.robot`."""
@@ -163,7 +163,7 @@ def _load(entry: EntryPoint) -> tuple[Skill, ...]:
         offered = entry.load()
     except Exception as error:  # a stranger's package: whatever its import raises
         raise BadSkill(f"skill entry point {entry.name!r} does not load: {error!r}") from error
-    skills = (offered,) if isinstance(offered, Skill) else tuple(offered)
+    skills = tuple(offered) if isinstance(offered, (tuple, list)) else (offered,)
     for one in skills:
         if not isinstance(one, Skill):
             raise BadSkill(f"skill entry point {entry.name!r} offers {one!r}, which is no @skill")

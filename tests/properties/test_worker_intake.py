@@ -1,0 +1,182 @@
+"""Laws of a worker's intake: whatever is delivered, whenever it crashes, no attempt runs twice."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+
+from keyexpr_schema.tasks import Order, ReportState
+from workers.intake import (
+    Accept,
+    AttemptName,
+    Cancel,
+    Entry,
+    Ignore,
+    Ledger,
+    Phase,
+    Refuse,
+    Renew,
+    Repeat,
+    attempt_name,
+    decide,
+    superseded,
+)
+from workers.journal import Journal
+from workers.reports import report_on
+
+small = st.integers(1, 3)
+orders = st.builds(
+    Order,
+    robot=st.just("hsr"),
+    plan=st.sampled_from(["p", "q"]),
+    task=st.sampled_from(["t1", "t2"]),
+    revision=small,
+    attempt=small,
+    epoch=small,
+    skill=st.just("navigate"),
+    args=st.just({"robot": "hsr", "to": "kitchen"}),
+    deadline_s=st.just(60.0),
+    cancelled=st.booleans(),
+)
+
+
+class Intake(RuleBasedStateMachine):
+    """The shell's use of `decide`, with everything on disk that the journal would have there."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.ledger = Ledger()
+        self.queue: list[AttemptName] = []
+        self.running: AttemptName | None = None
+        self.started: list[AttemptName] = []
+        self.fences: list[tuple[int, dict[str, int]]] = []
+
+    def end(self, name: AttemptName, state: ReportState) -> None:
+        order = self.ledger.entries[name].order
+        report = report_on(order, "r1", state)
+        self.ledger.put(Entry(order, Phase.ENDED, report))
+
+    @rule(order=orders)
+    def deliver(self, order: Order) -> None:
+        name = attempt_name(order)
+        before = self.ledger.entries.get(name)
+        older_epoch = order.epoch < self.ledger.epoch
+        decision = decide(self.ledger, order)
+        assert self.ledger.entries.get(name) is before, "deciding changes nothing"
+        if before is not None and before.phase is Phase.ENDED:
+            assert decision == Repeat(before.report)
+        if older_epoch:
+            assert isinstance(decision, (Refuse, Ignore, Repeat))
+        match decision:
+            case Accept():
+                assert not order.cancelled
+                for older in superseded(self.ledger, order):
+                    if older in self.queue:
+                        self.queue.remove(older)
+                        self.end(older, ReportState.CANCELLED)
+                self.ledger.put(Entry(order, Phase.QUEUED))
+                self.queue.append(name)
+            case Renew():
+                self.ledger.saw(order)
+            case Cancel():
+                if name in self.queue:
+                    self.queue.remove(name)
+                    self.end(name, ReportState.CANCELLED)
+                elif name == self.running:
+                    self.end(name, ReportState.CANCELLED)
+                    self.running = None
+                else:
+                    assert before is None
+                    self.ledger.put(
+                        Entry(order, Phase.ENDED, report_on(order, "r", ReportState.CANCELLED))
+                    )
+            case Refuse():
+                assert before is None
+            case Repeat() | Ignore():
+                pass
+
+    @precondition(lambda self: self.queue and self.running is None)
+    @rule()
+    def start(self) -> None:
+        self.running = self.queue.pop(0)
+        self.ledger.put(Entry(self.ledger.entries[self.running].order, Phase.STARTED))
+        self.started.append(self.running)
+
+    @precondition(lambda self: self.running is not None)
+    @rule(state=st.sampled_from([ReportState.SUCCEEDED, ReportState.FAILED]))
+    def finish(self, state: ReportState) -> None:
+        assert self.running is not None
+        self.end(self.running, state)
+        self.running = None
+
+    @precondition(lambda self: self.queue)
+    @rule()
+    def withdraw(self) -> None:
+        self.ledger.drop(self.queue.pop())
+
+    @rule()
+    def crash_and_restart(self) -> None:
+        kept = Ledger(epoch=self.ledger.epoch, revisions=dict(self.ledger.revisions))
+        for entry in self.ledger.entries.values():
+            if entry.phase is not Phase.QUEUED:
+                kept.put(entry)
+        self.ledger, self.queue, self.running = kept, [], None
+        for entry in kept.phases(Phase.STARTED):
+            self.end(attempt_name(entry.order), ReportState.INTERRUPTED)
+
+    @invariant()
+    def one_attempt_never_runs_twice(self) -> None:
+        assert len(self.started) == len(set(self.started))
+
+    @invariant()
+    def attempts_of_a_task_start_in_order(self) -> None:
+        for plan, task in {name[:2] for name in self.started}:
+            attempts = [a for p, t, a in self.started if (p, t) == (plan, task)]
+            assert attempts == sorted(attempts)
+
+    @invariant()
+    def fences_only_rise(self) -> None:
+        self.fences.append((self.ledger.epoch, dict(self.ledger.revisions)))
+        (epoch, revisions), (epoch_now, revisions_now) = (self.fences[-2:] * 2)[:2]
+        assert epoch_now >= epoch
+        assert all(revisions_now.get(plan, 0) >= seen for plan, seen in revisions.items())
+
+
+TestIntake = Intake.TestCase
+TestIntake.settings = settings(max_examples=150, stateful_step_count=40, deadline=None)
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.lists(st.tuples(orders, st.sampled_from(["queue", "start", "end", "open"])), max_size=12))
+def test_the_journal_on_disk_is_the_ledger_in_memory(steps: list[tuple[Order, str]]) -> None:
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "hsr.journal"
+        ledger = Ledger()
+        journal = Journal(path).__enter__()
+        try:
+            for order, step in steps:
+                name = attempt_name(order)
+                if step == "queue" and name not in ledger.entries:
+                    journal.queued(order)
+                    ledger.put(Entry(order, Phase.QUEUED))
+                elif step == "start" and name in ledger.entries:
+                    journal.started(order, report_on(order, "r", ReportState.STARTED))
+                    ledger.put(Entry(order, Phase.STARTED))
+                elif step == "end":
+                    report = report_on(order, "r", ReportState.SUCCEEDED)
+                    journal.ended(order, report)
+                    ledger.put(Entry(order, Phase.ENDED, report))
+                elif step == "open":
+                    journal.__exit__(None, None, None)
+                    journal = Journal(path).__enter__()
+                    for entry in ledger.phases(Phase.QUEUED):
+                        ledger.drop(attempt_name(entry.order))
+                assert journal.ledger.epoch == ledger.epoch
+                assert journal.ledger.revisions == ledger.revisions
+                assert journal.ledger.entries == ledger.entries
+        finally:
+            journal.__exit__(None, None, None)

@@ -60,13 +60,11 @@ class Clearance:
         return least
 
 
-def segment_distance(points_m: ArrayLike, start_m: ArrayLike, end_m: ArrayLike) -> Floats:
-    """Distance of each point `(…, 2)` to the segment from `start_m` to `end_m`, m."""
-    points = np.asarray(points_m, dtype=np.float64)
-    start, end = np.asarray(start_m, dtype=np.float64), np.asarray(end_m, dtype=np.float64)
-    along = end - start
-    length2 = float(along @ along)
-    if length2 < 1e-12:
-        return np.asarray(np.linalg.norm(points - start, axis=-1))
-    share = np.clip(((points - start) @ along) / length2, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(points - (start + share[..., None] * along), axis=-1))
+def segment_gap(one_m: tuple[ArrayLike, ArrayLike], other_m: tuple[ArrayLike, ArrayLike]) -> float:
+    """Least distance between two segments, m, from samples every few centimetres."""
+    share = np.linspace(0.0, 1.0, 40)[:, None]
+    a, b = (
+        np.asarray(start) + share * (np.asarray(end) - np.asarray(start))
+        for start, end in (one_m, other_m)
+    )
+    return float(np.linalg.norm(a[:, None] - b[None], axis=-1).min())

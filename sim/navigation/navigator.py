@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 from keyexpr_schema.robots import PoseMRad
 from sim.errors import NoPath, NoStance
-from sim.navigation.clearance import Clearance
+from sim.navigation.clearance import Clearance, segment_gap
 from sim.navigation.lattice import Lattice
 from sim.navigation.spots import Dock, Spots
 from sim.navigation.steering import Leg, passed, steer
 from sim.navigation.traffic import Traffic, Traveller
 from sim.world_model import LARGEST_RADIUS_M, WorldFile
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 """Simulated time after which a robot that cannot get on gives up."""
 
 LINGER_S = 10.0
@@ -79,8 +79,7 @@ class Navigator:
         ]
         if not docks:
             raise NoPath(f"{robot} at ({here[0]:.2f}, {here[1]:.2f}) is hemmed in: no way out")
-        taken = self._claimed(*self._robots)
-        dock = next((d for d in docks if not d.owned & taken), docks[0])
+        dock = self._way_out(docks, radius_m)
         traveller = Traveller(robot, radius_m, track=[dock.node], parked=dock)
         traveller.recount()
         self._robots[robot] = traveller
@@ -195,8 +194,32 @@ class Navigator:
         if changed:
             traveller.recount()
 
-    def _claimed(self, *names: str) -> frozenset[int]:
-        return frozenset().union(*(self._robots[name].claims for name in names))
+    def _way_out(self, docks: list[Dock], radius_m: float) -> Dock:
+        """The way to the lattice for a robot that starts beside it: with room to itself, if any.
+
+        Robots may start closer together than traffic would ever let them come. Then their ways out
+        must at least keep clear of each other.
+        """
+        others = list(self._robots.values())
+        taken = frozenset().union(*(other.claims for other in others))
+        alone = [dock for dock in docks if not dock.owned & taken]
+        if alone:
+            return alone[0]
+
+        def room(dock: Dock) -> float:
+            node = self._lattice.points_m[dock.node]
+            return min(
+                segment_gap(
+                    (dock.point_m, (float(node[0]), float(node[1]))),
+                    (other.parked.point_m, self._lattice.points_m[other.track[0]]),
+                )
+                - radius_m
+                - other.radius_m
+                for other in others
+                if other.parked is not None
+            )
+
+        return max(docks, key=room)
 
     def _resolve(self, name: str) -> None:
         """Choose the spot or stance to go to, or another one if somebody stands there now."""

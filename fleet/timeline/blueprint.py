@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import cos, hypot, radians, sin
 from typing import Any
 
+import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint import encodings
 
@@ -13,13 +14,27 @@ from fleet.timeline.sink import SIM_TIME
 Rectangle = tuple[float, float, float, float]
 
 DEFAULT_FLOOR_M: Rectangle = (0.0, 0.0, 10.0, 6.0)
+DEFAULT_SPAN_S = (0.0, 60.0)
+LANE_SHARE = 0.018
+"""A third of a lane of the Gantt chart, as a part of the height of a 900 pixel window."""
+
 ELEVATION_DEG = 52.0
-AWAY = 1.02
-"""Distance of the eye from the middle of the floor, in diagonals of the floor."""
+AWAY = 1.08
+"""Distance of the eye from the middle of the floor, in diagonals of the floor and for a view as
+high as the window; a lower view shows as much of the width from nearer by."""
 
 
-def blueprint(floor_m: Rectangle | None = None) -> rrb.Blueprint:
-    """The layout, its eye south of and above the floor `(x_min, y_min, x_max, y_max)` [m]."""
+def blueprint(
+    floor_m: Rectangle | None = None,
+    span_s: tuple[float, float] = DEFAULT_SPAN_S,
+    lanes: int = 2,
+) -> rrb.Blueprint:
+    """The layout, its eye south of and above the floor `(x_min, y_min, x_max, y_max)` [m].
+
+    `span_s` is the fleet time [s] that the Gantt chart and the utilisation show from side to
+    side; the chart gets room for so many `lanes`, up to half of the height.
+    """
+    chart = min(0.5, (4 + 3 * max(2, lanes)) * LANE_SHARE)
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(
@@ -27,14 +42,17 @@ def blueprint(floor_m: Rectangle | None = None) -> rrb.Blueprint:
                     name="World",
                     origin="/world",
                     contents="/world/**",
-                    eye_controls=_eye(floor_m or DEFAULT_FLOOR_M),
+                    eye_controls=_eye(floor_m or DEFAULT_FLOOR_M, 1.0 - chart),
                     line_grid=rrb.LineGrid3D(visible=False),
                     background=[24, 26, 30],
                 ),
                 rrb.StateTimelineView(
-                    name="Who does what", origin="/fleet/gantt", contents="/fleet/gantt/**"
+                    name="Who does what",
+                    origin="/robots",
+                    contents="/robots/**",
+                    time_view=_time(span_s),
                 ),
-                row_shares=[0.66, 0.34],
+                row_shares=[1.0 - chart, chart],
             ),
             rrb.Vertical(
                 rrb.GraphView(name="Task graph", origin="/fleet/dag", contents="/fleet/dag/**"),
@@ -42,13 +60,14 @@ def blueprint(floor_m: Rectangle | None = None) -> rrb.Blueprint:
                     name="Busy share since the first task",
                     origin="/fleet/utilisation",
                     contents="/fleet/utilisation/**",
-                    axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
-                    plot_legend=rrb.PlotLegend(visible=True, corner=rrb.Corner2D.RightTop),
+                    axis_x=_time(span_s),
+                    axis_y=rrb.ScalarAxis(range=(-0.05, 1.05)),
+                    plot_legend=rrb.PlotLegend(visible=True, corner=rrb.Corner2D.LeftBottom),
                 ),
                 rrb.TextLogView(
                     name="Events", origin="/fleet/log", contents="/fleet/log/**", columns=_columns()
                 ),
-                row_shares=[0.5, 0.2, 0.3],
+                row_shares=[0.5, 0.19, 0.31],
             ),
             column_shares=[0.58, 0.42],
         ),
@@ -61,10 +80,10 @@ def blueprint(floor_m: Rectangle | None = None) -> rrb.Blueprint:
     )
 
 
-def _eye(floor_m: Rectangle) -> Any:
+def _eye(floor_m: Rectangle, height: float) -> Any:
     x0, y0, x1, y1 = floor_m
     middle = ((x0 + x1) / 2, (y0 + y1) / 2)
-    away_m = AWAY * max(2.0, hypot(x1 - x0, y1 - y0))
+    away_m = AWAY * height * max(2.0, hypot(x1 - x0, y1 - y0))
     up = radians(ELEVATION_DEG)
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
@@ -72,6 +91,11 @@ def _eye(floor_m: Rectangle) -> Any:
         look_target=(middle[0], middle[1], 0.0),
         eye_up=(0.0, 0.0, 1.0),
     )
+
+
+def _time(span_s: tuple[float, float]) -> Any:
+    low, high = (rr.TimeRangeBoundary.absolute(seconds=edge) for edge in span_s)
+    return rrb.archetypes.TimeAxis(view_range=rr.TimeRange(start=low, end=high))
 
 
 def _columns() -> Any:

@@ -32,6 +32,7 @@ class Clock:
 
     def __init__(self) -> None:
         self.now_s = 0.0
+        self._ticks = False
         self._wall: list[float] = []
         self._fleet: list[float] = []
 
@@ -40,6 +41,7 @@ class Clock:
         if self._fleet and fleet_s < self._fleet[-1] - 1.0:
             self._wall.clear()
             self._fleet.clear()
+        self._ticks = True
         self.now_s = fleet_s
         self.learn(wall_s, fleet_s)
 
@@ -62,8 +64,13 @@ class Clock:
             self._fleet[:half] = self._fleet[:half:2]
 
     def fleet_at(self, wall_s: float) -> float:
-        """Fleet time [s] at a wall time; held at the ends of what is known, 0 if nothing is."""
-        return _between(wall_s, self._wall, self._fleet)
+        """Fleet time [s] at a wall time; 0 if nothing is known.
+
+        Before the first known instant it is held there. After the last one too if somebody
+        publishes the fleet's clock: then it stands still. Otherwise it goes on with wall time.
+        """
+        ahead_s = wall_s - self._wall[-1] if self._wall and not self._ticks else 0.0
+        return _between(wall_s, self._wall, self._fleet) + max(0.0, ahead_s)
 
     def wall_at(self, fleet_s: float) -> float | None:
         """Unix seconds at which the fleet's clock showed `fleet_s`; `None` if nothing is known."""

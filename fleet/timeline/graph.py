@@ -12,7 +12,7 @@ from fleet.timeline.sink import Sink, entity
 from keyexpr_schema.plans import Plan, PlanStatus
 from keyexpr_schema.tasks import TaskRecord, TaskState
 
-ROW_PX = 70.0
+ROW_PX = 58.0
 GLYPH_PX = 7.0
 GAP_PX = 40.0
 PLANS = 6
@@ -205,5 +205,5 @@ def _node(
     after: tuple[str, ...],
 ) -> Node:
     who = robot or f"?{actor}"
-    label = f"{GLYPHS[state]} {call_text(skill, args, robot)}\n{who} · {state.value}"
+    label = f"{GLYPHS[state]} {name}: {call_text(skill, args, robot)}\n{who} · {state.value}"
     return Node(task=name, label=label, state=state, lane=who, after=after)

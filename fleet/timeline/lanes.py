@@ -72,7 +72,7 @@ class Lanes:
         """The lane of a robot; made, and empty, if it is new."""
         lane = self.lanes.get(robot)
         if lane is None:
-            lane = self.lanes[robot] = Lane(entity("fleet", "gantt", robot))
+            lane = self.lanes[robot] = Lane(entity("robots", robot))
             self._palette.robot(robot)
         return lane
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import signal
 import subprocess
 import sys
@@ -15,13 +14,19 @@ from fleet.timeline import viewer
 from fleet.timeline.errors import NoPicture
 from fleet.timeline.recorder import RECORDED, Recorder
 from fleet.timeline.sink import free_port, open_stream
-from keyexpr_schema.session import SessionConfig, Watch, open_session
+from keyexpr_schema.session import Change, SessionConfig, Watch, open_session
 
 FLUSH_S = 1.0
 """How much wall time of rows a SIGKILL may cost."""
 
 LIVE_FLUSH_S = 0.25
 """The same with a viewer looking on."""
+
+
+BACKLOG_S = 2.0
+"""Values are put in the order of their timestamps for so long, if they do not cease before."""
+
+IDLE_S = 0.05
 
 
 def say(sentence: str) -> None:
@@ -91,44 +96,45 @@ async def record(
 
 async def _follow(watch: Watch, recorder: Recorder, stop: asyncio.Event, flush_s: float) -> None:
     """Hand changes to the recorder until `stop`; what was stored first, in the order of writing."""
-    backlog: list[Any] | None = []
     loop = asyncio.get_running_loop()
+    backlog: list[Change[Any, Any]] | None = []
+    give_up_at = loop.time() + BACKLOG_S
     synced = asyncio.ensure_future(watch.synced())
     stopped = asyncio.ensure_future(stop.wait())
-    following = asyncio.ensure_future(anext(watch))
+    following = asyncio.ensure_future(_next(watch))
     flush_at = loop.time() + flush_s
     try:
         while not stopped.done():
-            waiting = {stopped, following, *([synced] if backlog is not None else [])}
             await asyncio.wait(
-                waiting,
-                timeout=max(0.0, flush_at - loop.time()),
+                {stopped, following},
+                timeout=IDLE_S if backlog is not None else max(0.0, flush_at - loop.time()),
                 return_when=asyncio.FIRST_COMPLETED,
             )
-            if following.done():
+            idle = not following.done()
+            if not idle:
                 change = following.result()
                 if backlog is None:
                     recorder.record(change)
                 else:
                     backlog.append(change)
-                following = asyncio.ensure_future(anext(watch))
-            elif backlog is not None and synced.done():
-                # Everything that the first listing held has come through the iterator.
-                synced.result()
+                following = asyncio.ensure_future(_next(watch))
+            now = loop.time()
+            if backlog is not None and ((idle and synced.done()) or now >= give_up_at):
                 recorder.record_all(backlog)
                 backlog = None
-            if loop.time() >= flush_at:
+            if now >= flush_at:
                 recorder.flush()
                 flush_at = loop.time() + flush_s
-    except StopAsyncIteration:
-        pass
     finally:
         if backlog:
             recorder.record_all(backlog)
         for task in (synced, stopped, following):
             task.cancel()
-            with contextlib.suppress(asyncio.CancelledError, StopAsyncIteration):
-                await task
+        await asyncio.gather(synced, stopped, following, return_exceptions=True)
+
+
+async def _next(watch: Watch) -> Change[Any, Any]:
+    return await anext(watch)
 
 
 def _show(port: int, tell: Callable[[str], None]) -> subprocess.Popen[bytes] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -126,6 +127,10 @@ def _chunks(path: Path) -> Iterator[Any]:
     if not path.is_file():
         raise UnreadableRecording(f"there is no recording at {path}")
     try:
-        yield from RrdReader(path).stream()
+        with warnings.catch_warnings():
+            # A recorder that was killed could not write the table of contents; the rest is good.
+            warnings.filterwarnings("ignore", message="RRD file has no footer")
+            reader = RrdReader(path)
+        yield from reader.stream()
     except (ValueError, RuntimeError, OSError) as error:
         raise UnreadableRecording(f"{path} is not a readable Rerun recording: {error}") from None

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import rerun as rr
 
 from fleet.timeline import sentences
-from fleet.timeline.blueprint import blueprint
+from fleet.timeline.blueprint import DEFAULT_SPAN_S, blueprint
 from fleet.timeline.clock import Clock, wall_of
 from fleet.timeline.graph import Graphs
 from fleet.timeline.lanes import Lanes, call_text
@@ -40,7 +40,7 @@ from keyexpr_schema.keyspace import (
     SIM_TRUTH,
     TASK_RECORD,
 )
-from keyexpr_schema.tasks import TaskRecord, TaskState
+from keyexpr_schema.tasks import OrderAddress, Report, TaskRecord, TaskState
 
 RECORDED: tuple[Key[Any, Any], ...] = (
     SIM_SCENE,
@@ -69,7 +69,6 @@ _TELL: dict[str, tuple[str, Callable[[Any, Any], Iterator[sentences.Line]]]] = {
     PLAN_STATUS.name: ("plans", sentences.plan_status),
     TASK_RECORD.name: ("tasks", sentences.task_record),
     ORDER.name: ("orders", sentences.order),
-    REPORT.name: ("reports", sentences.report),
     FACT.name: ("facts", sentences.fact),
     ROBOT_SPEC.name: ("robots", sentences.robot_spec),
     ROBOT_STATE.name: ("robots", sentences.robot_state),
@@ -114,7 +113,8 @@ class Recorder:
         self._utilisation = Utilisation(self._sink, self._lanes, self._palette)
         self._known: dict[tuple[str, Any], Any] = {}
         self._doing: dict[str, tuple[str, str]] = {}  # robot -> task as (plan, task)
-        self._framed: object = ()
+        self._span_s = DEFAULT_SPAN_S
+        self._framed: object = None
 
     @property
     def now_s(self) -> float:
@@ -185,13 +185,23 @@ class Recorder:
         self._graphs.draw(self._clock.now_s)
 
     def _frame_view(self, final: bool) -> None:
+        """Fit the layout to what there is; seldom, for it undoes what a person made of it."""
         floor = self._world.bounds.rectangle()
-        if floor == self._framed or (floor is None and not final):
+        if floor is None and not final:
             return
-        if floor is None and self._framed != ():
-            return
-        self._framed = floor
-        self._sink.stream.send_blueprint(blueprint(floor))
+        low_s, high_s = self._span_s
+        if final:
+            begun_s = self._lanes.first_s
+            low_s = 0.0 if begun_s is None or begun_s < 0.3 * self.now_s else begun_s - 5.0
+            high_s = max(low_s + 10.0, low_s + 1.04 * (self.now_s - low_s))
+        else:
+            while high_s < self.now_s:
+                high_s += high_s - low_s
+        self._span_s = (low_s, high_s)
+        framed = (floor, self._span_s, len(self._lanes.lanes))
+        if self._framed != framed:
+            self._framed = framed
+            self._sink.stream.send_blueprint(blueprint(*framed))
 
     def _show(self, key: str, value: Any, at_s: float, wall_s: float) -> None:
         if key == SIM_SCENE.name:
@@ -226,13 +236,24 @@ class Recorder:
             self._world.robot_label(record.robot, None, at_s, None)
 
     def _tell(self, key: str, value: Any, before: Any, at_s: float, wall_s: float) -> None:
-        telling = _TELL.get(key)
-        if telling is None:
+        if key == REPORT.name:
+            topic, lines = "reports", sentences.report(value, before, self._call(value))
+        elif key in _TELL:
+            topic, tell = _TELL[key]
+            lines = tell(value, before)
+        else:
             return
-        topic, tell = telling
-        for level, sentence in tell(value, before):
+        for level, sentence in lines:
             line = rr.TextLog(sentence, level=level, color=_COLOURS[level])
             self._sink.log(entity("fleet", "log", topic), line, at_s, wall_s)
+
+    def _call(self, report: Report) -> str:
+        """What a report is about, in the words of its order if that is known."""
+        address = OrderAddress(robot=report.robot, plan=report.plan, task=report.task)
+        order = self._known.get((ORDER.name, address))
+        if order is None:
+            return report.task
+        return f"{call_text(order.skill, order.args, order.robot)} ({report.task})"
 
     def _forget(self, key: str, address: Any, at_s: float) -> None:
         if key == TASK_RECORD.name:

@@ -91,21 +91,21 @@ def order(now: Order, before: Order | None) -> Iterator[Line]:
         yield WARN, f"{now.robot} shall stop {now.task}"
 
 
-def report(now: Report, before: Report | None) -> Iterator[Line]:
-    """A robot spoke of an attempt: every failed try with its reason, then how it stands."""
+def report(now: Report, before: Report | None, what: str) -> Iterator[Line]:
+    """A robot spoke of an attempt at `what`: each failed try with its reason, then the outcome."""
     known = len(before.tries) if before is not None else 0
     for one in now.tries[known:]:
         if one.reason is not None:
-            yield WARN, f"{now.robot}: {now.task} try {one.number} failed: {one.reason}"
+            yield WARN, f"{now.robot}: {what}, try {one.number} failed: {one.reason}"
     if before is not None and before.state is now.state:
         return
     if now.state is ReportState.STARTED:
-        yield INFO, f"{now.robot} started {now.task}"
+        yield INFO, f"{now.robot} started {what}"
         return
     good = now.state is ReportState.SUCCEEDED
     tries = f" at try {len(now.tries)}" if good and len(now.tries) > 1 else ""
     why = "" if good else _why(now.reason or _last(now.tries))
-    yield INFO if good else ERROR, f"{now.robot}: {now.task} {now.state.value}{tries}{why}"
+    yield INFO if good else ERROR, f"{now.robot}: {what} {now.state.value}{tries}{why}"
 
 
 def fact(now: Fact, before: Fact | None) -> Iterator[Line]:
@@ -148,7 +148,10 @@ def truth(now: Truth, before: Truth | None) -> Iterator[Line]:
         where = f"in the hand of {now.held_by}"
     else:
         where = f"on {now.support}" if now.support else "in mid-air"
-    yield INFO, f"in truth {now.object} is {where}, {now.place or 'in no place'}"
+    yield (
+        INFO,
+        f"in truth {now.object} is {where}, {f'in {now.place}' if now.place else 'in no place'}",
+    )
 
 
 def reject(now: Reject, before: Reject | None) -> Iterator[Line]:

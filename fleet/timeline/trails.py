@@ -16,6 +16,9 @@ STEP_M = 0.15
 STRAIGHT_M = 0.02
 """A corner that stands out less than this from the line past it is left out."""
 
+LIFT_M = 0.03
+"""Trails are drawn this far above where the body is, or the floor would hide them."""
+
 CORNERS = 200
 """The oldest corners go when there are more: a row of a trail never exceeds 2.4 kB."""
 
@@ -29,8 +32,13 @@ class Trail:
         self._radius_m = radius_m
         self._points: list[PointM] = []
 
+    def become(self, colour: Rgba, radius_m: float) -> None:
+        """Draw on in another colour and thickness: what it is the trail of became known."""
+        self._colour, self._radius_m = colour, radius_m
+
     def visit(self, sink: Sink, point_m: PointM, sim_s: float, wall_s: float) -> None:
         """The body is here; logs the trail when it has grown."""
+        point_m = (point_m[0], point_m[1], point_m[2] + LIFT_M)
         points = self._points
         if not points:
             points.append(point_m)

@@ -45,7 +45,12 @@ def start(arguments: list[str], output: int = subprocess.DEVNULL) -> subprocess.
     command = [str(program()), "--bind", "127.0.0.1", *arguments]
     try:
         return subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            # What it logs it also shows, as a note over the picture.
+            env={"RUST_LOG": "error", **os.environ},
         )
     except OSError as error:
         raise NoPicture(f"Rerun's viewer cannot be started: {error.strerror or error}") from None

@@ -22,6 +22,9 @@ FRAME_STEP_S = 0.05
 ROWS = 400
 """Rows of one body that are sent at once, at the latest."""
 
+ROBOT_TRAIL_M = 0.025
+OBJECT_TRAIL_M = 0.015
+
 _STILL_M = 0.0005
 _STILL_QUATERNION = 0.0005
 _STAND_IN_M = (0.2, 0.5)  # radius, height of a robot that no scene describes
@@ -125,6 +128,8 @@ class World:
     def robot(self, spec: RobotSpec) -> None:
         """A robot by that name belongs to the fleet."""
         self._specs[spec.robot] = spec
+        if spec.robot in self._trails:
+            self._trails[spec.robot].become(self._palette.robot(spec.robot), ROBOT_TRAIL_M)
         self.robot_label(spec.robot, None, self._frame_s or 0.0, None)
 
     # --- where it is -------------------------------------------------------------------------
@@ -233,7 +238,9 @@ class World:
         if trail is None:
             robot = owner in self._specs or owner not in self._roots
             colour = self._palette.robot(owner) if robot else self._own_colour(owner)
-            trail = Trail(entity("world", "trails", owner), colour, 0.025 if robot else 0.015)
+            trail = Trail(
+                entity("world", "trails", owner), colour, ROBOT_TRAIL_M if robot else OBJECT_TRAIL_M
+            )
             self._trails[owner] = trail
         return trail
 

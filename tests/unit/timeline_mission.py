@@ -162,8 +162,20 @@ class Step:
 
 
 STEPS: tuple[Step, ...] = (
-    Step("t1", "navigate", {"robot": "hsr", "place": "kitchen"}, "hsr", (), 2, 15, (2.0, 3.6), "g1"),
-    Step("t2", "search", {"robot": "hsr", "object": "cup_1"}, "hsr", ("t1",), 15, 21, (1.4, 4.1), "g1"),
+    Step(
+        "t1", "navigate", {"robot": "hsr", "place": "kitchen"}, "hsr", (), 2, 15, (2.0, 3.6), "g1"
+    ),
+    Step(
+        "t2",
+        "search",
+        {"robot": "hsr", "object": "cup_1"},
+        "hsr",
+        ("t1",),
+        15,
+        21,
+        (1.4, 4.1),
+        "g1",
+    ),
     Step(
         "t3",
         "pick",
@@ -181,7 +193,15 @@ STEPS: tuple[Step, ...] = (
         ),
     ),
     Step(
-        "t4", "navigate", {"robot": "locobot", "place": "kitchen"}, "locobot", (), 2, 13, (2.6, 4.4), "g1"
+        "t4",
+        "navigate",
+        {"robot": "locobot", "place": "kitchen"},
+        "locobot",
+        (),
+        2,
+        13,
+        (2.6, 4.4),
+        "g1",
     ),
     Step(
         "t5",
@@ -399,9 +419,7 @@ def story(step: Step) -> list[Put]:
         put(
             keys.REPORT,
             said,
-            Report(
-                **common, incarnation="i1", state=ReportState.STARTED, started_s=step.start_s
-            ),
+            Report(**common, incarnation="i1", state=ReportState.STARTED, started_s=step.start_s),
             step.start_s + 0.02,
         ),
     ]

@@ -1,0 +1,144 @@
+"""The recorder as a process on real keys: what was there before, what comes, how it ends."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from fleet.timeline.errors import UnreadableRecording
+from fleet.timeline.read import Row, rows, summary
+from keyexpr_schema.goals import Goal, GoalAddress
+from keyexpr_schema.keyspace import GOAL_SPEC, SIM_CLOCK, SIM_FRAME, TASK_RECORD
+from keyexpr_schema.session import Session, open_session
+from keyexpr_schema.simulation import Frame, SimAddress, SimClock
+from keyexpr_schema.tasks import TaskAddress, TaskRecord, TaskState
+
+DEADLINE_S = 30.0
+
+
+@contextmanager
+def recorder(endpoint: str, out: Path) -> Iterator[subprocess.Popen[str]]:
+    """A recorder that is ready."""
+    code = (
+        "from pathlib import Path; from fleet.timeline.process import run; "
+        f"run(({endpoint!r},), 'robotfleet', Path({str(out)!r}))"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    try:
+        assert process.stdout.readline().strip() == f"recording to {out}"
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+def read(out: Path, entity: str, component: str) -> list[Row]:
+    """What there is already of a recording that is still being written."""
+    try:
+        return rows(out, entity, component)
+    except UnreadableRecording:
+        return []
+
+
+async def until_written(out: Path, entity: str, component: str, count: int) -> list[Row]:
+    """Wait until the file holds so many rows."""
+    deadline = time.monotonic() + DEADLINE_S
+    while time.monotonic() < deadline:
+        found = await asyncio.to_thread(read, out, entity, component)
+        if len(found) >= count:
+            return found
+        await asyncio.sleep(0.1)  # between two looks at the condition, not in place of one
+    raise AssertionError(f"{entity} has {len(found)} rows of {component}, not {count}")
+
+
+def record(state: TaskState, ended_s: float | None = None) -> TaskRecord:
+    return TaskRecord(
+        plan="p1",
+        revision=1,
+        task="t1",
+        skill="navigate",
+        args={"robot": "r1", "place": "kitchen"},
+        actor="a1",
+        robot="r1",
+        state=state,
+        attempt=1,
+        started_s=3.0,
+        ended_s=ended_s,
+    )
+
+
+async def work(session: Session, state: TaskState, ended_s: float | None = None) -> None:
+    address = TaskAddress(plan="p1", task="t1")
+    await session.confirm(TASK_RECORD, address, record(state, ended_s))
+
+
+def move(session: Session, time_s: float) -> None:
+    clock = SimClock(time_s=time_s, wall_time_s=time.time(), speed=1.0)
+    session.put(SIM_CLOCK, SimAddress(), clock)
+    pose = ((time_s, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    session.put(SIM_FRAME, SimAddress(), Frame(time_s=time_s, poses={"r1/base": pose}))
+
+
+@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
+async def test_a_recorder_writes_what_was_and_what_comes_until_it_ends(
+    router, session_config, tmp_path, end
+):
+    out = tmp_path / "run.rrd"
+    async with open_session(session_config(component="test")) as session:
+        await session.confirm(GOAL_SPEC, GoalAddress(goal="g1"), Goal(goal="g1", text="before"))
+        await work(session, TaskState.RUNNING)
+        with recorder(router.endpoint, out) as process:
+            await until_written(out, "/fleet/log/goals", "text", 1)
+            await until_written(out, "/robots/r1", "state", 1)
+            await session.confirm(GOAL_SPEC, GoalAddress(goal="g2"), Goal(goal="g2", text="after"))
+            for step in range(1, 40):
+                move(session, 0.1 * step + 3.0)
+                await asyncio.sleep(0.01)  # a stream keeps its pace
+            await work(session, TaskState.SUCCEEDED, 7.0)
+            await until_written(out, "/fleet/log/goals", "text", 2)
+            await until_written(out, "/world/bodies/world/r1\\/base", "translation", 5)
+            await until_written(out, "/robots/r1", "state", 2)
+            process.send_signal(end)
+            status = await asyncio.to_thread(process.wait, DEADLINE_S)
+            assert status == (-9 if end is signal.SIGKILL else 0)
+    texts = [row.value[0] for row in rows(out, "/fleet/log/goals", "text")]
+    assert texts == ["goal g1: “before”", "goal g2: “after”"]
+    lane = [(row.sim_s, row.value[0]) for row in rows(out, "/robots/r1", "state")]
+    assert lane == [(3.0, "p1/t1#1"), (7.0, "")]
+    assert summary(out).timelines == {"sim_time", "wall_time"}
+
+
+async def test_a_recorder_carries_on_after_the_router_was_away(router, session_config, tmp_path):
+    out = tmp_path / "run.rrd"
+    with recorder(router.endpoint, out) as process:
+        async with open_session(session_config(component="test")) as session:
+            await work(session, TaskState.RUNNING)
+            await until_written(out, "/robots/r1", "state", 1)
+            await asyncio.to_thread(router.restart)
+            await session.wait_connected(DEADLINE_S)
+            await work(session, TaskState.SUCCEEDED, 7.0)
+            lane = await until_written(out, "/robots/r1", "state", 2)
+            assert lane[-1] == Row(7.0, [""])
+        process.send_signal(signal.SIGTERM)
+        assert await asyncio.to_thread(process.wait, DEADLINE_S) == 0
+
+
+def test_without_a_router_the_recorder_says_so(tmp_path):
+    from fleet.timeline.process import run
+    from fleet.timeline.sink import free_port
+    from keyexpr_schema.errors import Unreachable
+
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with pytest.raises(Unreachable, match=endpoint):
+        run((endpoint,), "robotfleet", tmp_path / "x.rrd", connect_timeout_s=0.3)
+    assert not (tmp_path / "x.rrd").exists()

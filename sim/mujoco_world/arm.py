@@ -131,7 +131,10 @@ class Arm:
         return None
 
     def obstacle(self, values: Sequence[float]) -> str | None:
-        """The fixed thing that the arm would touch with these joint values, or `None`."""
+        """What the robot would touch with these joint values (not objects), or `None`.
+
+        Walls and furniture by their names, another robot by its own.
+        """
         import mujoco
 
         scratch, model = self._scratch, self._model
@@ -141,11 +144,12 @@ class Arm:
         for contact in scratch.contact[: scratch.ncon]:
             bodies = [int(model.geom_bodyid[geom]) for geom in contact.geom]
             roots = [int(model.body_rootid[body]) for body in bodies]
-            if self._robot_root in roots:
-                other = bodies[1 - roots.index(self._robot_root)]
-                if int(model.body_weldid[other]) == 0 and contact.dist < -0.001:
-                    name = str(model.body(other).name)
-                    return name.removeprefix("furniture/")
+            if self._robot_root not in roots or contact.dist > -0.001:
+                continue
+            other = str(model.body(bodies[1 - roots.index(self._robot_root)]).name)
+            kind, _, name = other.partition("/")
+            if kind != "object" and other != "floor":
+                return name if kind == "furniture" else kind
         return None
 
 

@@ -25,10 +25,10 @@ from sim.world_model import WorldFile
 
 STEPS = round(PERIOD_S / STEP_S)
 WATCH_EVERY = 2
-"""Contacts are looked at every so many physics steps: 10 ms; a touch between bodies lasts longer."""
+"""Contacts are looked at every so many physics steps (10 ms); a bump lasts longer."""
 
 SETTLE_PERIODS = 6
-"""Control periods before the clock starts: wheels and objects come to rest on what they stand on."""
+"""Control periods before the clock starts, in which everything comes to rest where it stands."""
 
 MOTIONS: dict[MotionKind, Callable[[Stage, Act, Motion], Steps]] = {
     MotionKind.GO_TO: go_to,
@@ -183,13 +183,16 @@ class MujocoBackend(Backend):
         run: _Run,
         state: MotionState,
         reason: str | None,
-        ending: Ending = Ending(),
+        ending: Ending | None = None,
     ) -> None:
         run.steps.close()
         self._stage.navigator.cancel(robot)
         self._bodies[robot].freeze()
         run.ended = MotionOutcome(
-            state=state, senses=self._senses(robot), reason=reason, detections=ending.detections
+            state=state,
+            senses=self._senses(robot),
+            reason=reason,
+            detections=ending.detections if ending else (),
         )
 
     def _steer(self, robot: str, body: RobotBody) -> None:

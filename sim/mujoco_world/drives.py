@@ -93,7 +93,7 @@ class Drive(ABC):
 
 
 class Planar(Drive):
-    """Omnidirectional: velocity servos on x, y and yaw. Faces where it drives when it has far to go."""
+    """Omnidirectional: velocity servos on x, y and yaw. Facing ahead when it has far to go."""
 
     def __init__(
         self, model: Any, data: Any, prefix: str, entry: PlanarDrive, speed_m_s: float

@@ -17,6 +17,9 @@ REACH_MARGIN_M = 0.015
 BESIDE_M = (0.15, 0.6)
 """How far from its own rim a robot without a hand stops before a point."""
 
+BESIDE_ROBOT_M = (0.60, 0.95)
+"""How far from a point on another robot it stops: outside of the room that traffic gives that."""
+
 
 def go_to(stage: Stage, act: Act, motion: Motion) -> Steps:
     """Drive to a free spot inside a place."""
@@ -37,9 +40,24 @@ def approach(stage: Stage, act: Act, motion: Motion) -> Steps:
     assert point is not None
     yield from stow(act)
     act.phase = "driving up to the point"
-    reach = reach_m(act)
+    host = _robot_at(stage, act, point)
+    if host is not None:
+        # It must not make way now; and it needs its room, so the last bit is driven by the motion
+        # that reaches into its basket.
+        act.guest_of = host
+        yield
+    reach = reach_m(act) if host is None else BESIDE_ROBOT_M
     yield from _navigate(stage, act, lambda: stage.navigator.approach(act.robot.name, point, reach))
     return Ending()
+
+
+def _robot_at(stage: Stage, act: Act, point: PointM) -> str | None:
+    """The other robot on whose footprint a point lies."""
+    for name, other in stage.robots.items():
+        near = math.dist(other.pose()[:2], point[:2]) < other.description.radius_m
+        if near and name != act.robot.name:
+            return name
+    return None
 
 
 def reach_m(act: Act) -> tuple[float, float]:

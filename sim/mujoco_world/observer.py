@@ -106,7 +106,7 @@ class Observer:
         """Where every object really is."""
         touching = self.touching()
         baskets = {
-            object: robot.name for robot in self._robots.values() for object in self.basket(robot)
+            name: robot.name for robot in self._robots.values() for name in self.basket(robot)
         }
         found = []
         for name, body in self._objects.items():
@@ -151,7 +151,7 @@ class Observer:
         ahead = self._data.site_xmat[robot.camera].reshape(3, 3)[:, 0]
         base = np.array(self.base_point(object))
         length, width, height = self._extent(object)
-        to = base + (0.0, 0.0, height / 2) - eye
+        to = base + np.array([0.0, 0.0, height / 2]) - eye
         if np.linalg.norm(to) > robot.spec.capabilities.get("see", 0.0):
             return False
         bearing = math.atan2(

@@ -1,0 +1,1 @@
+"""The shell around the planner's core: keys, clock, journal, planning jobs, processes."""

@@ -1,0 +1,89 @@
+"""The one place where concrete planners, allocators and skill files are named.
+
+A user's package adds its own by the entry point groups `robotfleet.planners` and
+`robotfleet.allocators` (classes without constructor arguments).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fleet.allocators.base import Allocator
+from fleet.allocators.milp import MilpAllocator
+from fleet.core.skills import SkillModel, skills_from_data
+from fleet.errors import BadSkillFile, FleetError
+from fleet.planners.base import Planner
+from fleet.planners.symbolic import SymbolicPlanner
+
+DEFAULT_SKILLS = Path("skills") / "household.yaml"
+
+
+@dataclass(frozen=True)
+class Composition:
+    """What this planner is made of."""
+
+    skills: Mapping[str, SkillModel]
+    planners: Mapping[str, Planner]
+    allocators: Mapping[str, Allocator]
+
+    @property
+    def strategies(self) -> tuple[str, ...]:
+        """Every strategy that some planner has."""
+        return tuple(dict.fromkeys(s for p in self.planners.values() for s in p.strategies))
+
+
+def compose(skill_files: tuple[Path, ...] = ()) -> Composition:
+    """All planners and allocators there are, and the skills of these files (none: the household's).
+
+    Raises:
+        BadSkillFile: a file cannot be read, or two files model the same skill.
+        FleetError: an installed package offers something that is not a planner or an allocator.
+    """
+    planners: dict[str, Planner] = {SymbolicPlanner.name: SymbolicPlanner()}
+    allocators: dict[str, Allocator] = {MilpAllocator.name: MilpAllocator()}
+    for found in _from_packages("robotfleet.planners"):
+        if not isinstance(found, Planner):
+            raise FleetError(f"{type(found).__name__}, installed as a planner, is not a Planner")
+        planners[found.name] = found
+    for found in _from_packages("robotfleet.allocators"):
+        if not isinstance(found, Allocator):
+            raise FleetError(f"{type(found).__name__}, installed as an allocator, is not one")
+        allocators[found.name] = found
+    skills: dict[str, SkillModel] = {}
+    for path in skill_files or (default_skill_file(),):
+        for name, skill in load_skills(path).items():
+            if name in skills:
+                raise BadSkillFile(f"{path}: skill {name} is already modelled in another file")
+            skills[name] = skill
+    return Composition(skills, planners, allocators)
+
+
+def load_skills(path: Path) -> dict[str, SkillModel]:
+    """The skill models in a YAML file.
+
+    Raises:
+        BadSkillFile: it cannot be read, or what is in it is not right.
+    """
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadSkillFile(f"{path} cannot be read: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise BadSkillFile(f"{path} is not YAML: {' '.join(str(error).split())}") from None
+    return skills_from_data(data, str(path))
+
+
+def default_skill_file() -> Path:
+    """`configs/skills/household.yaml` below the working folder, or else beside the packages."""
+    here = Path("configs") / DEFAULT_SKILLS
+    return here if here.exists() else Path(__file__).parents[2] / "configs" / DEFAULT_SKILLS
+
+
+def _from_packages(group: str) -> list[Any]:
+    return [entry.load()() for entry in entry_points(group=group)]

@@ -1,0 +1,112 @@
+"""The planner's event journal: every event that changed its state, in order, in SQLite.
+
+An event is on disk before its effects leave the process, so a planner killed at any moment
+replays to where it was. From time to time the whole state is kept beside it, so that a start takes
+no longer the longer the planner has lived.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import sqlite3
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import TextIO
+
+import msgspec
+
+from fleet.core.events import Event, decode_event, encode_event
+from fleet.core.state import State
+from fleet.errors import FleetError
+
+SNAPSHOT_EVERY = 2000
+"""Events between two snapshots; replaying this many takes well under a second."""
+
+
+class JournalInUse(FleetError):
+    """Another planner works with this folder."""
+
+
+class EventJournal:
+    """Appends events and gives them back; use in a `with` block.
+
+    Raises:
+        JournalInUse: on entering, if another process has it.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._lock: TextIO | None = None
+        self._since_snapshot = 0
+
+    def __enter__(self) -> EventJournal:
+        self._folder.mkdir(parents=True, exist_ok=True)
+        lock = (self._folder / "lock").open("w")
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            lock.close()
+            raise JournalInUse(
+                f"another planner works with {self._folder}: end it, or use another --data"
+            ) from None
+        self._lock = lock
+        self._db = sqlite3.connect(self._folder / "events.db", isolation_level=None)
+        self._db.execute("PRAGMA journal_mode=WAL")
+        self._db.execute("PRAGMA synchronous=NORMAL")
+        self._db.execute(
+            "CREATE TABLE IF NOT EXISTS events (number INTEGER PRIMARY KEY, event BLOB NOT NULL)"
+        )
+        self._db.execute(
+            "CREATE TABLE IF NOT EXISTS snapshots (number INTEGER PRIMARY KEY, state BLOB NOT NULL)"
+        )
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._db.close()
+        if self._lock is not None:
+            self._lock.close()
+
+    def append(self, event: Event, state: State) -> None:
+        """Keep an event, and now and then the state that it led to."""
+        cursor = self._db.execute("INSERT INTO events (event) VALUES (?)", (encode_event(event),))
+        self._since_snapshot += 1
+        if self._since_snapshot >= SNAPSHOT_EVERY:
+            self._since_snapshot = 0
+            self._db.execute("BEGIN")
+            self._db.execute("DELETE FROM snapshots")
+            self._db.execute(
+                "INSERT INTO snapshots (number, state) VALUES (?, ?)",
+                (cursor.lastrowid, msgspec.json.encode(state)),
+            )
+            self._db.execute("COMMIT")
+
+    @property
+    def empty(self) -> bool:
+        """Whether nothing was ever kept here."""
+        return self._db.execute("SELECT 1 FROM events LIMIT 1").fetchone() is None
+
+    def snapshot(self) -> tuple[int, State]:
+        """The newest kept state and the number of the event that led to it (0: none is kept).
+
+        A snapshot of an older version of the planner that no longer decodes counts as none.
+        """
+        row = self._db.execute("SELECT number, state FROM snapshots").fetchone()
+        if row is None:
+            return 0, State()
+        try:
+            return int(row[0]), msgspec.json.decode(row[1], type=State)
+        except msgspec.DecodeError:
+            return 0, State()
+
+    def events(self, after: int = 0) -> Iterator[Event]:
+        """Every event with a higher number than `after`, in order."""
+        for (data,) in self._db.execute(
+            "SELECT event FROM events WHERE number > ? ORDER BY number", (after,)
+        ):
+            yield decode_event(data)

@@ -1,0 +1,79 @@
+"""Publishes what the core wants published, each key in turn, until the store has confirmed it."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Iterable
+from contextlib import asynccontextmanager
+
+from fleet.core.effects import Publish, Retract
+from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.session import Session
+
+CONFIRM_TIMEOUT_S = 10.0
+IN_FLIGHT = 32
+"""Keys written at the same time; a confirmed put takes under a millisecond."""
+_RETRY_S = 0.2
+
+log = logging.getLogger(__name__)
+
+
+class Outbox:
+    """Holds the newest wanted value of each key and writes it; older ones are skipped.
+
+    Nothing is given up: while no router is there, writes wait.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._wanted: dict[str, Publish | Retract] = {}
+        self._busy: set[str] = set()
+        self._idle = asyncio.Event()
+        self._idle.set()
+        self._room = asyncio.Semaphore(IN_FLIGHT)
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    @asynccontextmanager
+    async def running(self) -> AsyncIterator[Outbox]:
+        """Write until the block ends; what was not written by then is left to the next start."""
+        try:
+            yield self
+        finally:
+            for task in self._tasks:
+                task.cancel()
+            await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    def send(self, effects: Iterable[Publish | Retract]) -> None:
+        """Want these values at their keys."""
+        for effect in effects:
+            keyexpr = effect.key.build(effect.address)
+            self._wanted[keyexpr] = effect
+            self._idle.clear()
+            if keyexpr not in self._busy:
+                self._busy.add(keyexpr)
+                task = asyncio.create_task(self._write(keyexpr))
+                self._tasks.add(task)
+                task.add_done_callback(self._tasks.discard)
+
+    async def drained(self) -> None:
+        """Wait until everything wanted is confirmed."""
+        await self._idle.wait()
+
+    async def _write(self, keyexpr: str) -> None:
+        async with self._room:
+            while (effect := self._wanted.pop(keyexpr, None)) is not None:
+                try:
+                    if isinstance(effect, Publish):
+                        await self._session.confirm(
+                            effect.key, effect.address, effect.payload, CONFIRM_TIMEOUT_S
+                        )
+                    else:
+                        await self._session.delete(effect.key, effect.address, CONFIRM_TIMEOUT_S)
+                except SchemaError as error:
+                    log.warning("%s", error)
+                    self._wanted.setdefault(keyexpr, effect)
+                    await asyncio.sleep(_RETRY_S)
+        self._busy.discard(keyexpr)
+        if not self._busy:
+            self._idle.set()

@@ -1,0 +1,253 @@
+"""The planner's shell: keys become events, events go through the core, effects are carried out."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+import uuid
+from collections.abc import Sequence
+from contextlib import AsyncExitStack
+from typing import Any
+
+from fleet.core import events
+from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
+from fleet.core.events import Event
+from fleet.core.state import Job, State
+from fleet.core.step import replay, step
+from fleet.core.working import next_timer
+from fleet.errors import Superseded
+from fleet.service.composition import Composition
+from fleet.service.event_journal import EventJournal
+from fleet.service.inbox import WATCHED, At, event_of, missed_deletions
+from fleet.service.outbox import Outbox
+from fleet.service.planning_desk import carry_out
+from keyexpr_schema.keyspace import (
+    ANSWER,
+    FACT,
+    GOAL_STATUS,
+    PLAN_STATUS,
+    PLANNER_ALIVE,
+    PLANNER_STATUS,
+    ROBOT_ALIVE,
+    SIM_CLOCK,
+)
+from keyexpr_schema.service import PlannerAddress, PlannerAliveAddress, PlannerStatus
+from keyexpr_schema.session import Session, TokenWatch, Watch
+
+log = logging.getLogger(__name__)
+
+
+class PlannerService:
+    """One run of the central planner over a session, with its journal."""
+
+    def __init__(self, session: Session, journal: EventJournal, parts: Composition) -> None:
+        self._session = session
+        self._journal = journal
+        self._parts = parts
+        self._incarnation = uuid.uuid4().hex[:12]
+        self._state = State()
+        self._time_s = 0.0
+        self._outbox = Outbox(session)
+        self._inbox: asyncio.Queue[Event] = asyncio.Queue()
+        self._planning: set[asyncio.Task[None]] = set()
+        self._held: list[Effect] | None = []
+        """Effects held back until everything stored is known; afterwards `None`."""
+
+    @property
+    def state(self) -> State:
+        """What the planner knows now."""
+        return self._state
+
+    async def run(self, ready: asyncio.Event | None = None) -> None:
+        """Plan until cancelled; sets `ready` once everything that is stored was taken in.
+
+        Raises:
+            Superseded: a planner with a higher epoch is in charge.
+        """
+        number, snapshot = self._journal.snapshot()
+        first_run = self._journal.empty
+        self._state = replay(self._journal.events(number), self._parts.skills, snapshot)
+        async with AsyncExitStack() as stack:
+            watch = await stack.enter_async_context(
+                self._session.watch(*WATCHED, SIM_CLOCK, PLANNER_STATUS)
+            )
+            tokens = await stack.enter_async_context(self._session.watch_tokens(ROBOT_ALIVE))
+            await stack.enter_async_context(self._outbox.running())
+            if first_run:
+                await self._take_over()
+            await self._take_charge()
+            await stack.enter_async_context(
+                self._session.token(PLANNER_ALIVE, PlannerAliveAddress(self._incarnation))
+            )
+            await self._catch_up(watch, tokens)
+            self._speak()
+            if ready is not None:
+                ready.set()
+            try:
+                async with asyncio.TaskGroup() as tasks:
+                    tasks.create_task(self._listen(watch))
+                    tasks.create_task(self._count_robots(tokens))
+                    tasks.create_task(self._work())
+            except* Superseded as group:
+                raise group.exceptions[0] from None
+            finally:
+                for task in self._planning:
+                    task.cancel()
+
+    def _at(self) -> At:
+        return {"time_s": self._time_s, "wall_time_s": time.time()}
+
+    async def _take_over(self) -> None:
+        """Without a journal: what an earlier planner answered and ended is not done again."""
+        answers = await self._session.list(ANSWER)
+        goals = await self._session.list(GOAL_STATUS)
+        plans = await self._session.list(PLAN_STATUS)
+        self._apply(
+            events.Remembered(
+                answers=tuple(answers.values()),
+                goals=tuple(goals.values()),
+                plans=tuple(address.plan for address in plans),
+                **self._at(),
+            )
+        )
+
+    async def _take_charge(self) -> None:
+        status = await self._session.get(PLANNER_STATUS, PlannerAddress())
+        epoch = 1 + max(self._state.epoch, status.epoch if status else 0)
+        self._apply(events.PlannerStarted(epoch=epoch, incarnation=self._incarnation, **self._at()))
+        await self._session.confirm(
+            PLANNER_STATUS,
+            PlannerAddress(),
+            PlannerStatus(
+                epoch=epoch,
+                incarnation=self._incarnation,
+                planners=tuple(self._parts.planners),
+                strategies=self._parts.strategies,
+                allocators=tuple(self._parts.allocators),
+                skills=tuple(self._parts.skills),
+            ),
+            timeout_s=3600.0,
+        )
+
+    async def _catch_up(self, watch: Watch, tokens: TokenWatch[Any]) -> None:
+        """Take in everything stored, and what went away while no planner was there."""
+        seen: set[str] = set()
+        synced = asyncio.ensure_future(watch.synced())
+        async for change in _until(watch, synced):
+            seen.add(change.key.build(change.address))
+            self._take_in(change)
+        for event in missed_deletions(self._state, seen, self._at()):
+            self._apply(event)
+        here: set[tuple[str, str]] = set()
+        async for token in _until(tokens, asyncio.ensure_future(tokens.synced())):
+            self._token(token)
+            if token.alive:
+                here.add((token.address.robot, token.address.incarnation))
+        for robot, runs in self._state.alive.items():
+            for run in runs:
+                if (robot, run) not in here:
+                    self._apply(events.RobotGone(robot=robot, incarnation=run, **self._at()))
+
+        while not self._inbox.empty():
+            self._apply(self._inbox.get_nowait())
+
+    def _speak(self) -> None:
+        """From now on effects are carried out; those of the catching up all at once.
+
+        Until here nothing was ordered, since a report that is not read yet could forbid it.
+        """
+        facts = [e for e in self._held or () if isinstance(e, Publish) and e.key is FACT]
+        self._held = None
+        self._carry_out((*facts, *effects_of(self._state)))
+
+    async def _listen(self, watch: Watch) -> None:
+        async for change in watch:
+            self._take_in(change)
+
+    def _take_in(self, change: Any) -> None:
+        if change.key is SIM_CLOCK:
+            self._time_s = change.value.time_s
+        elif change.key is PLANNER_STATUS:
+            other = change.value
+            if other is not None and other.epoch > self._state.epoch:
+                raise Superseded(
+                    f"planner {other.incarnation} took charge of realm "
+                    f"{self._session.config.realm} (epoch {other.epoch}); this one stops"
+                )
+        elif (event := event_of(change, self._at())) is not None:
+            self._time_s = max(self._time_s, _report_time_s(event))
+            self._inbox.put_nowait(event)
+
+    async def _count_robots(self, tokens: TokenWatch[Any]) -> None:
+        async for token in tokens:
+            self._token(token)
+
+    def _token(self, token: Any) -> None:
+        kind = events.RobotSeen if token.alive else events.RobotGone
+        robot, incarnation = token.address.robot, token.address.incarnation
+        self._inbox.put_nowait(kind(robot=robot, incarnation=incarnation, **self._at()))
+
+    async def _work(self) -> None:
+        """Take events one after the other; wake up when a timer of the state runs out."""
+        while True:
+            timer = next_timer(self._state)
+            try:
+                async with asyncio.timeout(None if timer is None else timer - time.time()):
+                    event = await self._inbox.get()
+            except TimeoutError:
+                event = events.TimePassed(**self._at())
+            self._apply(event)
+
+    def _apply(self, event: Event) -> None:
+        state, effects = step(self._state, event, self._parts.skills)
+        if state is self._state:
+            return
+        self._journal.append(event, state)
+        self._state = state
+        self._carry_out(effects)
+
+    def _carry_out(self, effects: Sequence[Effect]) -> None:
+        if self._held is not None:
+            self._held.extend(effects)
+            return
+        self._outbox.send(e for e in effects if isinstance(e, Publish | Retract))
+        for effect in effects:
+            if isinstance(effect, MakePlan):
+                task = asyncio.create_task(self._make_plan(effect.job))
+                self._planning.add(task)
+                task.add_done_callback(self._planning.discard)
+
+    async def _make_plan(self, job: Job) -> None:
+        at = self._at()
+        try:
+            event: Event = await asyncio.to_thread(
+                carry_out, job, self._state, self._parts, at["time_s"], at["wall_time_s"]
+            )
+        except Exception as error:
+            log.exception("planning job %d", job.job)
+            event = events.PlanNotMade(
+                job=job.job, reason=f"the planner failed: {error or type(error).__name__}", **at
+            )
+        self._inbox.put_nowait(event)
+
+
+def _report_time_s(event: Event) -> float:
+    if isinstance(event, events.ReportTold):
+        return event.report.ended_s or event.report.started_s or 0.0
+    return 0.0
+
+
+async def _until(iterator: Any, done: asyncio.Future[None]) -> Any:
+    """Items of an async iterator until `done` is done and nothing more lies ready."""
+    while True:
+        item = asyncio.ensure_future(anext(iterator))
+        await asyncio.wait((item, done), return_when=asyncio.FIRST_COMPLETED)
+        if not item.done():
+            # One more turn of the loop: what lay ready when `done` came is still taken.
+            await asyncio.sleep(0)
+            if not item.done():
+                item.cancel()
+                await asyncio.gather(item, return_exceptions=True)
+                return
+        yield item.result()

@@ -1,0 +1,64 @@
+"""The process behind `robotctl planner`."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import signal
+import sys
+from pathlib import Path
+
+from fleet.errors import FleetError
+from fleet.service.composition import compose
+from fleet.service.event_journal import EventJournal
+from fleet.service.planner import PlannerService
+from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.session import SessionConfig, open_session
+
+
+def run(
+    endpoints: tuple[str, ...],
+    realm: str,
+    data_dir: Path,
+    skill_files: tuple[Path, ...] = (),
+) -> None:
+    """Be the central planner of a realm until SIGTERM or SIGINT; prints a line once it is ready.
+
+    The event journal lies in `data_dir`. It waits for a router as long as there is none.
+
+    Raises:
+        SystemExit: with 1 and one sentence on stderr, when it cannot start or is superseded.
+    """
+    logging.basicConfig(
+        level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s"
+    )
+    try:
+        asyncio.run(_run(endpoints, realm, data_dir, skill_files))
+    except (FleetError, SchemaError) as error:
+        print(f"error: {error}", file=sys.stderr)  # noqa: T201
+        raise SystemExit(1) from None
+
+
+async def _run(
+    endpoints: tuple[str, ...], realm: str, data_dir: Path, skill_files: tuple[Path, ...]
+) -> None:
+    parts = compose(skill_files)
+    config = SessionConfig(
+        endpoints=endpoints, realm=realm, component="planner", connect_timeout_s=None
+    )
+    loop = asyncio.get_running_loop()
+    with EventJournal(data_dir) as journal:
+        async with open_session(config) as session:
+            ready = asyncio.Event()
+            service = asyncio.create_task(PlannerService(session, journal, parts).run(ready))
+            for number in (signal.SIGTERM, signal.SIGINT):
+                loop.add_signal_handler(number, service.cancel)
+            waiting = asyncio.create_task(ready.wait())
+            await asyncio.wait((service, waiting), return_when=asyncio.FIRST_COMPLETED)
+            waiting.cancel()
+            if ready.is_set():
+                print(f"planner ready in realm {realm}", flush=True)  # noqa: T201
+            try:
+                await service
+            except asyncio.CancelledError:
+                return

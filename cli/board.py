@@ -22,9 +22,11 @@ from keyexpr_schema.keyspace import (
     SIM_CLOCK,
     SIM_CONTACTS,
     SIM_SCENE,
+    SIM_SENSES,
     SIM_TRUTH,
     TASK_RECORD,
 )
+from keyexpr_schema.motions import Senses
 from keyexpr_schema.plans import Plan, PlanStatus
 from keyexpr_schema.robots import RobotSpec, RobotState
 from keyexpr_schema.service import Reject
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
 
 FLEET = (GOAL_SPEC, GOAL_STATUS, PLAN_SPEC, PLAN_STATUS, TASK_RECORD, ROBOT_SPEC, ROBOT_STATE)
 """What any fleet has."""
-SIMULATION = (SIM_CLOCK, SIM_TRUTH, SIM_CONTACTS, SIM_SCENE)
+SIMULATION = (SIM_CLOCK, SIM_TRUTH, SIM_CONTACTS, SIM_SCENE, SIM_SENSES)
 """What only a simulated one has."""
 
 
@@ -56,6 +58,7 @@ class Board:
     robots: dict[str, RobotState] = field(default_factory=dict)
     rejects: dict[str, Reject] = field(default_factory=dict)
     truths: dict[str, Truth] = field(default_factory=dict)
+    senses: dict[str, Senses] = field(default_factory=dict)
     clock: SimClock | None = None
     contacts: ContactCount | None = None
     scene: Scene | None = None
@@ -93,6 +96,7 @@ class Board:
             ROBOT_SPEC.name: self.specs,
             ROBOT_STATE.name: self.robots,
             SIM_TRUTH.name: self.truths,
+            SIM_SENSES.name: self.senses,
             REJECT.name: self.rejects,
         }
         return shelves.get(key)

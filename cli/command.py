@@ -79,10 +79,14 @@ class Call:
 
             encoded = msgspec.json.encode(data, enc_hook=_encode)
             typer.echo(msgspec.json.format(encoded, indent=2).decode())
+            return
+        drawn = draw()
+        if isinstance(drawn, str):
+            typer.echo(drawn)
         else:
             from cli.show.page import page
 
-            page().print(draw())
+            page().print(drawn)
 
     def say(self, sentence: str) -> None:
         """A sentence for a person: on stdout, or on stderr where stdout carries JSON."""

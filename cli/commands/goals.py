@@ -42,6 +42,7 @@ async def add(
     from cli.errors import Refused
     from cli.presence import planner_alive
     from cli.show.fleet_tables import GoalRow
+    from cli.telling import put_goal
     from keyexpr_schema.goals import ENDED_GOALS, GoalState
     from keyexpr_schema.keyspace import GOAL_STATUS
 
@@ -74,32 +75,6 @@ async def add(
             f"goal {spec.goal} {status.state.value}: {status.reason or 'no reason given'}"
         )
     call.show(GoalRow(goal=spec.goal, spec=spec, status=status), lambda: _sentence(spec, status))
-
-
-async def put_goal(session: Session, text: str, name: str | None, priority: int = 0) -> Goal:
-    """Store a goal, confirmed, after all that were given before it.
-
-    Raises:
-        BadArgument: a goal of that name exists and says something else.
-    """
-    from cli.errors import BadArgument
-    from cli.naming import free_name
-    from keyexpr_schema.goals import Goal, GoalAddress
-    from keyexpr_schema.keyspace import GOAL_SPEC
-
-    stored, status = await _all(session)
-    if name in stored:
-        raise BadArgument(
-            f"there is a goal {name!r} already: “{stored[name].text}”; use another --id"
-        )
-    spec = Goal(
-        goal=name or free_name(text, [*stored, *status]),
-        text=text,
-        priority=priority,
-        ordinal=1 + max((each.ordinal for each in stored.values()), default=0),
-    )
-    await session.confirm(GOAL_SPEC, GoalAddress(spec.goal), spec)
-    return spec
 
 
 def _sentence(spec: Goal, status: GoalStatus) -> str:

@@ -44,10 +44,10 @@ def router(
 ) -> None:
     """Run a Zenoh router with the fleet's durable store in it."""
     from cli.running import end_with_parent
-    from fleet.service import router_process
+    from fleet.service.router_process import run
 
     end_with_parent()
-    router_process.run(
+    run(
         listen=tuple(listen or call.settings.routers[:1]),
         connect=tuple(connect or ()),
         data_dir=_data(data, "router"),
@@ -58,10 +58,10 @@ def router(
 def planner(call: Call, data: DataOption = None) -> None:
     """Run the planner: it turns goals into plans and has them carried out."""
     from cli.running import end_with_parent
-    from fleet.service import planner_process
+    from fleet.service.planner_process import run
 
     end_with_parent()
-    planner_process.run(
+    run(
         endpoints=call.settings.routers,
         realm=call.settings.realm,
         data_dir=_data(data, "planner"),
@@ -80,10 +80,10 @@ def worker(
     """Run one robot's worker: it takes orders and carries them out."""
     from cli.embodiments import embodiment_factory
     from cli.running import end_with_parent
-    from workers import process
+    from workers.process import run
 
     end_with_parent()
-    process.run(
+    run(
         robot=robot,
         endpoints=call.settings.routers,
         realm=call.settings.realm,
@@ -106,11 +106,12 @@ def sim(
     ] = "1",
 ) -> None:
     """Run a simulated world with a mission's robots in it."""
+    from sim.process import run
+
     from cli.running import end_with_parent
-    from sim import process
 
     end_with_parent()
-    process.run(
+    run(
         mission=mission,
         endpoints=call.settings.routers,
         realm=call.settings.realm,
@@ -127,10 +128,10 @@ def record(
 ) -> None:
     """Record everything that happens for Rerun."""
     from cli.running import end_with_parent
-    from fleet.timeline import process
+    from fleet.timeline.process import run
 
     end_with_parent()
-    process.run(endpoints=call.settings.routers, realm=call.settings.realm, out=out, view=view)
+    run(endpoints=call.settings.routers, realm=call.settings.realm, out=out, view=view)
 
 
 def parse_speed(written: str) -> float | None:

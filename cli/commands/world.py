@@ -9,12 +9,10 @@ import typer
 from cli.command import Call, command
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from rich.console import RenderableType
 
     from keyexpr_schema.session import Session
-    from keyexpr_schema.world import Fact, Object, Place, Statement, Value
+    from keyexpr_schema.world import Value
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False)
 
@@ -29,6 +27,7 @@ async def load(
     call: Call, file: Annotated[str, typer.Argument(metavar="FILE", help="See configs/worlds.")]
 ) -> None:
     """Tell the fleet the places and objects of a world file (not where the objects are)."""
+    from cli.telling import put_world
     from sim.world_file import load_world
 
     told = load_world(file)
@@ -42,17 +41,6 @@ async def load(
             f"objects {', '.join(o.object for o in objects) or 'none'}"
         ),
     )
-
-
-async def put_world(session: Session, places: Iterable[Place], objects: Iterable[Object]) -> None:
-    """Store places and objects, confirmed."""
-    from keyexpr_schema.keyspace import OBJECT, PLACE
-    from keyexpr_schema.world import ObjectAddress, PlaceAddress
-
-    for place in places:
-        await session.confirm(PLACE, PlaceAddress(place.place), place)
-    for thing in objects:
-        await session.confirm(OBJECT, ObjectAddress(thing.object), thing)
 
 
 @command(app, "add")
@@ -71,6 +59,7 @@ async def add(
 ) -> None:
     """Say something of the world, in a sentence or as a fact (`--fact at cup_1 kitchen`)."""
     from cli.errors import BadArgument
+    from cli.telling import add_fact, add_statement
 
     if fact and len(words) != 3:
         raise BadArgument(
@@ -85,59 +74,6 @@ async def add(
         else:
             told = await add_statement(session, " ".join(words), name)
             call.show(told, lambda: f"stored statement {told.statement}: “{told.text}”")
-
-
-async def add_statement(session: Session, text: str, name: str | None = None) -> Statement:
-    """Store a sentence, confirmed, under `name` or one made from its words."""
-    from cli.naming import free_name
-    from keyexpr_schema.keyspace import STATEMENT
-    from keyexpr_schema.world import Statement, StatementAddress
-
-    if name is None:
-        stored = await session.list(STATEMENT)
-        same = [a.statement for a, said in stored.items() if said.text == text]
-        name = same[0] if same else free_name(text, (a.statement for a in stored))
-    said = Statement(statement=name, text=text)
-    await session.confirm(STATEMENT, StatementAddress(name), said)
-    return said
-
-
-async def add_fact(session: Session, relation: str, subject: str, written: str) -> Fact:
-    """Store a fact, confirmed.
-
-    Raises:
-        Unknown: `at` of something that is no object or robot, or of a place that is none.
-    """
-    from cli.errors import check_known
-    from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, ROBOT_SPEC
-    from keyexpr_schema.world import Fact, FactAddress
-
-    address = FactAddress(subject, relation)
-    value = parse_value(written)
-    if relation == "at":
-        how = "load a world with `robotctl world load FILE`"
-        robots = [a.robot for a in await session.list(ROBOT_SPEC)]
-        objects = [a.object for a in await session.list(OBJECT)]
-        check_known("object or robot", subject, [*objects, *robots], how)
-        if value is not None:
-            places = [a.place for a in await session.list(PLACE)]
-            check_known("place or robot", written, [*places, *robots], how)
-    fact = Fact(subject=subject, relation=relation, value=value, source="person")
-    await session.confirm(FACT, address, fact)
-    return fact
-
-
-def parse_value(written: str) -> Value:
-    """`unknown`, `true`, `false`, a number, or the word itself."""
-    words: dict[str, Value] = {"unknown": None, "true": True, "false": False}
-    if written in words:
-        return words[written]
-    for kind in (int, float):
-        try:
-            return kind(written)
-        except ValueError:
-            continue
-    return written
 
 
 def _words(value: Value) -> str:

@@ -37,6 +37,7 @@ class Fleet:
     def __init__(self, endpoint: str, realm: str, out: Path) -> None:
         self.endpoint, self.realm, self.out = endpoint, realm, out
         self._commands: dict[str, tuple[str, ...]] = {}
+        self._layers: dict[str, int] = {}
         self._children: dict[str, asyncio.subprocess.Process] = {}
         self._waiters: dict[str, asyncio.Task[None]] = {}
         self._ending: set[str] = set()
@@ -47,14 +48,20 @@ class Fleet:
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        # Dependents first, so that none of them complains of a router that has gone.
-        await asyncio.gather(*(self.stop(name) for name in reversed(self._children)))
+        for layer in sorted(set(self._layers.values()), reverse=True):
+            names = [name for name in self._children if self._layers[name] == layer]
+            await asyncio.gather(*(self.stop(name) for name in names))
         if self._died is not None and not self._died.done():
             self._died.cancel()
 
-    def declare(self, name: str, *arguments: str) -> None:
-        """Say which `robotctl` command `name` runs, for this and every later `start`."""
+    def declare(self, name: str, *arguments: str, layer: int = 0) -> None:
+        """Say which `robotctl` command `name` runs, for this and every later `start`.
+
+        At the end the highest layer is stopped first, so that nobody complains of a router that
+        has gone, and the recorder sees how the others end.
+        """
         self._commands[name] = arguments
+        self._layers[name] = layer
 
     def log(self, name: str) -> Path:
         """Where the output of `name` goes."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 from rich.console import Group, RenderableType
 from rich.live import Live
+from rich.text import Text
 
 from cli.show.page import page, table
 from cli.show.plan_tree import plan_tree
@@ -95,7 +96,7 @@ def picture(board: Board, only: str | None = None) -> RenderableType:
     parts: list[RenderableType] = []
     clock = board.now_s
     if clock is not None:
-        parts.append(f"[bold]{seconds(clock)}[/bold] on the fleet's clock")
+        parts.append(Text(f"{seconds(clock)} on the fleet's clock", "bold"))
     for name in sorted(board.plans):
         if only not in (None, name):
             continue

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 if TYPE_CHECKING:
@@ -18,23 +17,28 @@ PIPED_WIDTH = 200
 
 
 def page(file: TextIO | None = None) -> Console:
-    """A console on `file` (stdout at the time of the call); piped output is wide and plain."""
+    """A console on `file` (stdout at the time of the call); piped output is wide.
+
+    Text is never markup: a person's sentence may have brackets in it.
+    """
     target = file or sys.stdout
     return Console(
         file=target,
         width=None if target.isatty() else PIPED_WIDTH,
         highlight=False,
+        markup=False,
+        emoji=False,
         soft_wrap=False,
     )
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[object]], title: str = "") -> Table:
-    """A plain table; `None` shows as nothing. Cells are text, not markup."""
+    """A plain table; `None` shows as nothing."""
     drawn = Table(
         title=title or None, title_justify="left", box=None, pad_edge=False, header_style="bold"
     )
     for column in columns:
         drawn.add_column(column, overflow="fold")
     for row in rows:
-        drawn.add_row(*(escape("" if cell is None else str(cell)) for cell in row))
+        drawn.add_row(*("" if cell is None else str(cell) for cell in row))
     return drawn

@@ -1,0 +1,110 @@
+"""`robotctl demo`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cli.command import Call, command
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from cli.demo.mission_run import Demo, DemoOptions
+    from cli.demo.summary import Summary
+    from cli.show.live import Ticker
+
+app = typer.Typer(rich_markup_mode=None, add_completion=False)
+BACKENDS = ("mujoco", "kinematic")
+
+
+@command(app)
+async def demo(
+    call: Call,
+    mission: Annotated[
+        str, typer.Argument(metavar="MISSION", help="A mission's file, or name as two-cups.")
+    ],
+    backend: Annotated[
+        str, typer.Option("--backend", help="mujoco (physics) or kinematic (fast, no physics).")
+    ] = "mujoco",
+    speed: Annotated[
+        str, typer.Option("--headless-speed", help="Simulated seconds a second, or max.")
+    ] = "max",
+    view: Annotated[bool, typer.Option("--view", help="Show it live in Rerun, too.")] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Logs, data, recording; else runs/MISSION-TIME."),
+    ] = None,
+    timeout_s: Annotated[
+        float, typer.Option("--timeout-s", min=1.0, help="Longest time for the plan, by the wall.")
+    ] = 600.0,
+) -> None:
+    """Run a whole mission here: router, simulation, planner, workers and recorder, each a process.
+
+    Exit code 0 only if the planner says that every goal is reached and the physics agrees.
+    """
+    import msgspec
+
+    from cli.commands.processes import parse_speed
+    from cli.demo.mission_run import DemoOptions
+    from cli.errors import check_known
+    from cli.show.live import Ticker
+    from sim.world_file import load_mission
+
+    check_known("backend", backend, BACKENDS, "")
+    parse_speed(speed)
+    name = load_mission(mission).mission
+    options = DemoOptions(
+        mission=mission,
+        out=out or _new_folder(name),
+        backend=backend,
+        speed=speed,
+        view=view,
+        timeout_s=timeout_s,
+    )
+    summary = await _run(options, Ticker(call.json), call)
+
+    def draw() -> RenderableType:
+        from cli.show.summary_page import summary_page
+
+        return summary_page(summary)
+
+    (options.out / "summary.json").write_bytes(
+        msgspec.json.format(msgspec.json.encode(summary), indent=2)
+    )
+    call.show(summary, draw)
+    if not summary.ok:
+        raise typer.Exit(1)
+
+
+async def _run(options: DemoOptions, ticker: Ticker, call: Call) -> Summary:
+    """Bring everything up, carry the mission out, take everything down, however it ends."""
+    import asyncio
+    import signal
+
+    from cli.demo.mission_run import running
+
+    # SIGTERM ends the demo as Ctrl-C does: by cancellation, so that no process stays behind.
+    me = asyncio.current_task()
+    if me is not None:
+        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, me.cancel)
+    call.warn(f"starting {options.mission}; logs go to {options.out}")
+    async with running(options, ticker.hear) as demo:
+        return await demo.fleet.guard(_play(demo, ticker))
+
+
+async def _play(demo: Demo, ticker: Ticker) -> Summary:
+    from cli.show.live import showing
+
+    async with showing(demo.board, ticker):
+        await demo.give()
+        await demo.ended()
+    return await demo.judged()
+
+
+def _new_folder(mission: str) -> Path:
+    from datetime import datetime
+
+    return Path("runs") / f"{mission}-{datetime.now():%Y%m%d-%H%M%S}"

@@ -1,0 +1,200 @@
+"""One mission, from the first process to the verdict."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cli.asking import ask_planner
+from cli.board import FLEET, SIMULATION, Board, following
+from cli.demo.bring_up import RECORDING, bring_up, declare_processes, router_up
+from cli.demo.fleet import Fleet, free_endpoint
+from cli.demo.summary import Summary, task_lines, times
+from cli.errors import Refused, TooLate
+from cli.judge import all_agreed, judge
+from cli.naming import request_name
+from cli.telling import add_statement, put_goal
+from keyexpr_schema.goals import GoalState, GoalStatus
+from keyexpr_schema.requests import PlanRequest
+from keyexpr_schema.session import Session, SessionConfig, open_session
+from sim.world_file import Mission, load_mission
+
+if TYPE_CHECKING:
+    from keyexpr_schema.session import Change
+
+SETTLE_S = 20.0
+"""How long objects may take to come to rest after the last goal has ended [s, wall]."""
+UNDERSTAND_S = 30.0
+PLAN_S = 120.0
+REALM = "demo"
+
+
+@dataclass(frozen=True)
+class DemoOptions:
+    """`speed` is simulated seconds a second, or `max`; `timeout_s` bounds the plan's execution."""
+
+    mission: str
+    out: Path
+    backend: str = "mujoco"
+    speed: str = "max"
+    view: bool = False
+    timeout_s: float = 600.0
+
+
+@dataclass
+class Demo:
+    """A running demo; made by `running`. `fleet` holds its processes, `board` what they say."""
+
+    options: DemoOptions
+    mission: Mission
+    fleet: Fleet
+    session: Session
+    board: Board
+    started_at_s: float
+    """Seconds of `time.monotonic` when the first process was started."""
+    goals: tuple[str, ...] = ()
+    _clock_from: tuple[float, float] | None = field(default=None)
+    _clock_to: tuple[float, float] | None = field(default=None)
+
+    async def give(self) -> None:
+        """Say the mission's statements and goals, and ask for one plan for all of them.
+
+        Raises:
+            Refused: the planner does not understand a goal, or cannot plan; the message says why.
+        """
+        for text in self.mission.statements:
+            await add_statement(self.session, text)
+        given = [await put_goal(self.session, text, None) for text in self.mission.goals]
+        self.goals = tuple(goal.goal for goal in given)
+        await self.board.until(
+            lambda: all(goal in self.board.goal_status for goal in self.goals),
+            UNDERSTAND_S,
+            "the planner to read the goals",
+        )
+        for status in self._statuses().values():
+            if status.state is GoalState.REJECTED:
+                raise Refused(f"goal {status.goal} is rejected: {status.reason}")
+        asked = self.mission.plan
+        default = PlanRequest(request=request_name())
+        self._clock_from = self._clock()
+        await ask_planner(
+            self.session,
+            PlanRequest(
+                request=default.request,
+                goals=self.goals,
+                strategy=asked.strategy or default.strategy,
+                planner=asked.planner or default.planner,
+                allocator=asked.allocator or default.allocator,
+            ),
+            PLAN_S,
+        )
+
+    async def ended(self) -> None:
+        """Wait until the planner has given its last word on every goal.
+
+        Raises:
+            TooLate: it had not after `options.timeout_s`; the message names the goals.
+        """
+        try:
+            await self.board.until(
+                lambda: self.board.ended(self.goals), self.options.timeout_s, "the goals to end"
+            )
+        except TooLate:
+            status = self._statuses()
+            still = [
+                f"{goal} ({status[goal].state.value})" if goal in status else goal
+                for goal in self.goals
+                if not self.board.ended((goal,))
+            ]
+            raise TooLate(
+                f"after {self.options.timeout_s:g} s these goals have not ended: "
+                f"{', '.join(still)}; the logs are in {self.options.out}"
+            ) from None
+        finally:
+            self._clock_to = self._clock()
+
+    async def judged(self) -> Summary:
+        """Wait until what is true has settled, and hold the goals against it."""
+        board = self.board
+        ended_s = max((s.time_s for s in self._statuses().values()), default=0.0)
+
+        def settled() -> bool:
+            return bool(board.truths) and all(
+                truth.time_s >= ended_s and (truth.settled or truth.held_by is not None)
+                for truth in board.truths.values()
+            )
+
+        # Where one does not settle, the judge says which, and fails its goal.
+        with suppress(TooLate):
+            await board.until(settled, SETTLE_S, "the objects to come to rest")
+        robots = [robot.spec.robot for robot in self.mission.robots]
+        places = {robot: senses.place for robot, senses in board.senses.items()}
+        verdicts = judge(self._statuses(), board.truths, places)
+        records = list(board.tasks.values())
+        makespan_s, busy_s, idle_s = times(records, robots)
+        recording = self.options.out / RECORDING
+        return Summary(
+            mission=self.mission.mission,
+            backend=self.options.backend,
+            ok=len(verdicts) == len(self.goals) and all_agreed(verdicts),
+            goals=verdicts,
+            tasks=task_lines(records),
+            revisions={plan: status.revision for plan, status in board.plan_status.items()},
+            makespan_s=makespan_s,
+            busy_s=busy_s,
+            idle_s=idle_s,
+            contacts=board.contacts,
+            wall_s=time.monotonic() - self.started_at_s,
+            real_time_factor=self._real_time_factor(),
+            out=str(self.options.out),
+            recording=str(recording) if recording.is_file() else None,
+        )
+
+    def _statuses(self) -> dict[str, GoalStatus]:
+        status = self.board.goal_status
+        return {goal: status[goal] for goal in self.goals if goal in status}
+
+    def _clock(self) -> tuple[float, float] | None:
+        clock = self.board.clock
+        return None if clock is None else (clock.time_s, clock.wall_time_s)
+
+    def _real_time_factor(self) -> float | None:
+        if self._clock_from is None or self._clock_to is None:
+            return None
+        wall_s = self._clock_to[1] - self._clock_from[1]
+        return (self._clock_to[0] - self._clock_from[0]) / wall_s if wall_s > 0.0 else None
+
+
+@asynccontextmanager
+async def running(
+    options: DemoOptions, on_change: Callable[[Change[Any, Any]], None] | None = None
+) -> AsyncIterator[Demo]:
+    """Start every process of a mission and wait until each shows by its keys that it is ready.
+
+    At the end of the block every process is ended. Work in the block should go through
+    `demo.fleet.guard`, so that a death is noticed.
+
+    Raises:
+        ProcessDied: a process ended before it was ready.
+        TooLate: a process was not ready after `READY_S`.
+    """
+    mission = load_mission(options.mission)
+    options.out.mkdir(parents=True, exist_ok=True)
+    started_at_s = time.monotonic()
+    fleet = Fleet(free_endpoint(), REALM, options.out)
+    declare_processes(fleet, mission, options)
+    async with fleet:
+        await fleet.start("router")
+        await fleet.guard(router_up(fleet))
+        config = SessionConfig(endpoints=(fleet.endpoint,), realm=REALM, component="robotctl")
+        async with (
+            open_session(config) as session,
+            following(session, *FLEET, *SIMULATION, on_change=on_change) as board,
+        ):
+            demo = Demo(options, mission, fleet, session, board, started_at_s)
+            await fleet.guard(bring_up(fleet, session, board, mission))
+            yield demo

@@ -1,0 +1,110 @@
+"""What robotctl tells the fleet: goals, statements, facts, places, objects; each confirmed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from cli.errors import BadArgument, check_known
+from cli.naming import free_name
+from keyexpr_schema.goals import Goal, GoalAddress
+from keyexpr_schema.keyspace import (
+    FACT,
+    GOAL_SPEC,
+    GOAL_STATUS,
+    OBJECT,
+    PLACE,
+    ROBOT_SPEC,
+    STATEMENT,
+)
+from keyexpr_schema.world import (
+    Fact,
+    FactAddress,
+    Object,
+    ObjectAddress,
+    Place,
+    PlaceAddress,
+    Statement,
+    StatementAddress,
+    Value,
+)
+
+if TYPE_CHECKING:
+    from keyexpr_schema.session import Session
+
+
+async def put_world(session: Session, places: Iterable[Place], objects: Iterable[Object]) -> None:
+    """Store places and objects, confirmed."""
+    for place in places:
+        await session.confirm(PLACE, PlaceAddress(place.place), place)
+    for thing in objects:
+        await session.confirm(OBJECT, ObjectAddress(thing.object), thing)
+
+
+async def add_statement(session: Session, text: str, name: str | None = None) -> Statement:
+    """Store a sentence, confirmed, under `name` or one made from its words."""
+    if name is None:
+        stored = await session.list(STATEMENT)
+        same = [a.statement for a, said in stored.items() if said.text == text]
+        name = same[0] if same else free_name(text, (a.statement for a in stored))
+    said = Statement(statement=name, text=text)
+    await session.confirm(STATEMENT, StatementAddress(name), said)
+    return said
+
+
+async def add_fact(session: Session, relation: str, subject: str, written: str) -> Fact:
+    """Store a fact, confirmed.
+
+    Raises:
+        Unknown: `at` of something that is no object or robot, or of a place that is none.
+    """
+    address = FactAddress(subject, relation)
+    value = parse_value(written)
+    if relation == "at":
+        how = "load a world with `robotctl world load FILE`"
+        robots = [a.robot for a in await session.list(ROBOT_SPEC)]
+        objects = [a.object for a in await session.list(OBJECT)]
+        check_known("object or robot", subject, [*objects, *robots], how)
+        if value is not None:
+            places = [a.place for a in await session.list(PLACE)]
+            check_known("place or robot", written, [*places, *robots], how)
+    fact = Fact(subject=subject, relation=relation, value=value, source="person")
+    await session.confirm(FACT, address, fact)
+    return fact
+
+
+def parse_value(written: str) -> Value:
+    """`unknown`, `true`, `false`, a number, or the word itself."""
+    words: dict[str, Value] = {"unknown": None, "true": True, "false": False}
+    if written in words:
+        return words[written]
+    try:
+        number = float(written)
+    except ValueError:
+        return written
+    if not math.isfinite(number):  # JSON has no such number
+        return written
+    return int(number) if number.is_integer() and "." not in written else number
+
+
+async def put_goal(session: Session, text: str, name: str | None, priority: int = 0) -> Goal:
+    """Store a goal, confirmed, after all that were given before it.
+
+    Raises:
+        BadArgument: a goal of that name exists and says something else.
+    """
+    stored = {address.goal: spec for address, spec in (await session.list(GOAL_SPEC)).items()}
+    ended = [address.goal for address in await session.list(GOAL_STATUS)]
+    if name in stored:
+        raise BadArgument(
+            f"there is a goal {name!r} already: “{stored[name].text}”; use another --id"
+        )
+    spec = Goal(
+        goal=name or free_name(text, [*stored, *ended]),
+        text=text,
+        priority=priority,
+        ordinal=1 + max((each.ordinal for each in stored.values()), default=0),
+    )
+    await session.confirm(GOAL_SPEC, GoalAddress(spec.goal), spec)
+    return spec

@@ -1,0 +1,176 @@
+"""What robotctl draws."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import RenderableType
+
+from cli.commands.processes import parse_speed
+from cli.commands.tasks import parse_args
+from cli.errors import BadArgument
+from cli.show.live import tell
+from cli.show.page import page, table
+from cli.show.plan_tree import in_order, plan_tree
+from cli.telling import parse_value
+from keyexpr_schema.goals import Condition, Goal, GoalState, GoalStatus
+from keyexpr_schema.plans import Plan, PlanState, PlanStatus, Task, Violation
+from keyexpr_schema.tasks import TaskRecord, TaskState
+
+GOAL = "bring"
+TASKS = (
+    Task(
+        task="t2",
+        skill="pick",
+        args={"robot": "?a1", "object": "cup_1"},
+        actor="a1",
+        after=("t1",),
+        goal=GOAL,
+        duration_s=8.0,
+    ),
+    Task(
+        task="t1",
+        skill="navigate",
+        args={"robot": "?a1", "place": "kitchen"},
+        actor="a1",
+        goal=GOAL,
+    ),
+)
+PLAN = Plan(
+    plan="p1",
+    goals=(GOAL,),
+    conditions=(Condition(relation="at", subject="cup_1", value="hallway"),),
+    tasks=TASKS,
+)
+
+
+def drawn(what: RenderableType) -> str:
+    file = io.StringIO()
+    page(file).print(what)
+    return file.getvalue()
+
+
+def test_the_tree_shows_goals_tasks_dependencies_actors_states_and_times() -> None:
+    status = PlanStatus(
+        plan="p1", revision=1, state=PlanState.RUNNING, allocation={"a1": "hsr"}, made_by="symbolic"
+    )
+    running = TaskRecord(
+        plan="p1",
+        revision=1,
+        task="t2",
+        skill="pick",
+        args={"robot": "hsr", "object": "cup_1"},
+        actor="a1",
+        robot="hsr",
+        state=TaskState.RUNNING,
+        attempt=2,
+        started_s=10.0,
+    )
+    text = drawn(
+        plan_tree(
+            PLAN,
+            status,
+            {"t2": running},
+            {GOAL: Goal(goal=GOAL, text="Bring [the] cup.")},
+            {GOAL: GoalStatus(goal=GOAL, state=GoalState.RUNNING)},
+            now_s=13.5,
+        )
+    )
+    lines = [line.strip() for line in text.splitlines()]
+    assert lines[0].startswith("p1 revision 1  running")
+    assert "“Bring [the] cup.”" in lines[1]
+    assert "t1 navigate(place=kitchen)  a1→hsr  waiting" in lines[2]
+    assert "t2 pick(object=cup_1)  a1→hsr  running 3.5 s of about 8.0 s" in lines[3]
+    assert "attempt 2" in lines[3]
+    assert "after t1" in lines[3]
+
+
+def test_a_rejected_plan_shows_why() -> None:
+    status = PlanStatus(
+        plan="p1",
+        revision=1,
+        state=PlanState.REJECTED,
+        violations=(Violation(code="cycle", sentence="t1 waits for itself."),),
+    )
+    assert "t1 waits for itself." in drawn(plan_tree(PLAN, status, {}, {}, {}))
+
+
+@given(st.data())
+def test_tasks_come_after_what_they_wait_for_and_none_is_lost(data: st.DataObject) -> None:
+    number = data.draw(st.integers(1, 8))
+    after = [
+        tuple(f"t{j}" for j in data.draw(st.sets(st.integers(0, i - 1))) if i) if i else ()
+        for i in range(number)
+    ]
+    tasks = [
+        Task(task=f"t{i}", skill="wait", args={}, actor="a", after=after[i]) for i in range(number)
+    ]
+    shuffled = data.draw(st.permutations(tasks))
+    places = {task.task: place for place, task in enumerate(in_order(shuffled))}
+    assert len(places) == number
+    assert all(places[a] < places[task.task] for task in tasks for a in task.after)
+
+
+def test_a_cycle_is_drawn_not_followed() -> None:
+    loop = [
+        Task(task="t1", skill="wait", args={}, actor="a", after=("t2",)),
+        Task(task="t2", skill="wait", args={}, actor="a", after=("t1", "gone")),
+    ]
+    assert {task.task for task in in_order(loop)} == {"t1", "t2"}
+
+
+def test_text_is_never_markup() -> None:
+    assert "[bold]x[/bold] :smile:" in drawn(table(["a"], [("[bold]x[/bold] :smile:",)]))
+
+
+def test_a_change_in_a_line() -> None:
+    record = TaskRecord(
+        plan="p1",
+        revision=1,
+        task="t1",
+        skill="pick",
+        args={"object": "cup_1"},
+        actor="a1",
+        robot="hsr",
+        state=TaskState.FAILED,
+        attempt=3,
+        ended_s=12.0,
+        reason="it slipped",
+    )
+    assert tell(record) == (
+        "    12.0 s  p1/t1 pick(object=cup_1) hsr: failed (attempt 3): it slipped"
+    )
+
+
+@pytest.mark.parametrize(
+    ("written", "value"),
+    [
+        ("kitchen", "kitchen"),
+        ("unknown", None),
+        ("true", True),
+        ("3", 3),
+        ("2.5", 2.5),
+        ("nan", "nan"),
+    ],
+)
+def test_values_of_facts(written: str, value: object) -> None:
+    assert parse_value(written) == value
+    assert type(parse_value(written)) is type(value)
+
+
+def test_arguments_of_tasks() -> None:
+    assert parse_args(["place=kitchen", "object=cup_1"]) == {"place": "kitchen", "object": "cup_1"}
+    for bad in (["place"], ["=x"], ["place="], ["a=1", "a=2"]):
+        with pytest.raises(BadArgument):
+            parse_args(bad)
+
+
+def test_speeds() -> None:
+    assert parse_speed("max") is None
+    assert parse_speed("2.5") == 2.5
+    for bad in ("fast", "0", "-1", "nan", "inf"):
+        with pytest.raises(BadArgument, match=bad):
+            parse_speed(bad)

@@ -1,0 +1,69 @@
+# Two commands do everything on a machine with Python 3.11+ and make: `make demo` and `make test`.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+MISSION ?= two-cups
+
+.DEFAULT_GOAL := help
+
+help: ## this list
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-14s %s\n", $$1, $$2}'
+
+demo: $(VENV)/runtime ## two robots bring two cups, in physics, from a fresh machine
+	$(BIN)/robotctl demo $(MISSION)
+
+test: $(VENV)/development ## every test
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/development ## style
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(VENV)/development ## types
+	$(BIN)/mypy
+
+imports: $(VENV)/development ## which package may import which
+	$(BIN)/lint-imports
+
+check: lint types imports test ## everything that CI runs
+
+bench: $(VENV)/development ## measure the key-space and the planner; prints tables
+	for file in benchmarks/bench_*.py; do $(BIN)/python $$file || exit 1; done
+
+docs: $(VENV)/development ## write the generated pages under docs/
+	$(BIN)/python -m keyexpr_schema.document
+
+screenshots: $(VENV)/runtime ## run the demo and make the pictures of the README from its recording
+	rm -rf runs/screenshots
+	$(BIN)/robotctl demo two-cups --out runs/screenshots
+	$(BIN)/python -m fleet.timeline.screenshot runs/screenshots/two-cups.rrd docs/screenshots/two-cups.png
+
+lock: $(VENV)/development ## renew the pinned versions of everything
+	$(BIN)/python -m pip install --quiet uv
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+		--no-emit-index-url --no-header pyproject.toml build-requirements.in -o requirements.lock
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+		--no-emit-index-url --no-header pyproject.toml build-requirements.in --group dev \
+		-o requirements-dev.lock
+
+clean: ## remove everything that is made
+	rm -rf $(VENV) runs .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
+
+# --- installation --------------------------------------------------------------------------------
+$(VENV)/created:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "$(PYTHON) is older than 3.11: name a newer one, as in make PYTHON=python3.12"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	touch $@
+
+$(VENV)/runtime: requirements.lock pyproject.toml | $(VENV)/created
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	touch $@
+
+$(VENV)/development: requirements-dev.lock pyproject.toml | $(VENV)/created
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	touch $@ $(VENV)/runtime
+
+.PHONY: help demo test lint types imports check bench docs screenshots lock clean

@@ -16,7 +16,8 @@ from sim.mujoco_world.description import load_description
 from sim.mujoco_world.drawing import draw_frame, draw_scene
 from sim.mujoco_world.drives import PERIOD_S
 from sim.mujoco_world.driving import approach, fold, go_to, look
-from sim.mujoco_world.handling import grasp, release, release_in_basket
+from sim.mujoco_world.handling import grasp, release
+from sim.mujoco_world.handover import release_in_basket
 from sim.mujoco_world.observer import Observer
 from sim.mujoco_world.robot_body import RobotBody
 from sim.mujoco_world.stage import Act, CannotDo, Ending, Stage, Steps

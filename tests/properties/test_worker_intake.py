@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+from msgspec.structs import replace
 
 from keyexpr_schema.tasks import Order, ReportState
 from workers.intake import (
@@ -44,40 +45,43 @@ orders = st.builds(
 )
 
 
-class Intake(RuleBasedStateMachine):
+class Intake:
     """The shell's use of `decide`, with everything on disk that the journal would have there."""
 
     def __init__(self) -> None:
-        super().__init__()
         self.ledger = Ledger()
         self.queue: list[AttemptName] = []
         self.running: AttemptName | None = None
         self.started: list[AttemptName] = []
-        self.fences: list[tuple[int, dict[str, int]]] = []
+        self.fences: tuple[int, dict[str, int]] = (0, {})
 
     def end(self, name: AttemptName, state: ReportState) -> None:
         order = self.ledger.entries[name].order
         report = report_on(order, "r1", state)
         self.ledger.put(Entry(order, Phase.ENDED, report))
 
-    @rule(order=orders)
     def deliver(self, order: Order) -> None:
         name = attempt_name(order)
         before = self.ledger.entries.get(name)
-        older_epoch = order.epoch < self.ledger.epoch
+        older = order.epoch < self.ledger.epoch or order.revision < self.ledger.revisions.get(
+            order.plan, 0
+        )
         decision = decide(self.ledger, order)
         assert self.ledger.entries.get(name) is before, "deciding changes nothing"
         if before is not None and before.phase is Phase.ENDED:
             assert decision == Repeat(before.report)
-        if older_epoch:
+        if older:
             assert isinstance(decision, (Refuse, Ignore, Repeat))
         match decision:
             case Accept():
                 assert not order.cancelled
-                for older in superseded(self.ledger, order):
-                    if older in self.queue:
-                        self.queue.remove(older)
-                        self.end(older, ReportState.CANCELLED)
+                assert order.attempt > max(
+                    (a for *t, a in self.started if t == [*name[:2]]), default=0
+                )
+                for past in superseded(self.ledger, order):
+                    if past in self.queue:
+                        self.queue.remove(past)
+                        self.end(past, ReportState.CANCELLED)
                 self.ledger.put(Entry(order, Phase.QUEUED))
                 self.queue.append(name)
             case Renew():
@@ -99,26 +103,29 @@ class Intake(RuleBasedStateMachine):
             case Repeat() | Ignore():
                 pass
 
-    @precondition(lambda self: self.queue and self.running is None)
-    @rule()
-    def start(self) -> None:
-        self.running = self.queue.pop(0)
-        self.ledger.put(Entry(self.ledger.entries[self.running].order, Phase.STARTED))
-        self.started.append(self.running)
+    def deliver_again(self, number: int, cancelled: bool, newer: int) -> None:
+        names = list(self.ledger.entries)
+        if not names:
+            return
+        order = self.ledger.entries[names[-1 - number % len(names)]].order
+        epoch = self.ledger.epoch + newer
+        revision = self.ledger.revisions[order.plan] + newer
+        self.deliver(replace(order, epoch=epoch, revision=revision, cancelled=cancelled))
 
-    @precondition(lambda self: self.running is not None)
-    @rule(state=st.sampled_from([ReportState.SUCCEEDED, ReportState.FAILED]))
-    def finish(self, state: ReportState) -> None:
-        assert self.running is not None
-        self.end(self.running, state)
-        self.running = None
+    def go_on(self, state: ReportState = ReportState.FAILED) -> None:
+        """End what runs, or else start what is first in the queue."""
+        if self.running is not None:
+            self.end(self.running, state)
+            self.running = None
+        elif self.queue:
+            self.running = self.queue.pop(0)
+            self.ledger.put(Entry(self.ledger.entries[self.running].order, Phase.STARTED))
+            self.started.append(self.running)
 
-    @precondition(lambda self: self.queue)
-    @rule()
     def withdraw(self) -> None:
-        self.ledger.drop(self.queue.pop())
+        if self.queue:
+            self.ledger.drop(self.queue.pop())
 
-    @rule()
     def crash_and_restart(self) -> None:
         kept = Ledger(epoch=self.ledger.epoch, revisions=dict(self.ledger.revisions))
         for entry in self.ledger.entries.values():
@@ -128,26 +135,38 @@ class Intake(RuleBasedStateMachine):
         for entry in kept.phases(Phase.STARTED):
             self.end(attempt_name(entry.order), ReportState.INTERRUPTED)
 
-    @invariant()
-    def one_attempt_never_runs_twice(self) -> None:
+    def check(self) -> None:
+        """One attempt never runs twice; attempts of a task start in order; fences only rise."""
         assert len(self.started) == len(set(self.started))
-
-    @invariant()
-    def attempts_of_a_task_start_in_order(self) -> None:
         for plan, task in {name[:2] for name in self.started}:
             attempts = [a for p, t, a in self.started if (p, t) == (plan, task)]
             assert attempts == sorted(attempts)
-
-    @invariant()
-    def fences_only_rise(self) -> None:
-        self.fences.append((self.ledger.epoch, dict(self.ledger.revisions)))
-        (epoch, revisions), (epoch_now, revisions_now) = (self.fences[-2:] * 2)[:2]
-        assert epoch_now >= epoch
-        assert all(revisions_now.get(plan, 0) >= seen for plan, seen in revisions.items())
+        epoch, revisions = self.fences
+        assert self.ledger.epoch >= epoch
+        assert all(self.ledger.revisions[plan] >= seen for plan, seen in revisions.items())
+        self.fences = (self.ledger.epoch, dict(self.ledger.revisions))
 
 
-TestIntake = Intake.TestCase
-TestIntake.settings = settings(max_examples=150, stateful_step_count=40, deadline=None)
+Step = Callable[[Intake], None]
+steps: st.SearchStrategy[Step] = st.one_of(
+    st.builds(lambda o: lambda m: m.deliver(o), orders),
+    st.builds(
+        lambda n, c, up: lambda m: m.deliver_again(n, c, up),
+        st.integers(0, 9),
+        st.booleans(),
+        st.integers(0, 1),
+    ),
+    st.sampled_from([Intake.go_on, Intake.go_on, Intake.withdraw, Intake.crash_and_restart]),
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(steps, min_size=15, max_size=50))
+def test_one_attempt_never_runs_twice_whatever_comes(taken: list[Step]) -> None:
+    intake = Intake()
+    for step in taken:
+        step(intake)
+        intake.check()
 
 
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -1,0 +1,93 @@
+"""Routes for one robot that has the floor to itself."""
+
+from __future__ import annotations
+
+import bisect
+import math
+from collections.abc import Sequence
+from itertools import accumulate, pairwise
+
+import numpy as np
+
+from keyexpr_schema.robots import PoseMRad
+from sim.navigation.clearance import Clearance
+from sim.navigation.lattice import Lattice
+from sim.navigation.spots import Spots
+from sim.world_model import WorldFile
+
+XY = tuple[float, float]
+
+
+class Route:
+    """A way along straight pieces. `points_m` are its corners; it ends facing `yaw_rad`."""
+
+    def __init__(self, points_m: Sequence[XY], yaw_rad: float) -> None:
+        self._points, self._yaw = list(points_m), yaw_rad
+        steps = (math.dist(a, b) for a, b in pairwise(points_m))
+        self._ends = list(accumulate(steps, initial=0.0))
+
+    @property
+    def length_m(self) -> float:
+        """From start to end."""
+        return self._ends[-1]
+
+    def at(self, share: float) -> PoseMRad:
+        """Where one is after `share` (0 to 1) of the way."""
+        done = share * self.length_m
+        k = min(bisect.bisect_right(self._ends, done), len(self._ends) - 1)
+        if share >= 1.0 or k == 0:
+            return (*self._points[-1], self._yaw)
+        (ax, ay), (bx, by) = self._points[k - 1], self._points[k]
+        part = (done - self._ends[k - 1]) / max(self._ends[k] - self._ends[k - 1], 1e-9)
+        yaw = math.atan2(by - ay, bx - ax)
+        return (ax + part * (bx - ax), ay + part * (by - ay), yaw)
+
+
+class Routes:
+    """Routes over the lattice of one world, for robots that do not mind each other."""
+
+    def __init__(self, world: WorldFile) -> None:
+        clearance = Clearance(world)
+        self._lattice = Lattice(world, clearance)
+        self._spots = Spots(world, self._lattice, clearance)
+
+    def to_place(self, start: PoseMRad, place: str, taken_m: Sequence[XY]) -> Route | None:
+        """To a waiting spot in `place`, rather one that is not among `taken_m`; `None`: no way."""
+        first = self._nearest(start[:2])
+        field = self._lattice.field(frozenset({first}))
+        full = {self._nearest(point) for point in taken_m}
+        spots = [n for n in self._spots.waiting[place] if math.isfinite(field[n])]
+        if not spots:
+            return None
+        best = min(spots, key=lambda n: (n in full, field[n], n))
+        return self._route(start, best, start[2])
+
+    def to_point(self, start: PoseMRad, point_m: Sequence[float], reach_m: float) -> Route | None:
+        """To the node nearest to `point_m`, facing it; `None`: there is none within reach."""
+        target = (point_m[0], point_m[1])
+        gaps = np.linalg.norm(self._lattice.points_m - target, axis=1)
+        field = self._lattice.field(frozenset({self._nearest(start[:2])}))
+        for node in np.argsort(gaps, kind="stable").tolist():
+            if gaps[node] > reach_m:
+                return None
+            if math.isfinite(field[node]):
+                x, y = self._lattice.points_m[node]
+                return self._route(start, node, math.atan2(target[1] - y, target[0] - x))
+        return None
+
+    def _nearest(self, point_m: Sequence[float]) -> int:
+        gaps = self._lattice.points_m - (point_m[0], point_m[1])
+        return int(np.argmin((gaps**2).sum(axis=1)))
+
+    def _route(self, start: PoseMRad, goal: int, yaw_rad: float) -> Route:
+        field = self._lattice.field(frozenset({goal}))
+        node = self._nearest(start[:2])
+        corners = [(start[0], start[1])]
+        while True:
+            x, y = (float(v) for v in self._lattice.points_m[node])
+            corners.append((x, y))
+            if node == goal:
+                break
+            around = [*self._lattice.neighbours[node], *self._lattice.diagonals[node]]
+            node = min(around, key=lambda v: (field[v], v))
+        return Route(corners, yaw_rad)

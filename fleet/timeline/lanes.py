@@ -23,7 +23,6 @@ class Bar:
     colour: Rgba
     start_s: float
     end_s: float | None = None
-    hidden: bool = False
 
 
 @dataclass
@@ -32,15 +31,14 @@ class Lane:
 
     path: str
     bars: dict[str, Bar] = field(default_factory=dict)
+    dirty: bool = False
 
     def at(self, time_s: float) -> Bar | None:
         """The bar that covers `time_s`, the one that began last if there are several."""
         covering = [
             bar
             for bar in self.bars.values()
-            if not bar.hidden
-            and bar.start_s <= time_s
-            and (bar.end_s is None or time_s < bar.end_s)
+            if bar.start_s <= time_s and (bar.end_s is None or time_s < bar.end_s)
         ]
         return max(covering, key=lambda bar: bar.start_s, default=None)
 
@@ -49,7 +47,6 @@ class Lane:
         spans = sorted(
             (max(start_s, bar.start_s), min(end_s, end_s if bar.end_s is None else bar.end_s))
             for bar in self.bars.values()
-            if not bar.hidden
         )
         total, reach = 0.0, start_s
         for low, high in spans:
@@ -103,16 +100,27 @@ class Lanes:
         label, colour = _label(record), self._colour(record)
         if bar is None:
             bar = lane.bars[key] = Bar(key, label, colour, record.started_s)
-            self._configure(lane)
+            lane.dirty = True
             self._transition(lane, bar.start_s)
-            self.first_s = min(self.first_s or bar.start_s, bar.start_s)
+            first_s = bar.start_s if self.first_s is None else self.first_s
+            self.first_s = min(first_s, bar.start_s)
         elif (bar.label, bar.colour) != (label, colour):
             bar.label, bar.colour = label, colour
-            self._configure(lane)
+            lane.dirty = True
         if bar.end_s != end_s:
             bar.end_s = end_s
             if end_s is not None:
                 self._transition(lane, end_s)
+
+    def flush(self) -> None:
+        """Log the labels and colours of bars that are new or ended otherwise than well.
+
+        They are one list a lane and go out whole, so not at every change.
+        """
+        for lane in self.lanes.values():
+            if lane.dirty:
+                lane.dirty = False
+                self._configure(lane)
 
     def drop(self, plan: str, task: str, now_s: float) -> None:
         """The planner deleted its books on a task: what still ran there ended."""

@@ -17,10 +17,13 @@ from fleet.timeline.sink import free_port, open_stream
 from keyexpr_schema.session import Change, SessionConfig, Watch, open_session
 
 FLUSH_S = 1.0
-"""How much wall time of rows a SIGKILL may cost."""
+"""How much wall time of events a SIGKILL may cost."""
+
+POSES_S = 5.0
+"""How much wall time of poses it may cost; larger pieces make a smaller file."""
 
 LIVE_FLUSH_S = 0.25
-"""The same with a viewer looking on."""
+"""Both with a viewer looking on."""
 
 
 BACKLOG_S = 2.0
@@ -84,7 +87,7 @@ async def record(
             try:
                 async with session.watch(*RECORDED) as watch:
                     tell(f"recording to {out}")
-                    await _follow(watch, recorder, stop, LIVE_FLUSH_S if shown else FLUSH_S)
+                    await _follow(watch, recorder, stop, view)
             finally:
                 recorder.close()
     finally:
@@ -94,7 +97,7 @@ async def record(
             loop.remove_signal_handler(number)
 
 
-async def _follow(watch: Watch, recorder: Recorder, stop: asyncio.Event, flush_s: float) -> None:
+async def _follow(watch: Watch, recorder: Recorder, stop: asyncio.Event, live: bool) -> None:
     """Hand changes to the recorder until `stop`; what was stored first, in the order of writing."""
     loop = asyncio.get_running_loop()
     backlog: list[Change[Any, Any]] | None = []
@@ -102,7 +105,8 @@ async def _follow(watch: Watch, recorder: Recorder, stop: asyncio.Event, flush_s
     synced = asyncio.ensure_future(watch.synced())
     stopped = asyncio.ensure_future(stop.wait())
     following = asyncio.ensure_future(_next(watch))
-    flush_at = loop.time() + flush_s
+    flush_s, poses_s = (LIVE_FLUSH_S, LIVE_FLUSH_S) if live else (FLUSH_S, POSES_S)
+    flush_at, poses_at = loop.time() + flush_s, loop.time() + poses_s
     try:
         while not stopped.done():
             await asyncio.wait(
@@ -123,7 +127,9 @@ async def _follow(watch: Watch, recorder: Recorder, stop: asyncio.Event, flush_s
                 recorder.record_all(backlog)
                 backlog = None
             if now >= flush_at:
-                recorder.flush()
+                recorder.flush(whole=now >= poses_at)
+                if now >= poses_at:
+                    poses_at = loop.time() + poses_s
                 flush_at = loop.time() + flush_s
     finally:
         if backlog:

@@ -62,6 +62,9 @@ RECORDED: tuple[Key[Any, Any], ...] = (
 )
 """The keys the recorder listens to."""
 
+POSES = 64
+"""So many poses of one body are worth a piece of the file of their own."""
+
 _TELL: dict[str, tuple[str, Callable[[Any, Any], Iterator[sentences.Line]]]] = {
     GOAL_SPEC.name: ("goals", sentences.goal),
     GOAL_STATUS.name: ("goals", sentences.goal_status),
@@ -163,10 +166,14 @@ class Recorder:
             self._tell(key, value, before, at_s, wall_s)
         self._graphs.draw(max(at_s, self._clock.now_s))
 
-    def flush(self) -> None:
-        """Hand everything that waits to the file."""
+    def flush(self, whole: bool = True) -> None:
+        """Hand what waits to the file; all of it, or poses only where there are many by now.
+
+        Few poses in a piece cost more room than the poses themselves.
+        """
         self._draw()
-        self._world.flush()
+        self._lanes.flush()
+        self._world.flush(1 if whole else POSES)
         self._frame_view(final=False)
         self._sink.stream.flush(timeout_sec=10.0)
 
@@ -174,6 +181,7 @@ class Recorder:
         """Write what is left and close the file; nothing may be recorded afterwards."""
         self._utilisation.advance(self._clock.now_s, final=True)
         self._graphs.draw(self._clock.now_s, final=True)
+        self._lanes.flush()
         self._world.flush()
         self._frame_view(final=True)
         self._sink.stream.flush(timeout_sec=30.0)
@@ -237,15 +245,22 @@ class Recorder:
 
     def _tell(self, key: str, value: Any, before: Any, at_s: float, wall_s: float) -> None:
         if key == REPORT.name:
-            topic, lines = "reports", sentences.report(value, before, self._call(value))
+            what = self._call(value)
+            for ended_s, line in sentences.tries(value, before, what):
+                self._log("reports", line, ended_s, None)
+            topic, lines = "reports", sentences.report(value, before, what)
         elif key in _TELL:
             topic, tell = _TELL[key]
             lines = tell(value, before)
         else:
             return
-        for level, sentence in lines:
-            line = rr.TextLog(sentence, level=level, color=_COLOURS[level])
-            self._sink.log(entity("fleet", "log", topic), line, at_s, wall_s)
+        for line in lines:
+            self._log(topic, line, at_s, wall_s)
+
+    def _log(self, topic: str, line: sentences.Line, at_s: float, wall_s: float | None) -> None:
+        level, sentence = line
+        text = rr.TextLog(sentence, level=level, color=_COLOURS[level])
+        self._sink.log(entity("fleet", "log", topic), text, at_s, wall_s)
 
     def _call(self, report: Report) -> str:
         """What a report is about, in the words of its order if that is known."""

@@ -19,7 +19,7 @@ DRIVER = "mesa-vulkan-drivers"
 """The Debian package with a Vulkan driver that needs no graphics card."""
 
 START_S = 40.0
-_NO_ADAPTER = "graphics adapter"
+_NO_DRIVER = ("adapter", "render context", "vulkan", "wgpu")
 
 
 def screenshot(
@@ -106,13 +106,13 @@ def _take(
 def _why(said: IO[bytes]) -> str:
     said.seek(0)
     text = said.read().decode(errors="replace")
-    if _NO_ADAPTER in text or "adapter" in text.lower():
+    if any(word in text.lower() for word in _NO_DRIVER):
         return (
             "Rerun's viewer finds no graphics driver: install one that draws in software "
             f"(on Debian and Ubuntu: apt-get install {DRIVER})"
         )
-    last = text.strip().splitlines()[-1:] or ["it said nothing"]
-    return f"Rerun's viewer ended at once: {last[0]}"
+    first = text.strip().splitlines()[:1] or ["it said nothing"]
+    return f"Rerun's viewer ended at once: {first[0]}"
 
 
 def main(arguments: list[str] | None = None) -> int:

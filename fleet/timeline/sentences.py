@@ -91,21 +91,26 @@ def order(now: Order, before: Order | None) -> Iterator[Line]:
         yield WARN, f"{now.robot} shall stop {now.task}"
 
 
-def report(now: Report, before: Report | None, what: str) -> Iterator[Line]:
-    """A robot spoke of an attempt at `what`: each failed try with its reason, then the outcome."""
+def tries(now: Report, before: Report | None, what: str) -> Iterator[tuple[float, Line]]:
+    """Each failed try of an attempt at `what` that is news: when it ended [s], and why."""
     known = len(before.tries) if before is not None else 0
     for one in now.tries[known:]:
         if one.reason is not None:
-            yield WARN, f"{now.robot}: {what}, try {one.number} failed: {one.reason}"
+            said = f"{now.robot}: {what}, try {one.number} failed: {one.reason}"
+            yield one.ended_s, (WARN, said)
+
+
+def report(now: Report, before: Report | None, what: str) -> Iterator[Line]:
+    """A robot said how an attempt at `what` stands."""
     if before is not None and before.state is now.state:
         return
     if now.state is ReportState.STARTED:
         yield INFO, f"{now.robot} started {what}"
         return
     good = now.state is ReportState.SUCCEEDED
-    tries = f" at try {len(now.tries)}" if good and len(now.tries) > 1 else ""
+    count = f" at try {len(now.tries)}" if good and len(now.tries) > 1 else ""
     why = "" if good else _why(now.reason or _last(now.tries))
-    yield INFO if good else ERROR, f"{now.robot}: {what} {now.state.value}{tries}{why}"
+    yield INFO if good else ERROR, f"{now.robot}: {what} {now.state.value}{count}{why}"
 
 
 def fact(now: Fact, before: Fact | None) -> Iterator[Line]:

@@ -56,6 +56,8 @@ class World:
         self._specs: dict[str, RobotSpec] = {}
         self._trails: dict[str, Trail] = {}
         self._labels: dict[str, tuple[str, float]] = {}
+        self._doing: dict[str, str | None] = {}
+        self._stand_ins: set[str] = set()
         self._frame_s: float | None = None
         self._scene: Scene | None = None
         self._heights: dict[str, float] = {}
@@ -86,8 +88,11 @@ class World:
                 if body.owner is not None:
                     self._roots.setdefault(body.owner, body.body)
             log_shapes(self._sink, path, body.shapes)
-        for robot in self._specs:
-            self.robot_label(robot, None, self._frame_s or 0.0, None)
+        for robot in sorted(self._stand_ins & self._roots.keys()):
+            self._stand_ins.discard(robot)
+            path = entity("world", "robots", robot)
+            self._sink.log(path, rr.Clear(recursive=True), self._sink.clock.now_s)
+        self._relabel()
 
     def place(self, place: Place) -> None:
         """Tint the floor of a place and write its name on it."""
@@ -130,7 +135,7 @@ class World:
         self._specs[spec.robot] = spec
         if spec.robot in self._trails:
             self._trails[spec.robot].become(self._palette.robot(spec.robot), ROBOT_TRAIL_M)
-        self.robot_label(spec.robot, None, self._frame_s or 0.0, None)
+        self._relabel()
 
     # --- where it is -------------------------------------------------------------------------
     def frame(self, frame: Frame, wall_s: float) -> None:
@@ -160,6 +165,8 @@ class World:
             there = frame.poses.get(root)
             if there is not None:
                 self._trail(owner).visit(self._sink, there[0], frame.time_s, wall_s)
+        if last is None:  # now it is known how high the robots are
+            self._relabel()
 
     def state(self, state: RobotState, sim_s: float, wall_s: float) -> None:
         """Show a robot that no scene describes where it says that it is."""
@@ -168,18 +175,17 @@ class World:
         x, y, yaw = state.pose_m_rad
         radius, height = _STAND_IN_M
         path = entity("world", "robots", state.robot)
-        if state.robot not in self._labels:
-            self._sink.fix(
-                f"{path}/body",
-                rr.Cylinders3D(
-                    lengths=[height],
-                    radii=[radius],
-                    centers=[(0, 0, height / 2)],
-                    colors=[self._palette.robot(state.robot)],
-                    fill_mode=rr.components.FillMode.Solid,
-                ),
+        if state.robot not in self._stand_ins:
+            self._stand_ins.add(state.robot)
+            body = rr.Cylinders3D(
+                lengths=[height],
+                radii=[radius],
+                centers=[(0, 0, height / 2)],
+                colors=[self._palette.robot(state.robot)],
+                fill_mode=rr.components.FillMode.Solid,
             )
-            self.robot_label(state.robot, None, sim_s, wall_s)
+            self._sink.log(f"{path}/body", body, sim_s, wall_s)
+            self.robot_label(state.robot, self._doing.get(state.robot), sim_s, wall_s)
         self._sink.log(
             path,
             rr.Transform3D(
@@ -216,10 +222,15 @@ class World:
             wall_s,
         )
 
-    def flush(self) -> None:
-        """Send what waits."""
+    def flush(self, at_least: int = 1) -> None:
+        """Send the poses that wait, of bodies with `at_least` so many."""
         for column in self._columns.values():
-            self._send(column)
+            if len(column.sim_s) >= at_least:
+                self._send(column)
+
+    def _relabel(self) -> None:
+        for robot in self._specs:
+            self.robot_label(robot, self._doing.get(robot), self._sink.clock.now_s, None)
 
     # --- inside --------------------------------------------------------------------------------
     def _send(self, column: _Column) -> None:

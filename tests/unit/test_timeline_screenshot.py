@@ -1,0 +1,62 @@
+"""A picture of a recording: with a graphics driver, without one, and of what is no recording."""
+
+from __future__ import annotations
+
+import struct
+import sys
+from pathlib import Path
+
+import pytest
+from timeline_mission import mission
+
+from fleet.timeline.recorder import Recorder
+from fleet.timeline.screenshot import DRIVER, main
+from fleet.timeline.sink import open_stream
+
+
+def driver_is_installed() -> bool:
+    folders = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
+    return any(any(folder.glob("*.json")) for folder in folders if folder.is_dir())
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("screenshot") / "mission.rrd"
+    recorder = Recorder(open_stream(path, "test"))
+    for change in mission(0.5):
+        recorder.record(change)
+    recorder.close()
+    return path
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    sys.platform != "linux" or not driver_is_installed(), reason=f"needs {DRIVER} or another driver"
+)
+def test_a_picture_has_the_size_asked_for_and_changes_with_time(recording, tmp_path):
+    early, late = tmp_path / "early.png", tmp_path / "late.png"
+    assert main([str(recording), str(early), "--at", "3", "--size", "800x450"]) == 0
+    assert main([str(recording), str(late), "--size", "800x450"]) == 0
+    for picture in (early, late):
+        data = picture.read_bytes()
+        assert data.startswith(b"\x89PNG")
+        assert struct.unpack(">II", data[16:24]) == (800, 450)
+    assert early.read_bytes() != late.read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    sys.platform != "linux", reason="hides the drivers as the Linux loader finds them"
+)
+def test_without_a_driver_it_names_the_package(recording, tmp_path, monkeypatch, capsys):
+    for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES"):
+        monkeypatch.setenv(name, "/nonexistent")
+    assert main([str(recording), str(tmp_path / "x.png")]) == 1
+    said = capsys.readouterr().err.strip()
+    assert DRIVER in said
+    assert len(said.splitlines()) == 1
+
+
+def test_what_is_no_recording_is_told_in_a_sentence(tmp_path, capsys):
+    assert main([str(tmp_path / "none.rrd"), str(tmp_path / "x.png")]) == 1
+    assert capsys.readouterr().err == f"there is no recording at {tmp_path / 'none.rrd'}\n"

@@ -65,8 +65,8 @@ class Arm:
         )
 
     def stowed(self) -> bool:
-        """Whether it is folded, or on its way there."""
-        return self.goal == list(self.entry.stow) and self.arrived()
+        """Whether it is told to be folded and nothing else any more."""
+        return self.goal == self.setpoint == list(self.entry.stow)
 
     def tick(self, ctrl: Any) -> None:
         """Write the commands for the next control period."""

@@ -142,7 +142,8 @@ class MujocoBackend(Backend):
 
     def _advance(self) -> None:
         stage = self._stage
-        pinned = set()
+        # A robot whose arm is out, stopped in mid-work perhaps, must not be moved.
+        pinned = {name for name, body in self._bodies.items() if body.arm_out()}
         for robot, run in self._runs.items():
             if run.ended is None:
                 if run.act.manual or run.act.handling:
@@ -197,7 +198,9 @@ class MujocoBackend(Backend):
         )
 
     def _steer(self, robot: str, body: RobotBody) -> None:
-        """Follow the navigator, unless the robot's motion drives the base itself."""
+        """Follow the navigator, unless the arm is out or the motion drives the base itself."""
+        if body.arm_out():
+            return
         run = self._runs.get(robot)
         if run is not None and run.ended is None and run.act.manual:
             return

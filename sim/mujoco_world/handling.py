@@ -81,17 +81,17 @@ def grasp(stage: Stage, act: Act, motion: Motion) -> Steps:
     gripper.open()
     yield from move_arm(act, path.above, "moving the hand above the object")
     yield from move_arm(act, path.at, "lowering the hand", slower=1.5)
+    robot.reaching_for, robot.grip_above_base_m = name, grip_m
     yield from _close(act, gripper, name)
-    robot.held, robot.grip_above_base_m = name, grip_m
     yield from move_arm(act, path.above, f"lifting {name}", slower=2.0)
     yield from wait(SETTLE_S)
-    if robot.held is None or not gripper.feels():
-        robot.held = None
+    if not (robot.holds(name) and gripper.feels()):
+        robot.let_go()
         gripper.open()
         yield from stow(act)
         raise CannotDo(f"{name} slipped out of the hand while it was lifted")
     yield from stow(act)
-    if robot.held is None:
+    if not robot.holds(name):
         raise CannotDo(f"{name} slipped out of the hand while the arm was folded")
     return Ending()
 
@@ -123,11 +123,11 @@ def let_down(act: Act, path: Reach, held: str, opening_m: float) -> Step:
     if robot.held is None:
         raise CannotDo(f"{held} was lost on the way down")
     act.phase = "opening the hand"
+    robot.let_go()
     gripper.open(gripper.opening_m() + opening_m)
     yield from wait(0.6)
     if gripper.feels():
         raise CannotDo(f"the hand is open and {held} still sticks to it")
-    robot.held = None
     yield from move_arm(act, path.above, "withdrawing the hand", slower=1.5)
     yield from stow(act)
 
@@ -219,6 +219,7 @@ def _close(act: Act, gripper: Gripper, name: str) -> Step:
         waited += PERIOD_S
         felt = felt + PERIOD_S if gripper.feels() else 0.0
         if waited > CLOSE_TIMEOUT_S:
+            act.robot.let_go()
             gripper.open()
             yield from stow(act)
             raise CannotDo(f"the hand closed on nothing: {name} is not between the fingers")

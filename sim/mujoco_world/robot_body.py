@@ -30,6 +30,8 @@ class RobotBody:
         self.prefix = f"{spec.robot}/"
         self._data = data
         self.held: str | None = None
+        self.reaching_for: str | None = None
+        """What the hand was last told to grasp: a hand feels that it holds, not what."""
         self.grip_above_base_m = 0.0
         """How far above the held object's base the hand took it."""
         self._untouched_s = 0.0
@@ -79,6 +81,10 @@ class RobotBody:
         speed, rate = self.drive.speed()
         return speed > 0.02 or rate > 0.05
 
+    def arm_out(self) -> bool:
+        """Whether the arm reaches past the base, so that driving could knock something over."""
+        return self.arm is not None and not self.arm.stowed()
+
     def freeze(self) -> None:
         """Halt base and arm; the hand keeps what it has."""
         self.drive.halt()
@@ -92,9 +98,20 @@ class RobotBody:
             self.arm.tick(ctrl)
         if self.gripper is not None:
             self.gripper.tick(ctrl)
-            self._untouched_s = 0.0 if self.gripper.feels() else self._untouched_s + PERIOD_S
-            if self.held is not None and self._untouched_s > LOST_AFTER_S:
-                self.held = None
+            feels = self.gripper.feels()
+            self._untouched_s = 0.0 if feels else self._untouched_s + PERIOD_S
+            if feels and self.held is None:
+                self.held = self.reaching_for
+            elif self.held is not None and self._untouched_s > LOST_AFTER_S:
+                self.let_go()
+
+    def holds(self, name: str) -> bool:
+        """Whether an object is in the hand, as far as the robot knows."""
+        return self.held == name
+
+    def let_go(self) -> None:
+        """The hand is empty from now on."""
+        self.held = self.reaching_for = None
 
     def in_basket(self, point_m: Any) -> bool:
         """Whether a point lies within the volume of the basket."""

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 CONNECT_TIMEOUT_S = 2.0
 """Less than the 3 s within which robotctl must say that there is no router."""
 
+_OURS = ("cli", "keyexpr_schema", "fleet", "sim", "workers")
+
 RouterOption = Annotated[
     list[str] | None,
     typer.Option("--router", metavar="ENDPOINT", help="Zenoh router; may be repeated."),
@@ -152,7 +154,7 @@ class one_sentence_errors:  # noqa: N801 - used like a function, as contextlib's
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if error is None or isinstance(error, typer.Exit):
             return
-        found = next((each for each in _leaves(error) if isinstance(each, _domain_errors())), None)
+        found = next((each for each in _leaves(error) if _of_the_domain(each)), None)
         if found is not None:
             # Some libraries print to a buffered stdout; keep what was said before the error first.
             sys.stdout.flush()
@@ -167,20 +169,15 @@ def _leaves(error: BaseException) -> list[BaseException]:
     return [error]
 
 
-def _domain_errors() -> tuple[type[BaseException], ...]:
-    """Error roots of the packages that are loaded anyway; importing others would only cost time."""
-    from keyexpr_schema.errors import SchemaError
+def _of_the_domain(error: BaseException) -> bool:
+    """Whether the error is one that a package of ours declares, or the system's refusal.
 
-    roots: list[type[BaseException]] = [CliError, SchemaError, OSError]
-    for module, root in (
-        ("fleet.errors", "FleetError"),
-        ("sim.errors", "SimError"),
-        ("workers.errors", "WorkerError"),
-    ):
-        kind = getattr(sys.modules.get(module), root, None)
-        if isinstance(kind, type) and issubclass(kind, BaseException):
-            roots.append(kind)
-    return tuple(roots)
+    Told by the module a class was defined in, so that no package is imported only to ask.
+    """
+    declared = {kind.__module__ for kind in type(error).__mro__}
+    return isinstance(error, OSError) or any(
+        module.split(".")[0] in _OURS and module.endswith(".errors") for module in declared
+    )
 
 
 def _encode(value: object) -> object:

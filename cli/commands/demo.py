@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from cli.show.live import Ticker
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False)
-BACKENDS = ("mujoco", "kinematic")
 
 
 @command(app)
@@ -47,7 +46,7 @@ async def demo(
     """
     import msgspec
 
-    from cli.commands.processes import parse_speed
+    from cli.commands.processes import BACKENDS, parse_speed
     from cli.demo.mission_run import DemoOptions
     from cli.errors import check_known
     from cli.show.live import Ticker

@@ -19,6 +19,8 @@ worker_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 sim_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 record_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 
+BACKENDS = ("mujoco", "kinematic")
+
 DataOption = Annotated[
     Path | None,
     typer.Option(
@@ -116,7 +118,7 @@ def sim(
         endpoints=call.settings.routers,
         realm=call.settings.realm,
         backend=backend,
-        speed=parse_speed(speed),
+        speed=pace,
     )
 
 

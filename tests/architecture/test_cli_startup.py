@@ -1,0 +1,88 @@
+"""robotctl starts at once: it imports next to nothing until a command runs."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+import typer.main
+
+from cli.main import COMMANDS
+
+HEAVY = ("zenoh", "msgspec", "rich", "mujoco", "yaml", "rerun", "pulp", "numpy", "scipy", "asyncio")
+HELP_S = 0.15
+
+
+def run_help(*options: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *options, "-m", "cli.main", "--help"],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=30,
+    )
+
+
+def test_help_imports_nothing_heavy() -> None:
+    done = run_help("-X", "importtime")
+    loaded = {line.rsplit("|", 1)[-1].strip() for line in done.stderr.splitlines()}
+    assert "typer" in loaded
+    roots = {name.split(".")[0] for name in loaded}
+    assert not roots & set(HEAVY)
+    assert not roots & {"keyexpr_schema", "fleet", "sim", "workers"}
+
+
+def test_help_is_instant() -> None:
+    """The best of several runs: what it costs where nobody else wants the processor."""
+    times = []
+    for _ in range(7):
+        begun_s = time.perf_counter()
+        run_help()
+        times.append(time.perf_counter() - begun_s)
+    assert min(times) < HELP_S
+
+
+def test_help_lists_every_command() -> None:
+    page = run_help().stdout
+    for name, (_, line) in COMMANDS.items():
+        assert f"  {name} " in page
+        assert line[:30] in page
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_is_there_and_takes_the_global_options(name: str) -> None:
+    module, _, attribute = COMMANDS[name][0].partition(":")
+    command = typer.main.get_command(getattr(importlib.import_module(module), attribute))
+    leaves = list(getattr(command, "commands", {}).values()) or [command]
+    for leaf in leaves:
+        flags = {flag for parameter in leaf.params for flag in getattr(parameter, "opts", ())}
+        assert {"--router", "--realm", "--json"} <= flags, leaf.name
+        assert leaf.help, f"{name} {leaf.name} has no help"
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("robotctl pl", {"plan", "planner"}),
+        ("robotctl goal d", {"delete"}),
+        ("robotctl goal add --prio", {"--priority"}),
+    ],
+)
+def test_the_shell_completes(words: str, expected: set[str]) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", "from cli.main import main; main()"],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        env={
+            **os.environ,
+            "_ROBOTCTL_COMPLETE": "complete_bash",
+            "COMP_WORDS": words,
+            "COMP_CWORD": str(len(words.split()) - 1),
+        },
+    )
+    assert set(done.stdout.split()) == expected

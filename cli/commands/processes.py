@@ -57,7 +57,14 @@ def router(
 
 
 @command(planner_app)
-def planner(call: Call, data: DataOption = None) -> None:
+def planner(
+    call: Call,
+    data: DataOption = None,
+    skills: Annotated[
+        list[Path] | None,
+        typer.Option("--skills", metavar="FILE", help="Models of skills of your own."),
+    ] = None,
+) -> None:
     """Run the planner: it turns goals into plans and has them carried out."""
     from cli.running import end_with_parent
     from fleet.service.planner_process import run
@@ -67,6 +74,7 @@ def planner(call: Call, data: DataOption = None) -> None:
         endpoints=call.settings.routers,
         realm=call.settings.realm,
         data_dir=_data(data, "planner"),
+        skill_files=tuple(skills or ()),
     )
 
 
@@ -108,9 +116,12 @@ def sim(
     ] = "1",
 ) -> None:
     """Run a simulated world with a mission's robots in it."""
-    from sim.process import run
+    from cli.errors import check_known
 
+    check_known("backend", backend, BACKENDS, "")
+    pace = parse_speed(speed)
     from cli.running import end_with_parent
+    from sim.process import run
 
     end_with_parent()
     run(

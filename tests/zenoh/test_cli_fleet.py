@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -117,11 +116,14 @@ async def main():
 
 asyncio.run(main())
 """
-    with subprocess.Popen(
-        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True
-    ) as parent:
+    parent = await asyncio.create_subprocess_exec(
+        sys.executable, "-c", program, stdout=asyncio.subprocess.PIPE
+    )
+    try:
         assert parent.stdout is not None
-        child = int(await asyncio.to_thread(parent.stdout.readline))
+        child = int(await parent.stdout.readline())
         assert runs(child)
+    finally:
         parent.kill()
+        await parent.wait()
     await until(lambda: not runs(child))

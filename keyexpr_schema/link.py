@@ -2,8 +2,8 @@
 
 Zenoh's callbacks run on its own network threads and only hand over to the loop. Calls that may
 block (a full link, a handshake) run on one thread of their own, in the order in which they were
-made, so that a read never overtakes a write. `wire`, `link` and `router` are the only modules
-that import zenoh.
+made, so that a read never overtakes a write. `wire`, `link`, `connecting` and `router` are the
+only modules that import zenoh.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import threading
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -21,14 +20,11 @@ from typing import Any, TypeVar
 import zenoh
 from zenoh import handlers
 
-from keyexpr_schema.errors import Unreachable
-from keyexpr_schema.wire import Wire, read_sample, zenoh_config
+from keyexpr_schema.wire import Wire, read_sample
 
 _T = TypeVar("_T")
 _log = logging.getLogger(__name__)
 
-OPEN_ATTEMPT_MS = 500
-"""Zenoh's own retry inside `open` cannot be interrupted, so it gets short attempts."""
 _TIMED_OUT = b"Timeout"
 """What Zenoh puts into the error reply of a query that ran into its timeout."""
 
@@ -57,7 +53,8 @@ class Request:
         await self.link.call(self._answer, data, encoding)
 
     def _answer(self, data: bytes, encoding: str) -> None:
-        with self.query as query:
+        # An asker whom the answer cannot reach any more sees that by its own timeout.
+        with contextlib.suppress(zenoh.ZError), self.query as query:
             query.reply(self.keyexpr, data, encoding=encoding)
 
     async def refuse(self, sentence: str) -> None:
@@ -65,12 +62,12 @@ class Request:
         await self.link.call(self._refuse, sentence)
 
     def _refuse(self, sentence: str) -> None:
-        with self.query as query:
+        with contextlib.suppress(zenoh.ZError), self.query as query:
             query.reply_err(sentence.encode(), encoding="text/plain")
 
 
 class Link:
-    """A Zenoh client session; made by `open_link`.
+    """A Zenoh client session; made by `connecting.open_link`.
 
     `generation` counts how often a router came into view: what was learned in one generation
     says nothing about the next.
@@ -235,8 +232,12 @@ class Link:
                 congestion_control=zenoh.CongestionControl.BLOCK,
             )
 
+        started_s = self._loop.time()
         await self.call(ask)
         await done
+        # The router's own clock may end a query first, and then without an error reply.
+        if not replies.values and self._loop.time() - started_s >= 0.9 * timeout_s:
+            replies.timed_out = True
         return replies
 
     @asynccontextmanager
@@ -348,92 +349,3 @@ class Link:
 def _log_failure(future: Any) -> None:
     if not future.cancelled() and future.exception() is not None:
         _log.warning("a put was lost: %s", future.exception())
-
-
-class _Opening:
-    """`zenoh.open` on a thread, such that a session nobody waits for any more is closed."""
-
-    def __init__(self, config: zenoh.Config) -> None:
-        self._config = config
-        self._lock = threading.Lock()
-        self._abandoned = False
-        self._session: zenoh.Session | None = None
-
-    def run(self) -> zenoh.Session:
-        session = zenoh.open(self._config)
-        with self._lock:
-            self._session = session
-            abandoned = self._abandoned
-        if abandoned:
-            session.close()  # type: ignore[no-untyped-call]
-        return session
-
-    def abandon(self) -> None:
-        with self._lock:
-            self._abandoned = True
-            session = self._session
-        if session is not None:
-            session.close()  # type: ignore[no-untyped-call]
-
-
-async def _connect(
-    endpoints: Sequence[str],
-    realm: str,
-    lease_s: float,
-    timeout_s: float | None,
-    executor: ThreadPoolExecutor,
-) -> zenoh.Session:
-    loop = asyncio.get_running_loop()
-    started_s = loop.time()
-    pause_s = 0.1
-    while True:
-        left_s = None if timeout_s is None else timeout_s - (loop.time() - started_s)
-        attempt_ms = OPEN_ATTEMPT_MS if left_s is None else min(OPEN_ATTEMPT_MS, left_s * 1000)
-        config = zenoh_config(
-            "client",
-            connect=endpoints,
-            lease_s=lease_s,
-            namespace=realm,
-            connect_timeout_ms=max(50, round(attempt_ms)),
-        )
-        opening = _Opening(config)
-        try:
-            return await asyncio.shield(loop.run_in_executor(executor, opening.run))
-        except zenoh.ZError as error:
-            if timeout_s is not None and loop.time() - started_s + pause_s >= timeout_s:
-                raise Unreachable(
-                    f"no router answers at {', '.join(endpoints)}: start one with "
-                    "`robotctl router` or name another with --router"
-                ) from error
-        except asyncio.CancelledError:
-            opening.abandon()
-            raise
-        await asyncio.sleep(pause_s)
-        pause_s = min(0.5, pause_s * 2)
-
-
-@asynccontextmanager
-async def open_link(
-    endpoints: Sequence[str], realm: str, lease_s: float, connect_timeout_s: float | None
-) -> AsyncIterator[Link]:
-    """A link to the first of `endpoints` that answers; closed at the end, whatever happens.
-
-    Raises:
-        Unreachable: none answered within `connect_timeout_s`.
-    """
-    loop = asyncio.get_running_loop()
-    executor = ThreadPoolExecutor(1, "zenoh")
-    try:
-        session = await _connect(endpoints, realm, lease_s, connect_timeout_s, executor)
-        close: Callable[[], None] = session.close
-        try:
-            link = Link(session, executor)
-            close = link.close
-            with contextlib.suppress(TimeoutError):
-                await link.wait_up(1.0)
-            yield link
-        finally:
-            # Shielded: an unclosed session keeps the interpreter from ending.
-            await asyncio.shield(loop.run_in_executor(executor, close))
-    finally:
-        executor.shutdown(wait=False)

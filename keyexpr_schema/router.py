@@ -21,11 +21,11 @@ from zenoh import handlers
 
 from keyexpr_schema.errors import ForeignKey, SchemaError
 from keyexpr_schema.keyspace import STORE_JOURNAL, key_of
+from keyexpr_schema.questions import reply_encoding
 from keyexpr_schema.service import JournalEntry, StoreAddress, StoreJournal, StoreQuery
 from keyexpr_schema.storage import Store, Write
 from keyexpr_schema.wire import (
     decode_wire,
-    encoding_of,
     stamp_of_text,
     text_of_stamp,
     timestamp_of_stamp,
@@ -143,7 +143,7 @@ class _Feed:
         if rest == STORE_JOURNAL.build(StoreAddress()):
             self._reply_journal(query, keyexpr, realm)
             return
-        if "*" not in rest and not is_stored(keyexpr):
+        if "*" not in keyexpr and not is_stored(keyexpr):
             return
         self._apply()
         for write in self._store.select(keyexpr):
@@ -186,7 +186,7 @@ class _Feed:
         query.reply(
             keyexpr,
             STORE_JOURNAL.encode(reply),  # type: ignore[arg-type]
-            encoding=encoding_of(f"robotfleet/{STORE_JOURNAL.name}_reply/1"),
+            encoding=reply_encoding(STORE_JOURNAL),
         )
 
 
@@ -205,12 +205,12 @@ async def run_router(
     Raises:
         CannotListen: an endpoint is taken or not valid.
     """
-    config = zenoh_config("router", listen=listen, connect=connect, lease_s=lease_s)
-    config.insert_json5("listen/exit_on_failure", "true")
-    # Another router that is away must not keep this one from starting.
-    config.insert_json5("connect/timeout_ms", "0")
-    config.insert_json5("connect/exit_on_failure", "false")
     try:
+        config = zenoh_config("router", listen=listen, connect=connect, lease_s=lease_s)
+        config.insert_json5("listen/exit_on_failure", "true")
+        # Another router that is away must not keep this one from starting.
+        config.insert_json5("connect/timeout_ms", "0")
+        config.insert_json5("connect/exit_on_failure", "false")
         session = await asyncio.shield(asyncio.to_thread(zenoh.open, config))
     except zenoh.ZError as error:
         raise CannotListen(

@@ -15,12 +15,11 @@ import hashlib
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
+from keyexpr_schema.connecting import open_link
 from keyexpr_schema.errors import (
     ForeignKey,
-    NoAnswer,
-    SchemaError,
     Unconfirmed,
     UndecodablePayload,
     Unreachable,
@@ -28,7 +27,8 @@ from keyexpr_schema.errors import (
 from keyexpr_schema.ids import check_id
 from keyexpr_schema.key import A, Kept, Key, P, Payload
 from keyexpr_schema.keyspace import REJECT, STORE_JOURNAL
-from keyexpr_schema.link import Link, Request, open_link
+from keyexpr_schema.link import Link
+from keyexpr_schema.questions import Service, ask
 from keyexpr_schema.service import Reject, RejectAddress, StoreAddress, StoreQuery
 from keyexpr_schema.tokens import TokenChange, TokenWatch
 from keyexpr_schema.watch import Change, Watch
@@ -46,7 +46,6 @@ __all__ = [
 
 SETTLE_S = 0.5
 _RESEND_S = 0.25
-_REPLY_VERSION = 1
 
 
 @dataclass(frozen=True)
@@ -88,6 +87,11 @@ class Session:
         self.config = config
         self.link = link
         self._rejects: dict[str, tuple[str, int]] = {}
+
+    @property
+    def component(self) -> str:
+        """Who we are."""
+        return self.config.component
 
     @property
     def connected(self) -> bool:
@@ -341,47 +345,9 @@ class Session:
 
         What `handler` raises becomes an error reply; the asker sees its text.
         """
-        tasks: set[asyncio.Task[None]] = set()
-
-        def receive(request: Request) -> None:
-            task = asyncio.create_task(self._answer(key, handler, request))
-            tasks.add(task)
-            task.add_done_callback(tasks.discard)
-
-        try:
-            async with self.link.answering(key.pattern(**fixed), receive):
-                yield
-        finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
-
-    async def _answer(
-        self, key: Key[A, P], handler: Callable[[A, P], Awaitable[Payload]], request: Request
-    ) -> None:
-        try:
-            address = key.parse(request.keyexpr)
-            question = decode_wire(
-                request.data,
-                request.encoding,
-                key.payload,
-                key.name,
-                key.version,
-                request.keyexpr,
-            )
-            answer = await handler(address, question)
-        except asyncio.CancelledError:
-            await asyncio.shield(request.refuse(f"{self.config.component} is going away"))
-            raise
-        except UndecodablePayload as error:
-            self.reject(request.keyexpr, request.data, str(error))
-            await request.refuse(str(error))
-        except SchemaError as error:
-            await request.refuse(str(error))
-        except Exception as error:  # whatever a handler raises is an answer, too
-            await request.refuse(f"{self.config.component} failed: {error or type(error).__name__}")
-        else:
-            await request.answer(key.encode(cast(Any, answer)), encoding_of(_reply_schema(key)))
+        service = Service(self, key, handler)
+        async with service.running(key.pattern(**fixed)):
+            yield
 
     async def ask(self, key: Key[A, P], address: A, payload: P, timeout_s: float = 5.0) -> Any:
         """Ask whoever serves `key` at `address`; the answer has the type `key.reply`.
@@ -389,33 +355,4 @@ class Session:
         Raises:
             NoAnswer: nobody serves it, it failed, or it took longer than `timeout_s`.
         """
-        if key.kept is not Kept.QUERY or key.reply is None:
-            raise TypeError(f"{key.name} is {key.kept.value}: it cannot be asked")
-        keyexpr = key.build(address)
-        replies = await self.link.query(
-            keyexpr, timeout_s, key.encode(payload), encoding_of(key.schema), first=True
-        )
-        if replies.values:
-            wire = replies.values[0]
-            try:
-                return decode_wire(
-                    wire.data,
-                    wire.encoding,
-                    key.reply,
-                    f"{key.name}_reply",
-                    _REPLY_VERSION,
-                    wire.keyexpr,
-                )
-            except UndecodablePayload as error:
-                raise NoAnswer(f"the answer of {keyexpr} cannot be read: {error}") from None
-        if replies.errors:
-            raise NoAnswer(f"{keyexpr}: {replies.errors[0]}")
-        if replies.timed_out:
-            raise NoAnswer(f"{keyexpr} did not answer within {timeout_s:g} s")
-        if not self.link.up:
-            raise NoAnswer(f"{keyexpr} cannot be asked: {self._unreachable()}")
-        raise NoAnswer(f"nobody serves {keyexpr}: the process that answers it is not running")
-
-
-def _reply_schema(key: Key[Any, Any]) -> str:
-    return f"robotfleet/{key.name}_reply/{_REPLY_VERSION}"
+        return await ask(self.link, key, address, payload, timeout_s)

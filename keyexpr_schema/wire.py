@@ -1,6 +1,6 @@
 """What travels on a Zenoh link, in plain Python: configuration, stamps, encodings, samples.
 
-`wire`, `link` and `router` are the only modules that import zenoh.
+`wire`, `link`, `connecting` and `router` are the only modules that import zenoh.
 """
 
 from __future__ import annotations

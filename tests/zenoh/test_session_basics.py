@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import time
 
 import pytest
@@ -43,6 +44,13 @@ async def test_without_a_router_opening_fails_with_one_sentence_and_in_time():
         async with open_session(SessionConfig(endpoints=("tcp/127.0.0.1:9",))):
             pass
     assert time.monotonic() - started_s < 3.5
+
+
+@pytest.mark.parametrize("endpoint", ["nonsense", "127.0.0.1:7447", "tcp/no-such-host.invalid:1"])
+async def test_an_endpoint_that_is_none_is_one_sentence(endpoint):
+    with pytest.raises(Unreachable, match=re.escape(endpoint)):
+        async with open_session(SessionConfig(endpoints=(endpoint,), connect_timeout_s=1.0)):
+            pass
 
 
 async def test_realms_do_not_see_each_other(session_config):

@@ -1,0 +1,153 @@
+"""Bytes of every payload as they were once written still decode, and are written the same.
+
+A new payload type, or a new field: run `python tests/contracts/test_golden_payloads.py` and commit
+what it adds under golden/. Bytes that are there are never rewritten.
+"""
+
+from __future__ import annotations
+
+import enum
+import types
+import typing
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from keyexpr_schema.errors import UndecodablePayload
+from keyexpr_schema.key import Key, Payload, decode_payload
+from keyexpr_schema.keyspace import KEYSPACE
+
+GOLDEN = Path(__file__).parent / "golden"
+
+
+def top_level() -> dict[str, type[Payload]]:
+    """Every payload that travels by itself, by file name."""
+    kinds: dict[str, type[Payload]] = {}
+    for key in KEYSPACE:
+        kinds[f"{key.name}.{key.version}"] = key.payload
+        if key.reply is not None:
+            kinds[f"{key.name}_reply.1"] = key.reply
+    return kinds
+
+
+def sample(kind: Any, name: str = "x") -> Any:
+    """A value of `kind` in which every field is set, the same one every time."""
+    origin, args = typing.get_origin(kind), typing.get_args(kind)
+    if origin is typing.Annotated:
+        return name.replace("_", "-")
+    if origin in (typing.Union, types.UnionType):
+        return sample(args[0], name)
+    if origin is tuple:
+        inner = args[:1] if args[-1] is Ellipsis else args
+        return tuple(sample(one, name) for one in inner)
+    if origin is dict:
+        return {sample(args[0], name): sample(args[1], name)}
+    if isinstance(kind, type) and issubclass(kind, enum.Enum):
+        return list(kind)[-1]
+    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        fields = msgspec.structs.fields(kind)
+        return kind(**{field.name: sample(field.type, field.name) for field in fields})
+    return {str: name, int: 3, float: 1.5, bool: True}[kind]
+
+
+def required_only(kind: Any) -> Any:
+    """A value of `kind` with nothing set that need not be."""
+    fields = [field for field in msgspec.structs.fields(kind) if field.required]
+    return kind(**{field.name: sample(field.type, field.name) for field in fields})
+
+
+def variants(kind: type[Payload]) -> dict[str, Payload]:
+    return {"full": sample(kind), "least": required_only(kind)}
+
+
+CASES = [(name, kind, v) for name, kind in top_level().items() for v in ("full", "least")]
+
+
+@pytest.mark.parametrize(("name", "kind", "variant"), CASES)
+def test_golden_bytes_decode_and_are_written_again(name, kind, variant):
+    path = GOLDEN / f"{name}.{variant}.json"
+    assert path.exists(), f"run python {__file__} and commit {path.name}"
+    data = path.read_bytes()
+    value = variants(kind)[variant]
+    decoded = decode_payload(kind, data, path.name)
+    assert decoded == value
+    assert msgspec.json.decode(msgspec.json.encode(value)) == msgspec.json.decode(data)
+    assert msgspec.json.encode(decoded) == data
+
+
+def test_no_golden_bytes_without_a_payload():
+    """A version that is gone from the table would leave bytes that nobody can read any more."""
+    names = {f"{name}.{variant}.json" for name, _, variant in CASES}
+    assert {path.name for path in GOLDEN.glob("*.json")} == names
+
+
+@pytest.mark.parametrize("kind", top_level().values(), ids=top_level().keys())
+def test_a_field_from_the_future_is_passed_over(kind):
+    fields = msgspec.to_builtins(sample(kind))
+    data = msgspec.json.encode({**fields, "field_of_a_later_version": [1, {"a": None}]})
+    assert decode_payload(kind, data, "here") == sample(kind)
+
+
+def strategy(kind: Any) -> st.SearchStrategy[Any]:
+    origin, args = typing.get_origin(kind), typing.get_args(kind)
+    if origin is typing.Annotated:
+        return st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,8}", fullmatch=True)
+    if origin in (typing.Union, types.UnionType):
+        return st.one_of([strategy(one) for one in args])
+    if origin is tuple and args[-1] is Ellipsis:
+        return st.lists(strategy(args[0]), max_size=2).map(tuple)
+    if origin is tuple:
+        return st.tuples(*(strategy(one) for one in args))
+    if origin is dict:
+        return st.dictionaries(strategy(args[0]), strategy(args[1]), max_size=2)
+    if kind is type(None):
+        return st.none()
+    if isinstance(kind, type) and issubclass(kind, enum.Enum):
+        return st.sampled_from(kind)
+    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        fields = msgspec.structs.fields(kind)
+        return st.builds(kind, **{field.name: strategy(field.type) for field in fields})
+    plain: dict[Any, st.SearchStrategy[Any]] = {
+        str: st.text(max_size=8),
+        int: st.integers(-(2**53), 2**53),
+        float: st.floats(allow_nan=False, allow_infinity=False),
+        bool: st.booleans(),
+    }
+    return plain[kind]
+
+
+STRATEGIES = {key.name: strategy(key.payload) for key in KEYSPACE}
+
+
+@given(st.data())
+@settings(max_examples=200, deadline=None)
+def test_every_payload_survives_the_journey(data):
+    key: Key[Any, Any] = data.draw(st.sampled_from(KEYSPACE))
+    value = data.draw(STRATEGIES[key.name])
+    decoded = key.decode(key.encode(value))
+    assert key.encode(decoded) == key.encode(value)
+
+
+@given(st.sampled_from(KEYSPACE), st.binary(max_size=60))
+def test_any_bytes_decode_or_are_undecodable_and_nothing_else(key, data):
+    try:
+        key.decode(data)
+    except UndecodablePayload as error:
+        assert "\n" not in str(error)
+
+
+def main() -> None:
+    GOLDEN.mkdir(exist_ok=True)
+    for name, kind in top_level().items():
+        for variant, value in variants(kind).items():
+            path = GOLDEN / f"{name}.{variant}.json"
+            if not path.exists():
+                path.write_bytes(msgspec.json.encode(value))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,328 @@
+"""A worker on real keys: orders in, reports and facts out."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from pathlib import Path
+
+import pytest
+from conftest import RouterProcess
+from worker_world import DEADLINE_S, Fleet, running_fleet
+
+from keyexpr_schema.keyspace import ORDER, REJECT, REPORT, ROBOT_ALIVE, ROBOT_STATE
+from keyexpr_schema.motions import MotionKind
+from keyexpr_schema.robots import RobotActivity, RobotAddress, RobotState
+from keyexpr_schema.session import SessionConfig
+from keyexpr_schema.tasks import OrderAddress, ReportAddress, ReportState
+from keyexpr_schema.world import NOTHING
+from sim.backend import Backend
+from sim.kinematic import Durations, KinematicBackend
+from sim.world_file import Mission
+from workers.context import SkillContext
+from workers.skill import skill
+
+MakeFleet = Callable[..., AbstractAsyncContextManager[Fleet]]
+
+
+@pytest.fixture
+def fleet_of(session_config: Callable[..., SessionConfig], tmp_path: Path) -> MakeFleet:
+    """Makes a running fleet; motions fail as told: `fleet_of({"hsr": {"grasp": (1,)}})`."""
+
+    @asynccontextmanager
+    async def make(
+        failures: dict[str, dict[str, tuple[int, ...]]] | None = None,
+    ) -> AsyncIterator[Fleet]:
+        def backend(mission: Mission) -> Backend:
+            durations = Durations(failures=failures or {})
+            robots = [(r.spec, r.start_m_rad) for r in mission.robots]
+            return KinematicBackend(mission.world, robots, durations, step_s=0.05)
+
+        async with running_fleet(session_config, tmp_path / "workers", backend) as fleet:
+            yield fleet
+
+    return make
+
+
+def truth(fleet: Fleet, name: str) -> tuple[str | None, str | None, str | None]:
+    """`(place, support, held_by)` of an object, as it really is."""
+    found = next(t for t in fleet.world.backend.truths() if t.object == name)
+    return found.place, found.support, found.held_by
+
+
+async def state_of(fleet: Fleet, robot: str, holds: Callable[[RobotState], bool]) -> RobotState:
+    fixed: dict[str, str | int] = {"robot": robot}
+    async with (
+        asyncio.timeout(DEADLINE_S),
+        fleet.session.watch((ROBOT_STATE, fixed)) as watch,
+    ):
+        async for change in watch:
+            if change.value is not None and holds(change.value):
+                return change.value  # type: ignore[no-any-return]
+    raise AssertionError("a watch does not end")
+
+
+def kinds(fleet: Fleet, robot: str) -> list[MotionKind]:
+    return [motion.kind for name, motion in fleet.world.begun if name == robot]
+
+
+async def test_a_cup_is_fetched_and_put_down_and_every_fact_is_true(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("hsr"):
+        assert (await state_of(fleet, "hsr", lambda s: s.place == "living_room")).holding is None
+        first = await fleet.report(await fleet.order("hsr", "t1", "navigate", to="kitchen"))
+        assert (first.state, first.reason) == (ReportState.SUCCEEDED, None)
+        assert len(first.tries) == 1 and first.started_s is not None
+        second = await fleet.report(
+            await fleet.order("hsr", "t2", "pick", object="cup_1", place="kitchen")
+        )
+        assert second.state is ReportState.SUCCEEDED, second.reason
+        assert truth(fleet, "cup_1")[2] == "hsr"
+        held = await fleet.fact("holding", "hsr")
+        at = await fleet.fact("at", "cup_1")
+        assert held is not None and held.value == "cup_1" and held.source == "hsr"
+        assert at is not None and at.value == "hsr"
+        assert (await state_of(fleet, "hsr", lambda s: s.holding == "cup_1")).place == "kitchen"
+        await fleet.report(await fleet.order("hsr", "t3", "navigate", to="hallway"))
+        last = await fleet.report(
+            await fleet.order("hsr", "t4", "place", object="cup_1", place="hallway")
+        )
+        assert last.state is ReportState.SUCCEEDED, last.reason
+        assert truth(fleet, "cup_1") == ("hallway", "hallway_table", None)
+        said = {(f.relation, f.subject): f.value for f in last.facts}
+        assert said["at", "cup_1"] == "hallway" and said["holding", "hsr"] == NOTHING
+        for (relation, subject), value in said.items():
+            stored = await fleet.fact(relation, subject)
+            assert stored is not None and stored.value == value
+
+
+async def test_a_cup_is_handed_to_the_robot_with_the_basket(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("hsr"), fleet.worker("locobot"):
+        drive = await fleet.order("locobot", "t1", "navigate", to="kitchen")
+        await fleet.order("hsr", "t2", "navigate", to="kitchen")
+        await fleet.order("hsr", "t3", "pick", object="cup_2", place="kitchen")
+        await fleet.report(drive)
+        give = await fleet.order(
+            "hsr", "t4", "place_on_robot", object="cup_2", carrier="locobot", place="kitchen"
+        )
+        report = await fleet.report(give)
+        assert report.state is ReportState.SUCCEEDED, report.reason
+        assert truth(fleet, "cup_2")[1] == "locobot"
+        said = {(f.relation, f.subject): f.value for f in report.facts}
+        assert said["at", "cup_2"] == "locobot" and said["holding", "hsr"] == NOTHING
+        assert (await state_of(fleet, "locobot", lambda s: s.basket == ("cup_2",))).holding is None
+
+
+async def test_searching_tells_what_lies_there_and_what_does_not(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("locobot"):
+        await fleet.report(await fleet.order("locobot", "t1", "navigate", to="kitchen"))
+        report = await fleet.report(await fleet.order("locobot", "t2", "search", place="kitchen"))
+        assert report.state is ReportState.SUCCEEDED, report.reason
+        said = {(f.relation, f.subject): f.value for f in report.facts}
+        assert said["at", "cup_1"] == said["at", "cup_2"] == "kitchen"
+        assert said["searched", "kitchen"] is True
+
+
+async def test_a_grasp_that_slips_twice_is_done_at_the_third_try(fleet_of: MakeFleet) -> None:
+    async with fleet_of({"hsr": {"grasp": (1, 2)}}) as fleet, fleet.worker("hsr"):
+        report = await fleet.report(
+            await fleet.order("hsr", "t1", "pick", object="cup_1", place="kitchen")
+        )
+        slipped = "the object slipped out of the hand"
+        assert report.state is ReportState.SUCCEEDED
+        assert [t.reason for t in report.tries] == [slipped, slipped, None]
+        did = kinds(fleet, "hsr")
+        for n in (i for i, kind in enumerate(did) if kind is MotionKind.GRASP):
+            assert did[n + 1] is MotionKind.STOW, "safe before the next try"
+
+
+async def test_three_slips_are_a_failure_with_three_reasons(fleet_of: MakeFleet) -> None:
+    async with fleet_of({"hsr": {"grasp": (1, 2, 3)}}) as fleet, fleet.worker("hsr"):
+        report = await fleet.report(
+            await fleet.order("hsr", "t1", "pick", object="cup_1", place="kitchen")
+        )
+        assert (report.state, report.retryable) == (ReportState.FAILED, True)
+        assert [t.number for t in report.tries] == [1, 2, 3]
+        assert all(t.reason == report.reason for t in report.tries)
+        again = await fleet.report(
+            await fleet.order("hsr", "t1", "pick", attempt=2, object="cup_1", place="kitchen")
+        )
+        assert again.state is ReportState.SUCCEEDED
+
+
+async def test_a_cup_that_is_not_there_is_not_looked_for_for_ever(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("hsr"):
+        report = await fleet.report(
+            await fleet.order("hsr", "t1", "pick", object="cup_1", place="living_room")
+        )
+        assert (report.state, report.retryable) == (ReportState.FAILED, False)
+        assert report.reason == "cup_1 is not to be seen in living_room"
+        assert {(f.relation, f.subject): f.value for f in report.facts}["at", "cup_1"] is None
+        assert kinds(fleet, "hsr").count(MotionKind.LOOK) >= 2
+
+
+async def test_a_cancelled_order_stops_the_robot(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("hsr"):
+        order = await fleet.order("hsr", "t1", "navigate", to="kitchen")
+        waiting = await fleet.order("hsr", "t2", "navigate", to="hallway")
+        await fleet.report(order, ReportState.STARTED)
+        fleet.world.paused = True
+        await fleet.order("hsr", "t2", "navigate", to="hallway", cancelled=True)
+        dropped = await fleet.report(waiting)
+        assert dropped.state is ReportState.CANCELLED and dropped.tries == ()
+        await fleet.order("hsr", "t1", "navigate", to="kitchen", cancelled=True)
+        await fleet.world.until_begun(lambda begun: begun[-1][1].kind is MotionKind.STOW)
+        fleet.world.paused = False
+        report = await fleet.report(order)
+        assert report.state is ReportState.CANCELLED
+        assert report.reason == "the order was cancelled"
+        senses = fleet.world.backend.senses("hsr")
+        assert senses.place != "kitchen" and not senses.moving
+
+
+async def test_what_is_not_done_by_its_deadline_has_failed(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("hsr"):
+        fleet.world.steps = 1  # the drive takes longer than a look at the clock
+        order = await fleet.order("hsr", "t1", "navigate", deadline_s=2.0, to="kitchen")
+        report = await fleet.report(order)
+        assert report.state is ReportState.FAILED
+        assert report.reason == "navigate was not done within its deadline of 2 s"
+        assert report.started_s is not None and report.tries[0].ended_s >= report.started_s + 2.0
+        assert fleet.world.backend.senses("hsr").place == "living_room"
+
+
+async def test_an_order_that_is_withdrawn_before_its_start_is_dropped(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("hsr"):
+        first = await fleet.order("hsr", "t1", "navigate", to="kitchen")
+        await fleet.report(first, ReportState.STARTED)
+        fleet.world.paused = True
+        await fleet.order("hsr", "t2", "pick", object="cup_1", place="kitchen")
+        await fleet.session.delete(ORDER, OrderAddress("hsr", "p", "t2"))
+        third = await fleet.order("hsr", "t3", "navigate", to="hallway")
+        fleet.world.paused = False
+        assert (await fleet.report(third)).state is ReportState.SUCCEEDED
+        assert MotionKind.GRASP not in kinds(fleet, "hsr")
+        assert await fleet.session.get(REPORT, ReportAddress("hsr", "p", "t2", 1)) is None
+
+
+async def test_what_a_robot_cannot_do_is_refused_with_what_it_can(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("locobot"):
+        order = await fleet.order("locobot", "t1", "pick", object="cup_1", place="kitchen")
+        report = await fleet.report(order)
+        assert (report.state, report.retryable) == (ReportState.REFUSED, False)
+        assert report.reason is not None and "carries out navigate, search" in report.reason
+        wrong = await fleet.report(await fleet.order("locobot", "t2", "navigate", to="attic"))
+        assert wrong.state is ReportState.REFUSED
+        assert wrong.reason is not None and "hallway, kitchen, living_room" in wrong.reason
+
+
+async def test_an_order_of_an_older_planner_is_refused(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("locobot"):
+        now = await fleet.order("locobot", "t1", "navigate", epoch=5, to="hallway")
+        assert (await fleet.report(now)).state is ReportState.SUCCEEDED
+        old = await fleet.order("locobot", "t2", "navigate", epoch=4, to="kitchen")
+        report = await fleet.report(old)
+        assert (report.state, report.retryable) == (ReportState.REFUSED, True)
+        assert report.reason is not None and "epoch 4" in report.reason
+        assert fleet.world.backend.senses("locobot").place == "hallway"
+
+
+async def test_a_report_that_was_lost_is_put_again_and_nothing_moves(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("locobot"):
+        order = await fleet.order("locobot", "t1", "navigate", to="kitchen")
+        report = await fleet.report(order)
+        moved = len(fleet.world.begun)
+        where = ReportAddress("locobot", "p", "t1", 1)
+        await fleet.session.delete(REPORT, where)
+        again = await fleet.order("locobot", "t1", "navigate", epoch=2, to="kitchen")
+        assert await fleet.report(again) == report
+        assert len(fleet.world.begun) == moved
+
+
+async def test_an_order_that_cannot_be_read_disturbs_nobody(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("hsr"):
+        running = await fleet.order("hsr", "t1", "navigate", to="kitchen")
+        bad = ORDER.build(OrderAddress("hsr", "p", "t0"))
+        fleet.session.link.send_soon(bad, b'{"robot": 5}', "application/json", block=True)
+        misplaced = await fleet.order("hsr", "t1", "navigate", to="hallway", attempt=9)
+        await fleet.session.confirm(ORDER, OrderAddress("hsr", "p", "other"), misplaced)
+        assert (await fleet.report(running)).state in (ReportState.SUCCEEDED, ReportState.CANCELLED)
+        async with asyncio.timeout(DEADLINE_S), fleet.session.watch(REJECT) as watch:
+            async for change in watch:
+                if change.value is not None and change.address.component == "worker-hsr":
+                    assert change.value.keyexpr == bad
+                    break
+        async with asyncio.timeout(DEADLINE_S):
+            watching = fleet.session.watch((REPORT, {"robot": "hsr", "task": "other"}))
+            async with watching as watch:
+                async for change in watch:
+                    assert change.value is not None
+                    assert change.value.state is ReportState.REFUSED
+                    assert "orders/p/t1" in change.value.reason
+                    break
+
+
+@skill("trip")
+async def trip(ctx: SkillContext) -> None:
+    """A skill with a bug."""
+    raise KeyError("legs")
+
+
+async def test_a_bug_in_a_skill_is_reported_and_the_worker_goes_on(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("locobot", trip, skills=("trip",)):
+        report = await fleet.report(await fleet.order("locobot", "t1", "trip"))
+        assert (report.state, report.retryable) == (ReportState.FAILED, False)
+        assert report.reason == "unexpected error in skill trip: KeyError: 'legs'"
+        after = await fleet.order("locobot", "t2", "navigate", to="kitchen")
+        assert (await fleet.report(after)).state is ReportState.SUCCEEDED
+
+
+async def test_a_report_survives_a_router_that_was_away(
+    fleet_of: MakeFleet, router: RouterProcess
+) -> None:
+    async with fleet_of() as fleet, fleet.worker("hsr") as worker:
+        order = await fleet.order("hsr", "t1", "navigate", to="kitchen")
+        await fleet.report(order, ReportState.STARTED)
+        fleet.world.paused = True
+        router.kill()
+        fleet.world.paused = False
+        async with asyncio.timeout(DEADLINE_S):
+            while fleet.world.backend.senses("hsr").place != "kitchen":
+                await fleet.world.tick()
+        router.restart()
+        report = await fleet.report(order)
+        assert report.state is ReportState.SUCCEEDED
+        assert report.incarnation == worker.incarnation
+        at = await fleet.fact("at", "hsr")
+        assert at is not None and at.value == "kitchen"
+
+
+async def test_a_worker_that_is_told_to_end_says_what_it_leaves_behind(
+    fleet_of: MakeFleet,
+) -> None:
+    async with fleet_of() as fleet:
+        async with fleet.worker("hsr"):
+            order = await fleet.order("hsr", "t1", "navigate", to="kitchen")
+            await fleet.report(order, ReportState.STARTED)
+        report = await fleet.report(order)
+        assert report.state is ReportState.INTERRUPTED
+        assert not fleet.world.backend.senses("hsr").moving
+        state = await state_of(fleet, "hsr", lambda s: s.activity is RobotActivity.STOPPED)
+        assert state.place != "kitchen"
+        async with fleet.worker("hsr"):  # the order still stands, and is not begun again
+            other = await fleet.order("hsr", "t2", "navigate", to="hallway")
+            assert (await fleet.report(other)).state is ReportState.SUCCEEDED
+        went = [m.place for n, m in fleet.world.begun if n == "hsr" and m.kind is MotionKind.GO_TO]
+        assert went == ["kitchen", "hallway"]
+
+
+async def test_a_worker_is_alive_while_it_runs(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, asyncio.timeout(DEADLINE_S):
+        watching = fleet.session.watch_tokens(ROBOT_ALIVE, robot="hsr", debounce_s=0.05)
+        async with watching as tokens:
+            async with fleet.worker("hsr") as worker:
+                change = await anext(tokens)
+                assert change.alive and change.address.incarnation == worker.incarnation
+            assert not (await anext(tokens)).alive
+        state = await fleet.session.get(ROBOT_STATE, RobotAddress("hsr"))
+        assert state is not None and state.activity is RobotActivity.STOPPED

@@ -9,6 +9,7 @@ from __future__ import annotations
 import heapq
 import math
 import random
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from keyexpr_schema.motions import (
@@ -20,12 +21,12 @@ from keyexpr_schema.motions import (
     PointM,
     Senses,
 )
-from keyexpr_schema.robots import PoseMRad
+from keyexpr_schema.robots import PoseMRad, RobotSpec
 from keyexpr_schema.simulation import ContactCount, Frame, Scene, Truth
 from sim.backend import Backend
 from sim.kinematic_scene import draw_frame, draw_scene
 from sim.navigation.routes import Route, Routes
-from sim.world_model import FLOOR, MissionRobot, WorldFile
+from sim.world_model import FLOOR, WorldFile
 
 REACH_M = 1.2
 """How far from a robot's centre its hand gets, sideways; generous, as stances here are coarse."""
@@ -101,12 +102,12 @@ class KinematicBackend(Backend):
     def __init__(
         self,
         world: WorldFile,
-        robots: tuple[MissionRobot, ...],
+        robots: Sequence[tuple[RobotSpec, PoseMRad]],
         durations: Durations | None = None,
         seed: int = 0,
         step_s: float | None = None,
     ) -> None:
-        super().__init__(world, tuple(robot.spec.robot for robot in robots))
+        super().__init__(world, tuple(spec.robot for spec, _ in robots))
         self._durations = durations or Durations()
         self._step_s = step_s
         self._routes = Routes(world)
@@ -114,13 +115,13 @@ class KinematicBackend(Backend):
         self._count = 0
         # A generator for each robot: what one draws does not depend on when others ask.
         self._robots = {
-            item.spec.robot: _Robot(
-                item.spec.robot,
-                dict(item.spec.capabilities),
-                item.start_m_rad,
-                random.Random(f"{seed}/{item.spec.robot}"),
+            spec.robot: _Robot(
+                spec.robot,
+                dict(spec.capabilities),
+                start,
+                random.Random(f"{seed}/{spec.robot}"),
             )
-            for item in robots
+            for spec, start in robots
         }
         self._things = {
             name: _Thing(

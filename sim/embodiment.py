@@ -1,0 +1,141 @@
+"""`SimEmbodiment`: drives one simulated robot, for the worker that stands behind it."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, suppress
+from types import TracebackType
+
+from keyexpr_schema.errors import NoAnswer
+from keyexpr_schema.keyspace import SIM_CLOCK, SIM_MOTION
+from keyexpr_schema.motions import Motion, MotionOutcome, MotionState, Senses
+from keyexpr_schema.robots import RobotSpec
+from keyexpr_schema.session import Session
+from keyexpr_schema.simulation import MotionCall, SimRobotAddress
+from workers.errors import BodyUnreachable
+
+POLL_S = 1.0
+"""Wall time for which one question is left open at the simulation."""
+
+SLACK_S = 1.0
+"""How much longer than `POLL_S` an answer may take."""
+
+
+class SimEmbodiment(AbstractAsyncContextManager["SimEmbodiment"]):
+    """One simulated robot, over Zenoh. Within `async with` it also follows the simulation's clock.
+
+    Every motion is a call with a name of its own: asked as often as it takes until the answer is
+    there, carried out once. `patience_s` is how long, in wall time, router or simulation may be
+    away before a method raises `BodyUnreachable`.
+    """
+
+    def __init__(
+        self, session: Session, robot: str, incarnation: str, patience_s: float = 30.0
+    ) -> None:
+        self.robot = robot
+        self._session = session
+        self._incarnation = incarnation
+        self._patience_s = patience_s
+        self._time_s = 0.0
+        self._stack = AsyncExitStack()
+
+    async def __aenter__(self) -> SimEmbodiment:
+        following = asyncio.create_task(self._follow_clock())
+        self._stack.push_async_callback(_ended, following)
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        await self._stack.aclose()
+
+    def now_s(self) -> float:
+        """Simulated seconds, as last heard."""
+        return self._time_s
+
+    async def perform(self, motion: Motion) -> MotionOutcome:
+        """Carry out `motion` once; see `workers.embodiment.Embodiment.perform`.
+
+        Raises:
+            BodyUnreachable: the simulation did not answer for `patience_s`.
+        """
+        call = self._call(motion)
+        try:
+            outcome = await self._ask(call)
+            while outcome.state is MotionState.RUNNING:
+                outcome = await self._ask(call)
+        except asyncio.CancelledError:
+            # If this does not get through, the simulation notices that nobody asks any more.
+            await asyncio.shield(self._halt(call))
+            raise
+        return outcome
+
+    async def senses(self) -> Senses:
+        """What the robot knows of itself.
+
+        Raises:
+            BodyUnreachable: the simulation did not answer for `patience_s`.
+        """
+        return (await self._ask(self._call(None))).senses
+
+    async def stop(self) -> None:
+        """Bring the robot to rest, whatever it does.
+
+        Raises:
+            BodyUnreachable: the simulation did not answer for `patience_s`.
+        """
+        await self._ask(
+            MotionCall(call=_name(), incarnation=self._incarnation, stop=True, wait_s=POLL_S)
+        )
+
+    def _call(self, motion: Motion | None) -> MotionCall:
+        return MotionCall(call=_name(), incarnation=self._incarnation, motion=motion, wait_s=POLL_S)
+
+    async def _halt(self, call: MotionCall) -> None:
+        stop = MotionCall(call=call.call, incarnation=self._incarnation, stop=True, wait_s=POLL_S)
+        with suppress(BodyUnreachable, TimeoutError):
+            async with asyncio.timeout(2 * POLL_S):
+                await self._ask(stop)
+
+    async def _ask(self, call: MotionCall) -> MotionOutcome:
+        """The answer to `call`, asked again while router or simulation are away."""
+        loop = asyncio.get_running_loop()
+        deadline_s = loop.time() + self._patience_s
+        pause_s = 0.05
+        while True:
+            try:
+                outcome: MotionOutcome = await self._session.ask(
+                    SIM_MOTION, SimRobotAddress(self.robot), call, POLL_S + SLACK_S
+                )
+            except NoAnswer as error:
+                if loop.time() + pause_s > deadline_s:
+                    raise BodyUnreachable(f"the simulation does not answer: {error}") from None
+                await asyncio.sleep(pause_s)
+                pause_s = min(1.0, 2 * pause_s)
+            else:
+                self._time_s = max(self._time_s, outcome.senses.time_s)
+                return outcome
+
+    async def _follow_clock(self) -> None:
+        async with self._session.watch(SIM_CLOCK) as watch:
+            async for change in watch:
+                if change.value is not None:
+                    self._time_s = max(self._time_s, change.value.time_s)
+
+
+def sim_embodiment(session: Session, spec: RobotSpec, incarnation: str) -> SimEmbodiment:
+    """An `EmbodimentFactory`: the simulated robot that `spec` describes."""
+    return SimEmbodiment(session, spec.robot, incarnation)
+
+
+def _name() -> str:
+    return f"c{secrets.token_hex(8)}"
+
+
+async def _ended(task: asyncio.Task[None]) -> None:
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)

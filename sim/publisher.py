@@ -1,0 +1,93 @@
+"""Tells the keys how the simulated world stands, no faster than listeners can take."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+
+from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.keyspace import (
+    SIM_CLOCK,
+    SIM_CONTACTS,
+    SIM_FRAME,
+    SIM_SCENE,
+    SIM_SENSES,
+    SIM_TRUTH,
+)
+from keyexpr_schema.session import Session
+from keyexpr_schema.simulation import SimAddress, SimClock, SimRobotAddress, TruthAddress
+from sim.backend import Backend
+
+CLOCK_WALL_S = 0.05
+SENSES_S, SENSES_WALL_S = 0.2, 0.05
+FRAME_S, FRAME_WALL_S = 0.1, 0.01
+"""Frames and senses: no more often than this in simulated time, and in wall time."""
+REPEAT_WALL_S = 1.0
+"""Everything is told again after this: a put is lost without a word while a router is away."""
+
+
+class Publisher:
+    """What of a backend goes out on which key, and how often."""
+
+    def __init__(self, session: Session, backend: Backend, speed: float | None) -> None:
+        self._session, self._backend, self._speed = session, backend, speed
+        self._clock_wall_s = self._senses_wall_s = self._frame_wall_s = -1.0
+        self._senses_s = self._frame_s = -1.0
+        self._repeat_wall_s = 0.0
+        self._truths: dict[str, tuple[object, ...]] = {}
+        self._contacts = (-1, -1)
+
+    def publish(self, robots: tuple[str, ...] = ()) -> None:
+        """Whatever is due; of `robots`, whose motion just ended, the senses in any case."""
+        now_s, wall_s = self._backend.time_s, time.monotonic()
+        repeat = wall_s - self._repeat_wall_s >= REPEAT_WALL_S
+        if repeat:
+            self._repeat_wall_s = wall_s
+        if robots or repeat or wall_s - self._clock_wall_s >= CLOCK_WALL_S:
+            self._clock_wall_s = wall_s
+            self._session.put(
+                SIM_CLOCK,
+                SimAddress(),
+                SimClock(time_s=now_s, wall_time_s=time.time(), speed=self._speed),
+            )
+        if repeat or (
+            now_s - self._senses_s >= SENSES_S and wall_s - self._senses_wall_s >= SENSES_WALL_S
+        ):
+            self._senses_s, self._senses_wall_s = now_s, wall_s
+            robots = self._backend.robots
+        for robot in robots:
+            self._session.put(SIM_SENSES, SimRobotAddress(robot), self._backend.senses(robot))
+        if repeat or (
+            now_s - self._frame_s >= FRAME_S and wall_s - self._frame_wall_s >= FRAME_WALL_S
+        ):
+            self._frame_s, self._frame_wall_s = now_s, wall_s
+            self._session.put(SIM_FRAME, SimAddress(), self._backend.frame())
+            self._judge(repeat)
+        elif robots:
+            self._judge(False)
+
+    def _judge(self, repeat: bool) -> None:
+        for truth in self._backend.truths():
+            state = (truth.place, truth.support, truth.held_by, truth.settled)
+            if repeat or self._truths.get(truth.object) != state:
+                self._truths[truth.object] = state
+                self._session.put(SIM_TRUTH, TruthAddress(truth.object), truth)
+        contacts = self._backend.contacts()
+        counts = (contacts.robot_robot, contacts.robot_wall)
+        if repeat or counts != self._contacts:
+            self._contacts = counts
+            self._session.put(SIM_CONTACTS, SimAddress(), contacts)
+
+    async def keep_scene(self) -> None:
+        """See to it that the scene is stored; again whenever a router comes back."""
+        scene = self._backend.scene()
+        while True:
+            await self._session.wait_connected()
+            generation = self._session.link.generation
+            try:
+                await self._session.confirm(SIM_SCENE, SimAddress(), scene)
+            except SchemaError:
+                continue  # no store there yet: without one there is nothing to look at, either
+            # The link tells of itself only by these fields, and half a second is soon enough.
+            while self._session.link.generation == generation:  # noqa: ASYNC110
+                await asyncio.sleep(0.5)

@@ -1,0 +1,53 @@
+"""The example of a goal from one's own program, with a real router and the real planner."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from pathlib import Path
+
+from cli.demo.bring_up import router_up
+from cli.demo.fleet import Fleet, free_endpoint
+from cli.telling import put_world
+from keyexpr_schema.session import SessionConfig, open_session
+from sim.world_file import load_world
+
+ROOT = Path(__file__).parents[2]
+
+
+async def example(*words: str) -> tuple[int, str, str]:
+    child = await asyncio.create_subprocess_exec(
+        sys.executable,
+        str(ROOT / "examples" / "own_goal.py"),
+        *words,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+    )
+    out, err = await asyncio.wait_for(child.communicate(), 60)
+    return child.returncode or 0, out.decode(), err.decode()
+
+
+async def test_a_goal_is_understood_or_refused_with_a_reason(tmp_path: Path) -> None:
+    async with Fleet(free_endpoint(), "robotfleet", tmp_path) as fleet:
+        fleet.declare("router", "router", "--listen", fleet.endpoint, "--data", str(tmp_path / "r"))
+        fleet.declare("planner", "planner", "--data", str(tmp_path / "p"), layer=1)
+        await fleet.start("router")
+        await fleet.guard(router_up(fleet))
+        await fleet.start("planner")
+        world = load_world(ROOT / "configs" / "worlds" / "home.yaml")
+        async with open_session(SessionConfig(endpoints=(fleet.endpoint,))) as session:
+            await put_world(session, world.places(), world.objects())
+        code, out, _ = await fleet.guard(
+            example("Bring the first cup to the hallway.", fleet.endpoint)
+        )
+        assert (code, out.strip()) == (0, "waiting: at(cup_1) = hallway")
+        code, out, _ = await fleet.guard(example("Bring the unicorn to me.", fleet.endpoint))
+        assert code == 1
+        assert out.startswith("rejected: ")
+
+
+async def test_without_a_router_it_says_so() -> None:
+    code, out, err = await example("Anything.", "tcp/127.0.0.1:1")
+    assert code == 1
+    assert out == ""
+    assert err.startswith("Error: no router answers at tcp/127.0.0.1:1")

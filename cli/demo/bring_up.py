@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -94,8 +95,23 @@ async def bring_up(fleet: Fleet, session: Session, board: Board, mission: Missio
             )
             for robot in mission.robots
         ),
+        *(
+            board.until(
+                partial(_knows_itself, board, robot.spec.robot),
+                READY_S,
+                f"{robot.spec.robot} to say where it is "
+                f"(log: {fleet.log(f'worker-{robot.spec.robot}')})",
+            )
+            for robot in mission.robots
+        ),
         _recording(fleet),
     )
+
+
+def _knows_itself(board: Board, robot: str) -> bool:
+    """Whether the worker has a body: a planner can do nothing with a robot that is nowhere."""
+    state = board.robots.get(robot)
+    return state is not None and state.place is not None
 
 
 async def _token(

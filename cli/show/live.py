@@ -52,43 +52,44 @@ class Ticker:
 
     def hear(self, change: Change[Any, Any]) -> None:
         """Take in a change; say it if it is worth a line and was not said."""
-        line = tell(change.value)
-        if line is None or self.silent:
+        told = tell(change.value)
+        if told is None or self.silent:
             return
+        time_s, sentence = told
         where = change.key.build(change.address)
-        if self._told.get(where) != line:
-            self._told[where] = line
-            typer.echo(line, err=self._to_stderr)
+        if self._told.get(where) != sentence:
+            self._told[where] = sentence
+            time = " " * 10 if time_s is None else f"{time_s:8.1f} s"
+            typer.echo(f"{time}  {sentence}", err=self._to_stderr)
 
 
-def tell(what: object) -> str | None:
-    """A payload as a line of what happened; `None` if it is not worth one."""
+def tell(what: object) -> tuple[float | None, str] | None:
+    """What happened, and when on the fleet's clock [s]; `None` if it is not worth a line."""
     if isinstance(what, TaskRecord):
-        reason = f": {what.reason}" if what.reason else ""
-        at = {
+        time_s = {
             TaskState.ORDERED: what.ordered_s,
             TaskState.RUNNING: what.started_s,
         }.get(what.state, what.ended_s)
-        time = f"{at:8.1f} s  " if at is not None else " " * 12
         attempt = f" (attempt {what.attempt})" if what.attempt > 1 else ""
-        doer = what.robot or what.actor
-        return (
-            f"{time}{what.plan}/{what.task} {call(what.skill, what.args, what.robot)} "
-            f"{doer}: {what.state.value}{attempt}{reason}"
+        return time_s, (
+            f"{what.plan}/{what.task} {call(what.skill, what.args, what.robot)} "
+            f"{what.robot or what.actor}: {what.state.value}{attempt}{_because(what.reason)}"
         )
     if isinstance(what, GoalStatus):
-        reason = f": {what.reason}" if what.reason else ""
-        return f"{what.time_s:8.1f} s  goal {what.goal} is {what.state.value}{reason}"
+        return what.time_s, f"goal {what.goal} is {what.state.value}{_because(what.reason)}"
     if isinstance(what, PlanStatus):
         who = ", ".join(f"{actor}→{robot}" for actor, robot in what.allocation.items())
-        reason = f": {what.reason}" if what.reason else ""
-        return (
-            f"{what.time_s:8.1f} s  plan {what.plan} revision {what.revision} is "
-            f"{what.state.value}{f' ({who})' if who else ''}{reason}"
+        return what.time_s, (
+            f"plan {what.plan} revision {what.revision} is {what.state.value}"
+            f"{f' ({who})' if who else ''}{_because(what.reason)}"
         )
     if isinstance(what, Fact):
-        return f"{what.time_s:8.1f} s  {what.relation}({what.subject}) = {value(what.value)}"
+        return what.time_s, f"{what.relation}({what.subject}) = {value(what.value)}"
     return None
+
+
+def _because(reason: str | None) -> str:
+    return f": {reason}" if reason else ""
 
 
 def picture(board: Board, only: str | None = None) -> RenderableType:

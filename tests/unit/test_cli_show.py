@@ -141,8 +141,14 @@ def test_a_change_in_a_line() -> None:
         reason="it slipped",
     )
     assert tell(record) == (
-        "    12.0 s  p1/t1 pick(object=cup_1) hsr: failed (attempt 3): it slipped"
+        12.0,
+        "p1/t1 pick(object=cup_1) hsr: failed (attempt 3): it slipped",
     )
+    assert tell(GoalStatus(goal="g", state=GoalState.REACHED, time_s=3.0)) == (
+        3.0,
+        "goal g is reached",
+    )
+    assert tell("anything else") is None
 
 
 @pytest.mark.parametrize(

@@ -55,11 +55,13 @@ class Arm:
         """Stay as it is."""
         self.goal = list(self.setpoint)
 
+    def commanded(self) -> bool:
+        """Whether the joints have been told all the way to the goal."""
+        return self.setpoint == self.goal
+
     def arrived(self) -> bool:
         """Whether goal, commands and joints agree (within 6 mm or 0.02 rad)."""
-        if any(abs(a - b) > 1e-6 for a, b in zip(self.goal, self.setpoint, strict=True)):
-            return False
-        return all(
+        return self.commanded() and all(
             abs(float(self._data.qpos[at]) - goal) < 0.02
             for at, goal in zip(self._qpos, self.goal, strict=True)
         )

@@ -67,7 +67,7 @@ def compile_world(world: WorldFile, robots: Sequence[tuple[str, RobotModel]]) ->
             # Prefixed joints of a planar base keep world axes, as its frame is the world's.
             spec.attach(child, frame=spec.worldbody.add_frame(), prefix=f"{name}/")
         except (ValueError, mujoco.FatalError) as error:
-            raise BadFile(f"{model.mjcf}: MuJoCo refuses this model: {error}") from None
+            raise BadFile(f"{model.mjcf}: MuJoCo refuses this model: {_line(error)}") from None
         for one, two in itertools.combinations(bodies, 2):
             # A robot's controllers keep it out of its own way.
             spec.add_exclude(bodyname1=f"{name}/{one}", bodyname2=f"{name}/{two}")
@@ -76,7 +76,7 @@ def compile_world(world: WorldFile, robots: Sequence[tuple[str, RobotModel]]) ->
     try:
         return spec.compile()
     except ValueError as error:
-        raise BadFile(f"MuJoCo refuses the world {world.world!r}: {error}") from None
+        raise BadFile(f"MuJoCo refuses the world {world.world!r}: {_line(error)}") from None
 
 
 def yaw_quaternion(yaw_rad: float) -> tuple[float, float, float, float]:
@@ -192,3 +192,7 @@ def _shape(kind: ObjectKind) -> tuple[Any, tuple[float, float, float]]:
     if kind.shape == "cylinder":
         return mujoco.mjtGeom.mjGEOM_CYLINDER, (length / 2, height / 2, 0.0)
     return mujoco.mjtGeom.mjGEOM_SPHERE, (length / 2, 0.0, 0.0)
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())

@@ -122,6 +122,11 @@ class MujocoBackend(Backend):
         """Every counted touch: (time in s, robot, what it touched)."""
         return tuple(self._collisions.log)
 
+    def phase(self, robot: str) -> str | None:
+        """What the robot's running motion is at ("lowering the hand"), for people who watch."""
+        run = self._runs.get(robot)
+        return run.act.phase if run is not None and run.ended is None else None
+
     def scene(self) -> Scene:
         """The shapes of everything."""
         return self._scene

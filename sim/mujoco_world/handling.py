@@ -109,7 +109,15 @@ def release(stage: Stage, act: Act, motion: Motion) -> Steps:
     yield from face(act, point[0], point[1])
     _check_free(stage, robot, held, point)
     target = (point[0], point[1], point[2] + robot.grip_above_base_m + RELEASE_LIFT_M)
-    yield from let_down(act, reach_down(arm, target, None), held, RELEASE_OPENING_M)
+    path = reach_down(arm, target, None)
+    yield from move_arm(act, path.above, "moving the hand above the point", slower=1.5)
+    try:
+        # folded, the arm hid from the camera what is straight ahead
+        _check_free(stage, robot, held, point)
+        yield from let_down(act, path, held, RELEASE_OPENING_M)
+    except CannotDo:
+        yield from stow(act)
+        raise
     return Ending()
 
 

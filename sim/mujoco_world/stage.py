@@ -24,6 +24,10 @@ FACING_RAD = 0.006
 """5 mm off at an arm's length; the fingers open wider than that."""
 
 
+BLOCKED_S = 2.5
+"""An arm that is not where it was told to be this long after is held up by something."""
+
+
 class CannotDo(Exception):
     """A motion fails. The message is one sentence for a person."""
 
@@ -87,14 +91,22 @@ def face(act: Act, x_m: float, y_m: float) -> Step:
 
 
 def move_arm(act: Act, goal: list[float], phase: str, slower: float = 1.0) -> Step:
-    """Move the joints to `goal`, all arriving together."""
+    """Move the joints to `goal`, all arriving together.
+
+    Raises:
+        CannotDo: something holds the arm up.
+    """
     arm = act.robot.arm
     assert arm is not None
     act.phase = phase
     arm.goal = list(goal)
     arm.slowness = slower
+    overdue = 0.0
     while not arm.arrived():
         yield
+        overdue = overdue + PERIOD_S if arm.commanded() else 0.0
+        if overdue > BLOCKED_S:
+            raise CannotDo(f"something blocks the arm while {phase}")
     arm.slowness = 1.0
 
 

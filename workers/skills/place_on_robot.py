@@ -34,8 +34,8 @@ async def place_on_robot(ctx: SkillContext, object: str, carrier: str, place: st
             retryable=False,
         )
     await ctx.be_in(place)
-    point = await _stand_beside(ctx, carrier, place)
-    await ctx.do(MotionKind.RELEASE_IN_BASKET, object=object, robot=carrier, point_m=point)
+    await _stand_beside(ctx, carrier, place)
+    await ctx.do(MotionKind.RELEASE_IN_BASKET, object=object, robot=carrier)
     still = await ctx.holding()
     await ctx.do(MotionKind.STOW)
     if still == object:
@@ -45,13 +45,13 @@ async def place_on_robot(ctx: SkillContext, object: str, carrier: str, place: st
     ctx.learn("at", object, carrier)
 
 
-async def _stand_beside(ctx: SkillContext, carrier: str, place: str) -> PointM:
-    """Stand where the hand reaches over the carrier; the point where it stands."""
+async def _stand_beside(ctx: SkillContext, carrier: str, place: str) -> None:
+    """Stand where the hand reaches over the carrier."""
     for _ in range(MOST_APPROACHES):
         point = await _stands_at(ctx, carrier, place)
         await ctx.do(MotionKind.APPROACH, robot=carrier, point_m=point)
         if dist(point, await _stands_at(ctx, carrier, place)) <= STOOD_STILL_M:
-            return point
+            return
         ctx.log(f"{carrier} has moved: goes after it")
     raise SkillFailed(f"{carrier} does not stand still in {place}")
 

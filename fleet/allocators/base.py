@@ -6,10 +6,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from fleet.core.checker import CheckedPlan, check_plan, eligible
-from fleet.core.schedule import Schedule, actors_of, best_schedule
+from fleet.core.binding import able_robots, actors_apart, task_counts
+from fleet.core.checker import CheckedPlan, check_plan
+from fleet.core.schedule import Schedule, best_schedule
 from fleet.core.world_model import WorldModel
-from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.plans import Plan, Violation
 
 
@@ -33,7 +33,7 @@ class AllocationProblem:
     """What an allocator chooses from.
 
     `able` lists the robots that can be each actor. `load` counts each actor's tasks. `apart` holds
-    pairs of actors that meet in one task and so must be different robots.
+    pairs of actors that must be different robots.
     """
 
     plan: Plan
@@ -81,16 +81,11 @@ def _refused(sentence: str) -> NotAllocated:
 
 
 def _problem(plan: Plan, world: WorldModel, checked: CheckedPlan) -> AllocationProblem:
-    able: dict[str, tuple[str, ...]] = {}
-    for actor in actors_of(plan):
-        robots, _ = eligible(checked.requirements[ACTOR_PREFIX + actor], world)
-        able[actor] = tuple(robots)
-    load = dict.fromkeys(able, 0)
-    apart: set[tuple[str, str]] = set()
-    for action in checked.actions.values():
-        actors = [name.removeprefix(ACTOR_PREFIX) for name in action.participants]
-        load[actors[0]] += 1
-        for number, one in enumerate(actors):
-            for other in actors[number + 1 :]:
-                apart.add((min(one, other), max(one, other)))
-    return AllocationProblem(plan, world, checked, able, load, frozenset(apart))
+    return AllocationProblem(
+        plan=plan,
+        world=world,
+        checked=checked,
+        able=able_robots(plan, checked, world),
+        load=task_counts(plan),
+        apart=actors_apart(plan, checked),
+    )

@@ -23,11 +23,11 @@ class MilpAllocator(Allocator):
 
         model = pulp.LpProblem("allocation", pulp.LpMinimize)
         chosen = {
-            (actor, robot): pulp.LpVariable(f"x_{i}_{j}", cat="Binary")
+            (actor, robot): model.add_variable(f"x_{i}_{j}", cat="Binary")
             for i, (actor, robots) in enumerate(problem.able.items())
             for j, robot in enumerate(robots)
         }
-        top = pulp.LpVariable("top", lowBound=0)
+        top = model.add_variable("top", lowBound=0)
         travel_s = {(actor, robot): _approach_s(problem, actor, robot) for actor, robot in chosen}
         scale = 1.0 + sum(travel_s.values())  # the tie-break never outweighs one task
         model += top + pulp.lpSum(travel_s[k] / scale * x for k, x in chosen.items())
@@ -41,7 +41,9 @@ class MilpAllocator(Allocator):
             for robot in problem.able[one]:
                 if (other, robot) in chosen:
                     model += chosen[one, robot] + chosen[other, robot] <= 1
-        model.solve(pulp.PULP_CBC_CMD(msg=False, timeLimit=TIME_LIMIT_S))
+        # The CBC that lies in PuLP's wheel; `pulp[cbc]` would add 600 MB for the same solver.
+        cbc = pulp.PULP_CBC_CMD.pulp_cbc_path
+        model.solve(pulp.COIN_CMD(path=cbc, msg=False, timeLimit=TIME_LIMIT_S))
         if model.sol_status not in (
             pulp.LpSolutionOptimal,
             pulp.LpSolutionIntegerFeasible,

@@ -457,6 +457,10 @@ class _Flow:
                     if not any(self._graph.precedes(writer, other) for other, _ in rows)
                 ]
             )
+        for actor, robot in self._plan.pins.items():
+            for variable in self._writers:
+                if variable.subject == ACTOR_PREFIX + actor:
+                    final[Variable(variable.relation, robot)] = final[variable]
         return final
 
 

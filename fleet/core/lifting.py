@@ -14,19 +14,26 @@ from keyexpr_schema.plans import Task
 
 @dataclass(frozen=True)
 class Strand:
-    """Consecutive actions for one goal; each robot in it becomes an actor of its own."""
+    """Consecutive actions for one goal; each robot in it becomes an actor of its own.
+
+    `named` are robots that the goal itself speaks of: their actors are pinned to them.
+    """
 
     goal: str
     actions: tuple[Action, ...]
+    named: frozenset[str] = frozenset()
 
 
-def tasks_from(strands: Sequence[Strand], first_task: int = 1) -> tuple[Task, ...]:
-    """Tasks that do what the strands do, one after the other, with only the order that matters.
+def tasks_from(
+    strands: Sequence[Strand], first_task: int = 1
+) -> tuple[tuple[Task, ...], dict[str, str]]:
+    """Tasks that do what the strands do, with only the order that matters, and pinned actors.
 
     A task waits for the last one before it that wrote what it reads, for those that read what it
     overwrites, and for its robots' earlier tasks in the same strand (deordering by causal links).
     """
     rows: list[tuple[str, str, Action]] = []
+    pins: dict[str, str] = {}
     actor_count = 0
     for strand in strands:
         actors: dict[str, str] = {}
@@ -36,15 +43,17 @@ def tasks_from(strands: Sequence[Strand], first_task: int = 1) -> tuple[Task, ..
                 robot = args[parameter]
                 if robot not in actors:
                     actor_count += 1
-                    actors[robot] = (
-                        f"a{first_task}-{actor_count}" if first_task > 1 else (f"a{actor_count}")
-                    )
+                    # Names stay unique over the revisions of a plan, as the task numbers do.
+                    revision = f"{first_task}-" if first_task > 1 else ""
+                    actors[robot] = f"a{revision}{actor_count}"
+                    if robot in strand.named:
+                        pins[actors[robot]] = robot
                 args[parameter] = ACTOR_PREFIX + actors[robot]
             lifted = action.skill.ground(args)
             rows.append((f"t{first_task + len(rows)}", strand.goal, lifted))
     after = _dependencies([(name, action) for name, _, action in rows])
     reduced = TaskGraph(after).reduced()
-    return tuple(
+    tasks = tuple(
         Task(
             task=name,
             skill=action.skill.name,
@@ -56,6 +65,7 @@ def tasks_from(strands: Sequence[Strand], first_task: int = 1) -> tuple[Task, ..
         )
         for name, goal, action in rows
     )
+    return tasks, pins
 
 
 def _dependencies(rows: Sequence[tuple[str, Action]]) -> dict[str, set[str]]:

@@ -11,15 +11,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from fleet.core.checker import check_plan, eligible
+from fleet.core.binding import least_loaded
+from fleet.core.checker import check_plan
 from fleet.core.lifting import Strand, tasks_from
-from fleet.core.schedule import actors_of, best_schedule, predicted_duration_s
+from fleet.core.schedule import best_schedule, predicted_duration_s
 from fleet.core.skills import Action, Variable
 from fleet.core.world_model import WorldModel
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.search import Facts, cheapest, ground_actions
 from keyexpr_schema.goals import Condition
-from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.plans import Plan
 from keyexpr_schema.world import NOTHING, Value
 
@@ -109,7 +109,7 @@ def _strands(aim: _Aim, facts: Facts, world: WorldModel) -> tuple[list[Strand], 
             break
         if after is None:
             after = found.facts
-        strand = Strand(aim.goal, found.actions)
+        strand = Strand(aim.goal, found.actions, frozenset({subject} & world.robots.keys()))
         if strand not in strands:
             strands.append(strand)
         for action in found.actions:
@@ -195,22 +195,9 @@ def _evaluate(plan: Plan, world: WorldModel) -> tuple[float, float] | NoPlan:
     checked = check_plan(plan, world)
     if not checked.valid:
         return NoPlan(checked.violations[0].sentence, checked.violations)
-    load = dict.fromkeys(world.team, 0)
-    allocation: dict[str, str] = {}
-    for actor in actors_of(plan):
-        able, reasons = eligible(checked.requirements[ACTOR_PREFIX + actor], world)
-        taken = {
-            allocation.get(name.removeprefix(ACTOR_PREFIX))
-            for action in checked.actions.values()
-            if ACTOR_PREFIX + actor in action.participants
-            for name in action.participants
-        }
-        free = [robot for robot in able if robot not in taken]
-        if not free:
-            return NoPlan("; ".join(reasons) or f"no robot is left for actor {actor}")
-        robot = min(free, key=lambda name: load[name])
-        allocation[actor] = robot
-        load[robot] += sum(task.actor == actor for task in plan.tasks)
+    allocation = least_loaded(plan, checked, world)
+    if allocation is None:
+        return NoPlan("there are fewer robots than the plan needs at the same time")
     found = best_schedule(plan, checked, allocation, world)
     if found is None:
         return NoPlan("robots would wait for each other for ever")
@@ -221,12 +208,14 @@ def _evaluate(plan: Plan, world: WorldModel) -> tuple[float, float] | NoPlan:
 
 
 def _plan(problem: PlanningProblem, strands: Sequence[Strand]) -> Plan:
+    tasks, pins = tasks_from(strands, problem.first_task)
     return Plan(
         plan=problem.plan,
         revision=problem.revision,
         goals=tuple(goal.goal for goal in problem.goals),
         conditions=tuple(c for goal in problem.goals for c in goal.conditions),
-        tasks=tasks_from(strands, problem.first_task),
+        tasks=tasks,
+        pins=pins,
         strategy=problem.strategy,
         made_by="symbolic",
         allocator=problem.allocator,

@@ -6,6 +6,7 @@ import asyncio
 import signal
 import socket
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 
 from fleet.stores.errors import StoreError
@@ -15,11 +16,12 @@ from keyexpr_schema.router import CannotListen, run_router
 FREE_PORT = ":0"
 
 
-def run(listen: tuple[str, ...], connect: tuple[str, ...], data_dir: Path) -> None:
+def run(listen: tuple[str, ...], connect: tuple[str, ...], data_dir: Path | None) -> None:
     """Be a router until SIGTERM or SIGINT; prints one line once it listens.
 
     `listen` and `connect` are Zenoh endpoints such as `tcp/127.0.0.1:7447`; port 0 takes a free
-    one. `connect` names routers on other hosts. The store lies in `data_dir`.
+    one. `connect` names routers on other hosts. The store lies in `data_dir`; None: a router without
+    a store, for the other hosts of a fleet whose store is elsewhere.
 
     Raises:
         SystemExit: with 1 and one sentence on stderr, when it cannot start.
@@ -31,12 +33,12 @@ def run(listen: tuple[str, ...], connect: tuple[str, ...], data_dir: Path) -> No
         raise SystemExit(1) from None
 
 
-async def _run(listen: tuple[str, ...], connect: tuple[str, ...], data_dir: Path) -> None:
+async def _run(listen: tuple[str, ...], connect: tuple[str, ...], data_dir: Path | None) -> None:
     loop = asyncio.get_running_loop()
     ended = asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, ended.set)
-    with SqliteStore(data_dir) as store:
+    with SqliteStore(data_dir) if data_dir is not None else nullcontext() as store:
         async with run_router(listen, connect, store):
             print(f"router listening on {', '.join(listen)}", flush=True)  # noqa: T201
             await ended.wait()

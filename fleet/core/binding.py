@@ -1,0 +1,80 @@
+"""Which actors cannot be the same robot, and a quick binding of actors to robots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from fleet.core.checker import CheckedPlan, eligible
+from fleet.core.schedule import actors_of
+from fleet.core.world_model import WorldModel
+from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.plans import Plan
+
+Pair = tuple[str, str]
+
+
+def actors_apart(plan: Plan, checked: CheckedPlan) -> frozenset[Pair]:
+    """Pairs of actors that must be different robots, each pair in order of name.
+
+    Those that meet in one task; and those that both still have a load when the plan is done: a
+    robot on its way to a second delivery would carry the first one off.
+    """
+    apart: set[Pair] = set()
+    last_holder: dict[str, str] = {}
+    for task in checked.graph.order if checked.graph else ():
+        action = checked.actions[task]
+        actors = sorted(name.removeprefix(ACTOR_PREFIX) for name in action.participants)
+        apart.update((a, b) for i, a in enumerate(actors) for b in actors[i + 1 :])
+        for literal in action.after:
+            if literal.variable.relation == "at" and isinstance(literal.value, str):
+                last_holder[literal.variable.subject] = literal.value
+    loaded = sorted(
+        {
+            holder.removeprefix(ACTOR_PREFIX)
+            for holder in last_holder.values()
+            if holder.startswith(ACTOR_PREFIX)
+        }
+    )
+    apart.update((a, b) for i, a in enumerate(loaded) for b in loaded[i + 1 :])
+    return frozenset(apart)
+
+
+def able_robots(plan: Plan, checked: CheckedPlan, world: WorldModel) -> dict[str, tuple[str, ...]]:
+    """The robots of the team that can be each actor."""
+    return {
+        actor: tuple(eligible(checked.requirements[ACTOR_PREFIX + actor], world)[0])
+        for actor in actors_of(plan)
+    }
+
+
+def task_counts(plan: Plan) -> dict[str, int]:
+    """The number of tasks of each actor."""
+    counts = dict.fromkeys(actors_of(plan), 0)
+    for task in plan.tasks:
+        counts[task.actor] += 1
+    return counts
+
+
+def least_loaded(plan: Plan, checked: CheckedPlan, world: WorldModel) -> Mapping[str, str] | None:
+    """Each actor in turn to the able robot with the fewest tasks so far; `None` if one is left.
+
+    Actors with the fewest choices come first.
+    """
+    able = able_robots(plan, checked, world)
+    apart = actors_apart(plan, checked)
+    counts = task_counts(plan)
+    load = dict.fromkeys(world.team, 0)
+    allocation: dict[str, str] = {}
+    for actor in sorted(able, key=lambda name: len(able[name])):
+        taken = {
+            allocation.get(two if one == actor else one)
+            for one, two in apart
+            if actor in (one, two)
+        }
+        free = [robot for robot in able[actor] if robot not in taken]
+        if not free:
+            return None
+        robot = min(free, key=lambda name: load[name])
+        allocation[actor] = robot
+        load[robot] += counts[actor]
+    return allocation

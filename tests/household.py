@@ -1,0 +1,81 @@
+"""A small household for tests of the planner's pure parts: three rooms, cups, two kinds of robots."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fleet.core.skills import SkillModel
+from fleet.core.world_model import WorldModel
+from fleet.service.composition import load_skills
+from keyexpr_schema.goals import Condition, Goal
+from keyexpr_schema.robots import RobotSpec
+from keyexpr_schema.world import Fact, Object, Place
+
+SKILLS: dict[str, SkillModel] = load_skills(
+    Path(__file__).parents[1] / "configs" / "skills" / "household.yaml"
+)
+_TRAVEL_M = {
+    "kitchen": {"hallway": 4.0, "living_room": 7.0},
+    "hallway": {"kitchen": 4.0, "living_room": 4.0},
+    "living_room": {"kitchen": 7.0, "hallway": 4.0},
+}
+PLACES = tuple(
+    Place(place=name, label=name.replace("_", " "), travel_m=travel)
+    for name, travel in _TRAVEL_M.items()
+)
+
+
+def cup(number: int, mass_kg: float = 0.15) -> Object:
+    return Object(
+        object=f"cup_{number}", kind="cup", label=f"cup {number}", ordinal=number, mass_kg=mass_kg
+    )
+
+
+def manipulator(name: str = "hsr", grip_kg: float = 1.2) -> RobotSpec:
+    return RobotSpec(
+        robot=name,
+        model="hsr",
+        skills=("navigate", "search", "pick", "place", "place_on_robot"),
+        capabilities={"drive": 0.6, "see": 4.0, "grip": grip_kg},
+    )
+
+
+def carrier(name: str = "locobot", basket: float = 2.0) -> RobotSpec:
+    return RobotSpec(
+        robot=name,
+        model="locobot",
+        skills=("navigate", "search"),
+        capabilities={"drive": 0.6, "see": 4.0, "basket": basket},
+    )
+
+
+def fact(subject: str, relation: str, value: str | None, source: str = "test") -> Fact:
+    return Fact(subject=subject, relation=relation, value=value, source=source)
+
+
+def at(subject: str, place: str) -> Condition:
+    return Condition(relation="at", subject=subject, value=place)
+
+
+def bring(number: int, place: str, **more: int) -> Goal:
+    return Goal(
+        goal=f"g{number}",
+        text=f"Bring cup {number} to the {place}",
+        conditions=(at(f"cup_{number}", place),),
+        ordinal=number,
+        **more,
+    )
+
+
+def home(
+    robots: tuple[RobotSpec, ...] = (manipulator(), carrier()),
+    cups: int = 2,
+    facts: tuple[Fact, ...] = (),
+) -> WorldModel:
+    """Cups in the kitchen, empty hands, robots that are nobody knows where."""
+    known = (
+        *(fact(f"cup_{n}", "at", "kitchen") for n in range(1, cups + 1)),
+        *(fact(r.robot, "holding", "nothing") for r in robots if "grip" in r.capabilities),
+        *facts,
+    )
+    return WorldModel.of(SKILLS, PLACES, tuple(cup(n) for n in range(1, cups + 1)), robots, known)

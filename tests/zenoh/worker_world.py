@@ -97,20 +97,11 @@ class BackendBody:
         return self._world.backend.time_s
 
 
-class Fleet:
-    """The planner's side of the keys, and as many workers as a test starts."""
+class Planner:
+    """The planner's side of the keys."""
 
-    def __init__(
-        self,
-        config: Callable[..., SessionConfig],
-        session: Session,
-        mission: Mission,
-        world: LiveWorld,
-        data_dir: Path,
-    ) -> None:
-        self.session, self.mission, self.world = session, mission, world
-        self._config = config
-        self._data_dir = data_dir
+    def __init__(self, session: Session, mission: Mission) -> None:
+        self.session, self.mission = session, mission
 
     async def register(self) -> None:
         """Put places, objects and robots on their keys."""
@@ -120,36 +111,6 @@ class Fleet:
             await self.session.confirm(OBJECT, ObjectAddress(thing.object), thing)
         for robot in self.mission.robots:
             await self.session.confirm(ROBOT_SPEC, RobotAddress(robot.spec.robot), robot.spec)
-
-    @asynccontextmanager
-    async def worker(
-        self, robot: str, *more: Skill, skills: tuple[str, ...] = ()
-    ) -> AsyncIterator[Worker]:
-        """A worker that is ready; the block's end cancels it."""
-        spec = next(r.spec for r in self.mission.robots if r.spec.robot == robot)
-        spec = replace(spec, skills=(*spec.skills, *skills))
-        async with AsyncExitStack() as stack:
-            journal = stack.enter_context(Journal(self._data_dir / f"{robot}.journal"))
-            session = await stack.enter_async_context(
-                open_session(self._config(component=f"worker-{robot}"))
-            )
-            body = BackendBody(self.world, robot)
-            registry = SkillRegistry([*HOUSEHOLD, *more])
-            worker = Worker(session, spec, body, journal, registry, f"{robot}-1")
-            running = asyncio.create_task(worker.run())
-            ready = asyncio.create_task(worker.ready())
-            try:
-                async with asyncio.timeout(DEADLINE_S):
-                    await asyncio.wait({running, ready}, return_when=asyncio.FIRST_COMPLETED)
-                if running.done():
-                    await running
-                yield worker
-            finally:
-                ready.cancel()
-                running.cancel()
-                (ended,) = await asyncio.gather(running, return_exceptions=True)
-                if not isinstance(ended, asyncio.CancelledError):
-                    raise RuntimeError("the worker ended by itself") from ended
 
     async def order(
         self,
@@ -202,6 +163,53 @@ class Fleet:
     async def fact(self, relation: str, subject: str) -> Fact | None:
         """A fact as it is stored now."""
         return await self.session.get(FACT, FactAddress(subject, relation))
+
+
+class Fleet(Planner):
+    """The planner's side of the keys, and as many workers as a test starts."""
+
+    def __init__(
+        self,
+        config: Callable[..., SessionConfig],
+        session: Session,
+        mission: Mission,
+        world: LiveWorld,
+        data_dir: Path,
+    ) -> None:
+        super().__init__(session, mission)
+        self.world = world
+        self._config = config
+        self._data_dir = data_dir
+
+    @asynccontextmanager
+    async def worker(
+        self, robot: str, *more: Skill, skills: tuple[str, ...] = ()
+    ) -> AsyncIterator[Worker]:
+        """A worker that is ready; the block's end cancels it."""
+        spec = next(r.spec for r in self.mission.robots if r.spec.robot == robot)
+        spec = replace(spec, skills=(*spec.skills, *skills))
+        async with AsyncExitStack() as stack:
+            journal = stack.enter_context(Journal(self._data_dir / f"{robot}.journal"))
+            session = await stack.enter_async_context(
+                open_session(self._config(component=f"worker-{robot}"))
+            )
+            body = BackendBody(self.world, robot)
+            registry = SkillRegistry([*HOUSEHOLD, *more])
+            worker = Worker(session, spec, body, journal, registry, f"{robot}-1")
+            running = asyncio.create_task(worker.run())
+            ready = asyncio.create_task(worker.ready())
+            try:
+                async with asyncio.timeout(DEADLINE_S):
+                    await asyncio.wait({running, ready}, return_when=asyncio.FIRST_COMPLETED)
+                if running.done():
+                    await running
+                yield worker
+            finally:
+                ready.cancel()
+                running.cancel()
+                (ended,) = await asyncio.gather(running, return_exceptions=True)
+                if not isinstance(ended, asyncio.CancelledError):
+                    raise RuntimeError("the worker ended by itself") from ended
 
 
 @asynccontextmanager

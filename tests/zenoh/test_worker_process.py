@@ -1,0 +1,182 @@
+"""Workers as processes before a simulated world in a process of its own: kill -9 and after."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import RouterProcess
+from worker_world import DEADLINE_S, Planner
+
+from keyexpr_schema.keyspace import ROBOT_STATE
+from keyexpr_schema.robots import RobotActivity
+from keyexpr_schema.session import SessionConfig, open_session
+from keyexpr_schema.tasks import ReportState
+from keyexpr_schema.world import NOTHING
+from sim.world_file import load_mission
+
+SIM = """
+import sys
+from sim.process import run
+endpoint, speed = sys.argv[1], float(sys.argv[2])
+run("two-cups", (endpoint,), backend="kinematic", speed=speed)
+"""
+WORKER = """
+import sys
+from pathlib import Path
+from sim.embodiment import sim_embodiment
+from workers.errors import WorkerError
+from workers.process import run
+endpoint, robot, data = sys.argv[1:]
+try:
+    run(robot, (endpoint,), "robotfleet", Path(data), sim_embodiment)
+except WorkerError as error:
+    sys.exit(f"robotctl: {error}")
+"""
+
+
+class Processes:
+    """Starts the processes of a test, and ends every one of them."""
+
+    def __init__(self, router: RouterProcess, data_dir: Path) -> None:
+        self.endpoint, self.data_dir = router.endpoint, data_dir
+        self._all: list[subprocess.Popen[str]] = []
+
+    def start(self, program: str, *args: str) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            [sys.executable, "-c", program, self.endpoint, *args],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self._all.append(process)
+        return process
+
+    def sim(self, speed: float) -> subprocess.Popen[str]:
+        process = self.start(SIM, str(speed))
+        assert process.stdout is not None
+        assert "running" in process.stdout.readline()
+        return process
+
+    def worker(self, robot: str = "hsr") -> subprocess.Popen[str]:
+        return self.start(WORKER, robot, str(self.data_dir))
+
+    def end(self) -> None:
+        for process in self._all:
+            process.kill()
+            process.communicate(timeout=10)
+
+
+@pytest.fixture
+def processes(router: RouterProcess, tmp_path: Path) -> Iterator[Processes]:
+    started = Processes(router, tmp_path / "workers")
+    try:
+        yield started
+    finally:
+        started.end()
+
+
+async def line(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    async with asyncio.timeout(DEADLINE_S):
+        return (await asyncio.to_thread(process.stdout.readline)).strip()
+
+
+async def ready(process: subprocess.Popen[str], robot: str = "hsr") -> str:
+    """Waits for the line that says that a worker is ready; its incarnation."""
+    said = await line(process)
+    assert said.startswith(f"worker {robot} ready (incarnation {robot}-"), said
+    return said.removeprefix(f"worker {robot} ready (incarnation ").removesuffix(")")
+
+
+def said(facts: Any) -> dict[tuple[str, str], object]:
+    return {(f.relation, f.subject): f.value for f in facts}
+
+
+async def test_a_worker_killed_with_a_cup_in_its_hand_tells_so_and_begins_nothing_again(
+    processes: Processes, session_config: Callable[..., SessionConfig]
+) -> None:
+    processes.sim(speed=4.0)
+    async with open_session(session_config(component="test")) as session:
+        planner = Planner(session, load_mission("two-cups"))
+        await planner.register()
+        first = processes.worker()
+        killed = await ready(first)
+        order = await planner.order("hsr", "t1", "pick", object="cup_1", place="kitchen")
+        assert (await planner.report(order)).state is ReportState.SUCCEEDED
+        order = await planner.order("hsr", "t2", "place", object="cup_1", place="living_room")
+        started = await planner.report(order, ReportState.STARTED)
+        assert started.incarnation == killed
+        async with session.watch((ROBOT_STATE, {"robot": "hsr"})) as watch:
+            async for change in watch:
+                if change.value is not None and change.value.place == "hallway":
+                    break  # in the middle of the drive
+        first.kill()
+        second = processes.worker()
+        incarnation = await ready(second)
+        report = await planner.report(order)
+        assert report.state is ReportState.INTERRUPTED and report.incarnation == incarnation
+        assert report.retryable and report.tries == ()
+        told = said(report.facts)
+        assert told["holding", "hsr"] == "cup_1" and told["at", "cup_1"] == "hsr"
+        where = told["at", "hsr"]
+        held = await planner.fact("holding", "hsr")
+        assert held is not None and held.value == "cup_1"
+        # The order still stands on its key; the robot stays where it is until it is told more.
+        async with session.watch((ROBOT_STATE, {"robot": "hsr"})) as watch:
+            async for change in watch:
+                assert change.value is None or change.value.task is None
+                if change.value is not None and change.value.activity is RobotActivity.IDLE:
+                    assert (change.value.place, change.value.holding) == (where, "cup_1")
+                    break
+        again = await planner.order(
+            "hsr", "t2", "place", attempt=2, object="cup_1", place="living_room"
+        )
+        done = await planner.report(again)
+        assert done.state is ReportState.SUCCEEDED, done.reason
+        assert said(done.facts)["holding", "hsr"] == NOTHING
+        first_attempt = await planner.report(order)
+        assert first_attempt == report, "the first attempt was reported on again"
+
+
+async def test_a_worker_waits_for_its_robot_and_ends_cleanly_when_told(
+    processes: Processes, session_config: Callable[..., SessionConfig]
+) -> None:
+    processes.sim(speed=4.0)
+    worker = processes.worker()
+    assert await line(worker) == "worker hsr waits: the robot is not registered yet"
+    async with open_session(session_config(component="test")) as session:
+        planner = Planner(session, load_mission("two-cups"))
+        await planner.register()
+        await ready(worker)
+        order = await planner.order("hsr", "t1", "navigate", to="kitchen")
+        await planner.report(order, ReportState.STARTED)
+        worker.send_signal(signal.SIGTERM)
+        report = await planner.report(order)
+        assert report.state is ReportState.INTERRUPTED
+        assert report.reason == "the worker of hsr was stopped while it did this"
+        _, errors = await asyncio.to_thread(worker.communicate, timeout=DEADLINE_S)
+        assert worker.returncode == 0, errors
+        assert "Traceback" not in errors
+
+
+async def test_a_second_worker_for_a_robot_is_turned_away(
+    processes: Processes, session_config: Callable[..., SessionConfig]
+) -> None:
+    processes.sim(speed=4.0)
+    async with open_session(session_config(component="test")) as session:
+        await Planner(session, load_mission("two-cups")).register()
+        first = processes.worker("locobot")
+        await ready(first, "locobot")
+        second = processes.worker("locobot")
+        _, errors = await asyncio.to_thread(second.communicate, timeout=DEADLINE_S)
+        assert second.returncode == 1
+        assert "another worker runs for this robot with the same data directory" in errors
+        assert "Traceback" not in errors
+        assert first.poll() is None

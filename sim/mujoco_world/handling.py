@@ -78,22 +78,37 @@ def grasp(stage: Stage, act: Act, motion: Motion) -> Steps:
     grip_m = _grip_above_base(gripper, stage.observer.height_m(name))
     target = (point[0], point[1], point[2] + grip_m)
     path = reach_down(arm, target, stage.observer.opening_rad(name))
+    robot.grip_above_base_m = grip_m
+    try:
+        yield from _take(act, path, name)
+    except CannotDo:
+        robot.let_go()
+        gripper.open()
+        yield from stow(act)
+        raise
+    return Ending()
+
+
+def _take(act: Act, path: Reach, name: str) -> Step:
+    """Come down around the object, close on it, lift it.
+
+    Raises:
+        CannotDo: it is not in the hand in the end.
+    """
+    robot = act.robot
+    _, gripper = hand_of(robot)
     gripper.open()
     yield from move_arm(act, path.above, "moving the hand above the object")
     yield from move_arm(act, path.at, "lowering the hand", slower=1.5)
-    robot.reaching_for, robot.grip_above_base_m = name, grip_m
+    robot.reaching_for = name
     yield from _close(act, gripper, name)
     yield from move_arm(act, path.above, f"lifting {name}", slower=2.0)
     yield from wait(SETTLE_S)
     if not (robot.holds(name) and gripper.feels()):
-        robot.let_go()
-        gripper.open()
-        yield from stow(act)
         raise CannotDo(f"{name} slipped out of the hand while it was lifted")
     yield from stow(act)
     if not robot.holds(name):
         raise CannotDo(f"{name} slipped out of the hand while the arm was folded")
-    return Ending()
 
 
 def release(stage: Stage, act: Act, motion: Motion) -> Steps:
@@ -110,8 +125,8 @@ def release(stage: Stage, act: Act, motion: Motion) -> Steps:
     _check_free(stage, robot, held, point)
     target = (point[0], point[1], point[2] + robot.grip_above_base_m + RELEASE_LIFT_M)
     path = reach_down(arm, target, None)
-    yield from move_arm(act, path.above, "moving the hand above the point", slower=1.5)
     try:
+        yield from move_arm(act, path.above, "moving the hand above the point", slower=1.5)
         # folded, the arm hid from the camera what is straight ahead
         _check_free(stage, robot, held, point)
         yield from let_down(act, path, held, RELEASE_OPENING_M)
@@ -135,6 +150,7 @@ def let_down(act: Act, path: Reach, held: str, opening_m: float) -> Step:
     gripper.open(gripper.opening_m() + opening_m)
     yield from wait(0.6)
     if gripper.feels():
+        robot.reaching_for = held
         raise CannotDo(f"the hand is open and {held} still sticks to it")
     yield from move_arm(act, path.above, "withdrawing the hand", slower=1.5)
     yield from stow(act)
@@ -227,9 +243,6 @@ def _close(act: Act, gripper: Gripper, name: str) -> Step:
         waited += PERIOD_S
         felt = felt + PERIOD_S if gripper.feels() else 0.0
         if waited > CLOSE_TIMEOUT_S:
-            act.robot.let_go()
-            gripper.open()
-            yield from stow(act)
             raise CannotDo(f"the hand closed on nothing: {name} is not between the fingers")
 
 

@@ -15,11 +15,14 @@ from keyexpr_schema.world import Fact, Value
 
 
 def goal_told(state: State, event: events.GoalTold) -> State:
-    """Keep the goal and say what it is understood to mean; a goal that has ended begins anew."""
+    """Keep the goal and say what it is understood to mean; a changed goal begins anew."""
     goal = event.goal
     if state.goals.get(goal.goal) == goal:
         return state
+    remembered = goal.goal not in state.goals and goal.goal in state.goal_states
     state = replace(state, goals=put(state.goals, goal.goal, goal))
+    if remembered:
+        return state  # it ended under an earlier planner
     return set_goal(state, _understand(state, goal))
 
 

@@ -1,0 +1,215 @@
+"""A model of everything outside the planner's core, for tests of its laws: robots that carry out
+orders, fail, crash and come back, and a desk that plans. No key, no clock, no process.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fleet.core import events
+from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
+from fleet.core.events import Event, decode_event, encode_event
+from fleet.core.state import State
+from fleet.core.step import step
+from fleet.core.working import LOST_AFTER_S
+from fleet.service.composition import Composition, compose
+from fleet.service.planning_desk import carry_out
+from keyexpr_schema.goals import Goal
+from keyexpr_schema.keyspace import ORDER
+from keyexpr_schema.requests import PlanRequest
+from keyexpr_schema.robots import RobotSpec
+from keyexpr_schema.tasks import Order, Report, ReportState
+from keyexpr_schema.world import Fact, Value
+from tests.household import PLACES, SKILLS, cup
+
+PARTS: Composition = compose()
+
+
+class FleetModel:
+    """Feeds events to the core and keeps what it publishes; checks the laws on the way."""
+
+    def __init__(self, robots: tuple[RobotSpec, ...], cups: int) -> None:
+        self.state = State()
+        self.journal: list[bytes] = []
+        self.documents: dict[str, Any] = {}
+        self.effects: list[Effect] = []
+        self.time_s = 0.0
+        self.wall_s = 1000.0
+        self.given: dict[tuple[str, str, int], str] = {}
+        """Robot of every attempt ever ordered."""
+        self.started: set[tuple[str, str, int]] = set()
+        self.told: list[Report] = []
+        self._truth: dict[tuple[str, str], Value] = {}
+        self.tell(events.PlannerStarted, epoch=1, incarnation="one")
+        for place in PLACES:
+            self.tell(events.PlaceTold, place=place)
+        for number in range(1, cups + 1):
+            self.tell(events.ObjectTold, object=cup(number))
+            self.learn(f"cup_{number}", "at", "kitchen")
+        for spec in robots:
+            self.tell(events.RobotTold, spec=spec)
+            self.tell(events.RobotSeen, robot=spec.robot, incarnation="i1")
+            self.learn(spec.robot, "holding", "nothing")
+
+    # --- what happens to the planner -------------------------------------------------------------
+
+    def tell(self, kind: type[Event], **fields: Any) -> None:
+        """One event into the core; its effects are carried out, planning jobs at once."""
+        self.time_s += 1.0
+        self.wall_s += 0.01
+        self._apply(kind(time_s=self.time_s, wall_time_s=self.wall_s, **fields))
+
+    def _apply(self, event: Event) -> None:
+        before = self.state
+        self.state, effects = step(before, event, SKILLS)
+        if self.state is before:
+            assert effects == ()
+            return
+        self.journal.append(encode_event(event))
+        self._take(effects)
+
+    def _take(self, effects: tuple[Effect, ...]) -> None:
+        self.effects.extend(effects)
+        for effect in effects:
+            if isinstance(effect, Publish):
+                keyexpr = effect.key.build(effect.address)
+                if effect.key is ORDER:
+                    self._check_order(effect.payload)
+                self.documents[keyexpr] = effect.payload
+            elif isinstance(effect, Retract):
+                self.documents.pop(effect.key.build(effect.address), None)
+        for effect in effects:
+            if isinstance(effect, MakePlan):
+                self._apply(carry_out(effect.job, self.state, PARTS, self.time_s, self.wall_s))
+
+    def _check_order(self, order: Any) -> None:
+        assert isinstance(order, Order)
+        attempt = (order.plan, order.task, order.attempt)
+        assert self.given.setdefault(attempt, order.robot) == order.robot, (
+            "an attempt changed hands"
+        )
+        book = self.state.plans[order.plan]
+        record = book.records[order.task]
+        for before in (*record.after, *book.extra_after.get(order.task, ())):
+            if before in book.records:
+                assert book.records[before].state.value == "succeeded", "ordered before its time"
+        busy = [
+            other
+            for other in self.orders()
+            if {other.robot, *other.args.values()} & {order.robot, *_robots(order, self.state)}
+            and _robots(other, self.state) & _robots(order, self.state)
+            and (other.plan, other.task) != (order.plan, order.task)
+        ]
+        assert not busy, f"{order.robot} is in two places"
+
+    def learn(self, subject: str, relation: str, value: Value) -> None:
+        """Something becomes true, and everybody hears of it."""
+        self._truth[relation, subject] = value
+        fact = Fact(
+            subject=subject, relation=relation, value=value, source="test", time_s=self.time_s
+        )
+        self.tell(events.FactTold, fact=fact)
+
+    def plan(self, *goals: Goal, **more: Any) -> None:
+        """Put goals and ask for a plan for all that wait."""
+        for goal in goals:
+            self.tell(events.GoalTold, goal=goal)
+        number = sum(b"PlanAsked" in line for line in self.journal)
+        self.tell(events.PlanAsked, request=PlanRequest(request=f"r{number}", **more))
+
+    # --- what robots do --------------------------------------------------------------------------
+
+    def orders(self) -> list[Order]:
+        """Orders that stand, in a fixed order."""
+        return [d for _, d in sorted(self.documents.items()) if isinstance(d, Order)]
+
+    def report(self, order: Order, state: ReportState, **more: Any) -> None:
+        """A worker reports on an order."""
+        report = Report(
+            robot=order.robot,
+            plan=order.plan,
+            revision=order.revision,
+            task=order.task,
+            attempt=order.attempt,
+            epoch=order.epoch,
+            incarnation="i1",
+            state=state,
+            **more,
+        )
+        self.told.append(report)
+        self.tell(events.ReportTold, report=report)
+
+    def start(self, order: Order) -> None:
+        """A worker starts an attempt; nobody may ever start it again."""
+        attempt = (order.plan, order.task, order.attempt)
+        if attempt not in self.started:
+            self.started.add(attempt)
+            self.report(order, ReportState.STARTED, started_s=self.time_s)
+
+    def facts_after(self, order: Order) -> tuple[Fact, ...]:
+        """The facts that hold once the order has been carried out."""
+        action = SKILLS[order.skill].ground(order.args)
+        return tuple(
+            Fact(
+                subject=literal.variable.subject,
+                relation=literal.variable.relation,
+                value=literal.value,
+                source=order.robot,
+                time_s=self.time_s,
+            )
+            for literal in action.after
+        )
+
+    def succeed(self, order: Order) -> None:
+        """A robot carries an order out."""
+        self.start(order)
+        facts = self.facts_after(order)
+        for fact in facts:
+            self._truth[fact.relation, fact.subject] = fact.value
+        self.report(order, ReportState.SUCCEEDED, facts=facts, ended_s=self.time_s)
+
+    def fail(self, order: Order, reason: str = "it slipped") -> None:
+        """A robot has tried, and failed for good."""
+        self.start(order)
+        self.report(order, ReportState.FAILED, reason=reason, ended_s=self.time_s)
+
+    def interrupt(self, order: Order, done: bool) -> None:
+        """A worker crashed in the middle and is back; the work was done, or it was not."""
+        self.start(order)
+        facts = self.facts_after(order) if done else ()
+        self.report(order, ReportState.INTERRUPTED, facts=facts, ended_s=self.time_s)
+
+    def lose(self, robot: str) -> None:
+        """A robot goes away for so long that it counts as lost."""
+        self.tell(events.RobotGone, robot=robot, incarnation="i1")
+        self.wall_s += LOST_AFTER_S + 1.0
+        self.tell(events.TimePassed)
+
+    def return_(self, robot: str) -> None:
+        """A robot comes back."""
+        self.tell(events.RobotSeen, robot=robot, incarnation="i1")
+
+    def finish(self, limit: int = 500) -> None:
+        """Robots carry out everything they are told, until there is no order left."""
+        for _ in range(limit):
+            orders = self.orders()
+            if not orders:
+                return
+            self.succeed(orders[0])
+        raise AssertionError("the plan does not come to an end")
+
+    # --- the planner crashes ---------------------------------------------------------------------
+
+    def crash(self) -> None:
+        """The planner is killed; its journal is replayed by a new run."""
+        state = State()
+        for line in self.journal:
+            state, _ = step(state, decode_event(line), SKILLS)
+        assert state == self.state, "the journal replays to another state"
+        self.state = state
+        self.tell(events.PlannerStarted, epoch=state.epoch + 1, incarnation="again")
+        self._take(effects_of(self.state))
+
+
+def _robots(order: Order, state: State) -> set[str]:
+    return {order.robot} | {value for value in order.args.values() if value in state.robots}

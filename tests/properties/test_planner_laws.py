@@ -1,0 +1,115 @@
+"""Laws of the planner's core under any order of events: crashes, failures, losses, repetitions.
+
+The model checks on every order that its dependencies are done, that no robot is in two places and
+that an attempt never changes hands; on every crash that the journal replays to the same state.
+"""
+
+from __future__ import annotations
+
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from fleet.core import events
+from keyexpr_schema.goals import ENDED_GOALS
+from keyexpr_schema.plans import ENDED_PLANS, PlanState
+from keyexpr_schema.tasks import TaskState
+from tests.fleet_model import FleetModel
+from tests.household import bring, carrier, manipulator
+
+PICK = st.integers(0, 10)
+
+
+class Planner(RuleBasedStateMachine):
+    @initialize(
+        second=st.booleans(),
+        cups=st.integers(1, 3),
+        rooms=st.lists(st.sampled_from(["hallway", "living_room"]), min_size=3, max_size=3),
+    )
+    def begin(self, second: bool, cups: int, rooms: list[str]) -> None:
+        robots = (manipulator(), carrier(), *((manipulator("r2"),) if second else ()))
+        self.model = FleetModel(robots, cups)
+        self.away: set[str] = set()
+        self.finished: set[tuple[str, str]] = set()
+        self.model.plan(*(bring(n, rooms[n - 1]) for n in range(1, cups + 1)))
+
+    def order(self, pick: int):  # type: ignore[no-untyped-def]
+        orders = self.model.orders()
+        return orders[pick % len(orders)]
+
+    @precondition(lambda self: self.model.orders())
+    @rule(pick=PICK)
+    def succeed(self, pick: int) -> None:
+        self.model.succeed(self.order(pick))
+
+    @precondition(lambda self: self.model.orders())
+    @rule(pick=PICK)
+    def start(self, pick: int) -> None:
+        self.model.start(self.order(pick))
+
+    @precondition(lambda self: self.model.orders())
+    @rule(pick=PICK)
+    def fail(self, pick: int) -> None:
+        self.model.fail(self.order(pick))
+
+    @precondition(lambda self: self.model.orders())
+    @rule(pick=PICK, done=st.booleans())
+    def interrupt(self, pick: int, done: bool) -> None:
+        self.model.interrupt(self.order(pick), done)
+
+    @precondition(lambda self: self.model.told)
+    @rule(pick=PICK)
+    def an_old_report_comes_again(self, pick: int) -> None:
+        report = self.model.told[pick % len(self.model.told)]
+        self.model.tell(events.ReportTold, report=report)
+
+    @rule()
+    def the_planner_crashes(self) -> None:
+        self.model.crash()
+
+    @rule(robot=st.sampled_from(["hsr", "locobot", "r2"]))
+    def a_robot_is_lost(self, robot: str) -> None:
+        if robot in self.model.state.robots and robot not in self.away:
+            self.away.add(robot)
+            self.model.lose(robot)
+
+    @rule()
+    def robots_return(self) -> None:
+        for robot in sorted(self.away):
+            self.model.return_(robot)
+        self.away.clear()
+
+    @rule(cup=st.integers(1, 3), room=st.sampled_from(["kitchen", "hallway", None]))
+    def a_person_moves_a_cup(self, cup: int, room: str | None) -> None:
+        self.model.learn(f"cup_{cup}", "at", room)
+
+    def teardown(self) -> None:
+        if not hasattr(self, "model"):
+            return
+        self.robots_return()
+        self.model.finish()
+        state = self.model.state
+        for book in state.plans.values():
+            assert book.state in ENDED_PLANS, f"{book.plan.plan} is {book.state}: it never ends"
+            assert not book.outstanding()
+        for goal, status in state.goal_states.items():
+            waits = all(
+                goal not in book.plan.goals or book.state is PlanState.REJECTED
+                for book in state.plans.values()
+            )
+            assert status.state in ENDED_GOALS or waits, f"{goal} is {status.state} for ever"
+
+    @invariant()
+    def finished_work_stays_finished(self) -> None:
+        if not hasattr(self, "model"):
+            return
+        for plan, book in self.model.state.plans.items():
+            for record in book.records.values():
+                if (plan, record.task) in self.finished:
+                    assert record.state is TaskState.SUCCEEDED, "finished work was undone"
+                elif record.state is TaskState.SUCCEEDED:
+                    self.finished.add((plan, record.task))
+
+
+TestPlanner = Planner.TestCase
+TestPlanner.settings = settings(max_examples=60, stateful_step_count=25, deadline=None)

@@ -1,0 +1,330 @@
+"""The planner's core in the situations that matter, one event at a time."""
+
+from __future__ import annotations
+
+from fleet.core import events
+from fleet.core.effects import MakePlan, Publish
+from fleet.core.planning import MAX_REPLANS
+from fleet.core.state import State
+from fleet.core.step import step
+from keyexpr_schema.goals import Goal, GoalState
+from keyexpr_schema.keyspace import PLACE, PLAN_STATUS
+from keyexpr_schema.plans import Plan, PlanState, Task
+from keyexpr_schema.requests import Control, ControlRequest, ReplanRequest
+from keyexpr_schema.tasks import ReportState, TaskState
+from tests.fleet_model import FleetModel
+from tests.household import SKILLS, bring, carrier, manipulator
+
+BOTH = (bring(1, "hallway"), bring(2, "living_room"))
+
+
+def fleet() -> FleetModel:
+    return FleetModel((manipulator(), carrier()), cups=2)
+
+
+def goal_state(model: FleetModel, goal: str) -> GoalState:
+    return model.state.goal_states[goal].state
+
+
+def test_a_mission_from_goals_to_reached() -> None:
+    model = fleet()
+    model.plan(*BOTH)
+    assert {order.robot for order in model.orders()} == {"hsr", "locobot"}
+    model.finish()
+    assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
+    assert [goal_state(model, g) for g in ("g1", "g2")] == [GoalState.REACHED] * 2
+    assert model.state.answers["r0"].accepted
+
+
+def test_a_goal_is_reached_as_soon_as_it_is_and_not_when_the_plan_ends() -> None:
+    model = fleet()
+    model.plan(*BOTH)
+    while goal_state(model, "g2") is not GoalState.REACHED:
+        model.succeed(model.orders()[-1])
+    assert model.state.plans["plan-1"].state is PlanState.RUNNING
+
+
+def test_a_failed_task_leads_to_a_new_revision_with_finished_work_kept() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    model.succeed(model.orders()[0])
+    (pick,) = model.orders()
+    model.fail(pick)
+    book = model.state.plans["plan-1"]
+    assert book.plan.revision == 2
+    assert book.records["t1"].state is TaskState.SUCCEEDED
+    assert book.records["t2"].state is TaskState.FAILED
+    assert "it slipped" in (book.records["t2"].reason or "")
+    model.finish()
+    assert goal_state(model, "g1") is GoalState.REACHED
+
+
+def test_a_task_that_always_fails_ends_its_goal_with_the_reason() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    for _ in range(10 * MAX_REPLANS):
+        for order in model.orders():
+            if order.skill == "pick":
+                model.fail(order)
+            else:
+                model.succeed(order)
+    status = model.state.goal_states["g1"]
+    assert status.state is GoalState.FAILED
+    assert "it slipped" in (status.reason or "")
+    assert model.orders() == []
+
+
+def test_an_interrupted_attempt_that_was_done_counts_and_is_not_given_again() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    model.succeed(model.orders()[0])
+    model.interrupt(model.orders()[0], done=True)
+    assert model.state.plans["plan-1"].records["t2"].state is TaskState.SUCCEEDED
+    assert model.orders()[0].skill == "navigate"
+
+
+def test_an_interrupted_attempt_that_was_not_done_is_given_as_a_new_attempt() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    model.interrupt(model.orders()[0], done=False)
+    (order,) = model.orders()
+    assert (order.task, order.attempt) == ("t1", 2)
+
+
+def test_reports_of_old_attempts_change_nothing_but_facts() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    (order,) = model.orders()
+    model.interrupt(order, done=False)
+    before = model.state.plans
+    model.report(order, ReportState.FAILED, reason="late news")
+    model.report(order, ReportState.SUCCEEDED)
+    assert model.state.plans == before
+
+
+def test_a_lost_robots_work_goes_to_another() -> None:
+    model = FleetModel((manipulator("r1"), manipulator("r2")), cups=1)
+    model.plan(bring(1, "hallway"))
+    (order,) = model.orders()
+    other = {"r1": "r2", "r2": "r1"}[order.robot]
+    model.lose(order.robot)
+    assert {o.robot for o in model.orders()} == {other}
+    model.finish()
+    assert goal_state(model, "g1") is GoalState.REACHED
+
+
+def test_a_worker_that_comes_back_in_time_keeps_its_work() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    (order,) = model.orders()
+    model.tell(events.RobotGone, robot="hsr", incarnation="i1")
+    model.tell(events.TimePassed)
+    model.tell(events.RobotSeen, robot="hsr", incarnation="i2")
+    assert model.orders() == [order]
+    assert model.state.plans["plan-1"].plan.revision == 1
+
+
+def test_when_nobody_is_left_goals_fail_and_say_why() -> None:
+    model = FleetModel((manipulator(),), cups=1)
+    model.plan(bring(1, "hallway"))
+    model.lose("hsr")
+    assert goal_state(model, "g1") is GoalState.FAILED
+    assert "no robot is connected" in (model.state.goal_states["g1"].reason or "")
+
+
+def test_a_fact_that_contradicts_the_plan_leads_to_a_new_one() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    model.learn("cup_1", "at", "living_room")
+    model.succeed(model.orders()[0])
+    book = model.state.plans["plan-1"]
+    assert book.plan.revision == 2
+    model.finish()
+    assert goal_state(model, "g1") is GoalState.REACHED
+
+
+def test_an_unknown_place_of_the_object_is_told() -> None:
+    model = fleet()
+    model.tell(events.FactForgotten, subject="cup_1", relation="at")
+    model.plan(bring(1, "hallway"))
+    assert not model.state.answers["r0"].accepted
+    assert "where cup_1 is" in model.state.answers["r0"].sentence
+    assert goal_state(model, "g1") is GoalState.WAITING
+    assert model.state.plans["plan-1"].state is PlanState.REJECTED
+
+
+def test_sentences_wait_for_the_names_they_use() -> None:
+    model = FleetModel((manipulator(),), cups=1)
+    model.tell(events.GoalTold, goal=Goal(goal="g", text="bring the vase to the hallway"))
+    assert goal_state(model, "g") is GoalState.REJECTED
+    assert "known are cup_1" in (model.state.goal_states["g"].reason or "")
+    vase = events.ObjectTold(
+        object=model.state.objects["cup_1"].__class__(object="vase", kind="vase", label="vase"),
+        time_s=1.0,
+        wall_time_s=1.0,
+    )
+    model.tell(events.ObjectTold, object=vase.object)
+    assert goal_state(model, "g") is GoalState.WAITING
+
+
+def test_a_ready_plan_waits_for_start_and_can_be_cancelled_and_deleted() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"), start=False)
+    assert model.orders() == []
+    assert goal_state(model, "g1") is GoalState.PLANNED
+
+    def control(name: str, what: Control) -> bool:
+        request = ControlRequest(request=name, control=what, plan="plan-1")
+        model.tell(events.ControlAsked, request=request)
+        return model.state.answers[name].accepted
+
+    assert control("c1", Control.START)
+    (order,) = model.orders()
+    assert not control("c2", Control.DELETE)
+    assert control("c3", Control.CANCEL)
+    assert [o.cancelled for o in model.orders()] == [True]
+    model.report(order, ReportState.CANCELLED)
+    assert model.state.plans["plan-1"].state is PlanState.CANCELLED
+    assert goal_state(model, "g1") is GoalState.WAITING
+    assert control("c4", Control.DELETE)
+    assert not [key for key in model.documents if key.startswith("plans/")]
+
+
+def test_a_task_can_be_added_to_a_running_plan() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    request = ControlRequest(
+        request="c", control=Control.ADD_TASK, plan="plan-1", skill="navigate",
+        args={"to": "living_room"}, robot="locobot",
+    )  # fmt: skip
+    model.tell(events.ControlAsked, request=request)
+    model.finish()
+    book = model.state.plans["plan-1"]
+    assert book.state is PlanState.SUCCEEDED
+    assert book.records["t5"].robot == "locobot"
+    assert book.records["t5"].state is TaskState.SUCCEEDED
+
+
+def test_a_task_that_cannot_be_added_leaves_the_plan_as_it_was() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    request = ControlRequest(
+        request="c", control=Control.ADD_TASK, plan="plan-1", skill="fly", args={}
+    )
+    model.tell(events.ControlAsked, request=request)
+    model.finish()
+    book = model.state.plans["plan-1"]
+    assert book.state is PlanState.SUCCEEDED
+    assert "there is no skill fly" in (book.reason or "")
+
+
+def test_a_plan_that_someone_proposes_is_checked_like_any_other() -> None:
+    model = fleet()
+    go = Task(task="t1", skill="navigate", args={"robot": "?a1", "to": "kitchen"}, actor="a1")
+    good = Plan(plan="mine", goals=(), conditions=(), tasks=(go,))
+    model.tell(events.PlanProposed, plan=good)
+    model.finish()
+    assert model.state.plans["mine"].state is PlanState.SUCCEEDED
+    grab = Task(task="t1", skill="grab", args={"robot": "?a1"}, actor="a1")
+    bad = Plan(plan="yours", goals=(), conditions=(), tasks=(grab,))
+    model.tell(events.PlanProposed, plan=bad)
+    status = model.state.plans["yours"]
+    assert status.state is PlanState.REJECTED
+    assert status.violations[0].code == "unknown-skill"
+
+
+def test_requests_are_answered_once_and_wrong_ones_with_the_reason() -> None:
+    model = fleet()
+    model.plan(goals=("nothing",))
+    assert "there is no goal nothing" in model.state.answers["r0"].sentence
+    model.plan()
+    assert "no goal that waits" in model.state.answers["r1"].sentence
+    model.plan(*BOTH)
+    model.plan(goals=("g1",))
+    assert "already in plan plan-1" in model.state.answers["r3"].sentence
+    replan = ReplanRequest(request="x", plan="nope", reason="because")
+    model.tell(events.ReplanAsked, request=replan)
+    assert "known are plan-1" in model.state.answers["x"].sentence
+    before = model.state
+    model.tell(events.ReplanAsked, request=replan)
+    assert model.state is before
+
+
+def test_a_replan_on_request_waits_for_running_tasks_and_keeps_finished_ones() -> None:
+    model = fleet()
+    model.plan(*BOTH)
+    first = model.orders()[0]
+    model.start(first)
+    model.tell(
+        events.ReplanAsked, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
+    )
+    assert model.state.plans["plan-1"].plan.revision == 1
+    model.finish()
+    assert model.state.plans["plan-1"].plan.revision == 2
+    assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
+
+
+def test_a_deleted_goal_leaves_the_plan() -> None:
+    model = fleet()
+    model.plan(*BOTH)
+    model.tell(events.GoalForgotten, goal="g2")
+    model.finish()
+    book = model.state.plans["plan-1"]
+    assert book.state is PlanState.SUCCEEDED
+    assert book.plan.goals == ("g1",)
+    assert "goals/g2/status" not in model.documents
+
+
+def test_a_crash_of_the_planner_changes_nothing_but_the_epoch_of_orders() -> None:
+    model = fleet()
+    model.plan(*BOTH)
+    before = model.orders()
+    model.crash()
+    after = model.orders()
+    assert [(o.task, o.attempt) for o in before] == [(o.task, o.attempt) for o in after]
+    assert {order.epoch for order in after} == {2}
+    model.finish()
+    assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
+
+
+def test_a_planner_without_a_journal_does_nothing_a_second_time() -> None:
+    model = fleet()
+    model.plan(*BOTH)
+    model.finish()
+    fresh = State()
+    remembered = events.Remembered(
+        time_s=0.0, wall_time_s=0.0,
+        answers=tuple(model.state.answers.values()),
+        goals=tuple(model.state.goal_states.values()),
+        plans=("plan-1",),
+    )  # fmt: skip
+    fresh, _ = step(fresh, remembered, SKILLS)
+    for line in model.journal:
+        event = events.decode_event(line)
+        if isinstance(event, events.PlanAsked | events.GoalTold):
+            fresh, effects = step(fresh, event, SKILLS)
+            assert not any(isinstance(effect, MakePlan) for effect in effects)
+    proposed = events.PlanProposed(
+        plan=model.state.plans["plan-1"].plan, time_s=0.0, wall_time_s=0.0
+    )
+    fresh, effects = step(fresh, proposed, SKILLS)
+    assert effects == ()
+    assert fresh.goal_states["g1"].state is GoalState.REACHED
+
+
+def test_an_event_without_meaning_changes_nothing() -> None:
+    model = fleet()
+    state, effects = step(
+        model.state, events.GoalForgotten(goal="x", time_s=1e9, wall_time_s=1e12), SKILLS
+    )
+    assert state is model.state
+    assert effects == ()
+
+
+def test_only_documents_of_the_planner_are_published() -> None:
+    model = fleet()
+    model.plan(*BOTH)
+    model.finish()
+    kinds = {effect.key.name for effect in model.effects if isinstance(effect, Publish)}
+    assert PLAN_STATUS.name in kinds
+    assert PLACE.name not in kinds

@@ -1,0 +1,254 @@
+"""A simulated world behind real Zenoh: calls, clocks, stops, lost workers and lost routers."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+
+from keyexpr_schema.errors import NoAnswer
+from keyexpr_schema.keyspace import SIM_CLOCK, SIM_MOTION, SIM_SCENE, SIM_SENSES, SIM_TRUTH
+from keyexpr_schema.motions import Motion, MotionKind, MotionOutcome, MotionState
+from keyexpr_schema.session import Session, SessionConfig, open_session
+from keyexpr_schema.simulation import MotionCall, SimAddress, SimRobotAddress
+from sim.embodiment import SimEmbodiment
+from sim.kinematic import Durations, KinematicBackend
+from sim.server import SimServer
+from sim.world_file import load_mission
+from workers.embodiment import Embodiment
+from workers.errors import BodyUnreachable
+
+Make = Callable[..., SessionConfig]
+HSR = SimRobotAddress("hsr")
+TO_KITCHEN = Motion(kind=MotionKind.GO_TO, place="kitchen")
+LOOK = Motion(kind=MotionKind.LOOK)
+
+
+@asynccontextmanager
+async def served(
+    make: Make, speed: float | None = None, step_s: float | None = None, **options: Any
+) -> AsyncIterator[tuple[KinematicBackend, Session]]:
+    """The two-cups world without physics on a session of its own, and another session to ask."""
+    mission = load_mission("two-cups")
+    robots = [(robot.spec, robot.start_m_rad) for robot in mission.robots]
+    backend = KinematicBackend(mission.world, robots, Durations(), step_s=step_s)
+    async with open_session(make(component="sim")) as session, open_session(make()) as asker:
+        server = SimServer(session, backend, speed, **options)
+        running = asyncio.create_task(server.run())
+        await server.ready()
+        try:
+            yield backend, asker
+        finally:
+            running.cancel()
+            await asyncio.gather(running, return_exceptions=True)
+
+
+async def ask(session: Session, call: MotionCall) -> MotionOutcome:
+    """Ask until somebody serves: declarations take a moment to get around."""
+    async with asyncio.timeout(10.0):
+        while True:
+            try:
+                outcome: MotionOutcome = await session.ask(SIM_MOTION, HSR, call, 5.0)
+                return outcome
+            except NoAnswer:
+                await asyncio.sleep(0.02)
+
+
+async def until(condition: Callable[[], bool], timeout_s: float = 10.0) -> None:
+    async with asyncio.timeout(timeout_s):
+        while not condition():  # noqa: ASYNC110
+            await asyncio.sleep(0.01)
+
+
+async def test_a_motion_is_carried_out_and_costs_no_wall_time(session_config: Make) -> None:
+    async with (
+        served(session_config) as (backend, asker),
+        SimEmbodiment(asker, "hsr", "i1") as body,
+    ):
+        assert isinstance(body, Embodiment)
+        began = time.monotonic()
+        outcome = await body.perform(TO_KITCHEN)
+        assert outcome.state is MotionState.SUCCEEDED
+        assert outcome.senses.place == "kitchen"
+        assert backend.time_s > 5.0 > time.monotonic() - began
+        assert body.now_s() == pytest.approx(backend.time_s)
+        assert (await body.senses()).place == "kitchen"
+
+
+async def test_the_same_call_is_carried_out_once(session_config: Make) -> None:
+    async with served(session_config) as (backend, asker):
+        call = MotionCall(call="c1", incarnation="i1", motion=TO_KITCHEN)
+        first = await ask(asker, call)
+        ended_s = backend.time_s
+        assert first.state is MotionState.SUCCEEDED
+        assert await ask(asker, call) == first
+        assert backend.time_s == ended_s
+
+
+async def test_a_newer_run_of_a_worker_takes_over_for_good(session_config: Make) -> None:
+    async with served(session_config, speed=1.0, step_s=0.05) as (_, asker):
+        old = MotionCall(call="c1", incarnation="old", motion=TO_KITCHEN, wait_s=0.0)
+        assert (await ask(asker, old)).state is MotionState.RUNNING
+        new = MotionCall(call="c2", incarnation="new", wait_s=0.0)
+        assert not (await ask(asker, new)).senses.moving
+        refused = await ask(asker, old)
+        assert refused.state is MotionState.FAILED
+        assert refused.reason == "a newer run of this robot's worker drives it"
+
+
+async def test_cancelling_stops_the_robot_and_it_keeps_its_hand_closed(
+    session_config: Make,
+) -> None:
+    async with served(session_config, speed=1.0, step_s=0.05) as (backend, asker):
+        body = SimEmbodiment(asker, "hsr", "i1")
+        going = asyncio.create_task(body.perform(TO_KITCHEN))
+        await until(lambda: backend.senses("hsr").moving)
+        going.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await going
+        assert not backend.senses("hsr").moving
+        outcome = backend.outcome("hsr")
+        assert outcome is not None and outcome.state is MotionState.STOPPED
+
+
+async def test_a_stop_that_overtakes_its_motion_wins(session_config: Make) -> None:
+    async with served(session_config) as (backend, asker):
+        stop = MotionCall(call="c1", incarnation="i1", stop=True)
+        assert (await ask(asker, stop)).state is MotionState.STOPPED
+        late = MotionCall(call="c1", incarnation="i1", motion=TO_KITCHEN)
+        assert (await ask(asker, late)).state is MotionState.STOPPED
+        assert backend.time_s == 0.0
+
+
+async def test_a_motion_nobody_asks_about_is_stopped(session_config: Make) -> None:
+    async with served(session_config, speed=1.0, step_s=0.05, watchdog_s=0.3) as (backend, asker):
+        call = MotionCall(call="c1", incarnation="i1", motion=TO_KITCHEN, wait_s=0.0)
+        assert (await ask(asker, call)).state is MotionState.RUNNING
+        await until(lambda: not backend.senses("hsr").moving, 3.0)
+        outcome = await ask(asker, call)
+        assert outcome.state is MotionState.STOPPED
+        assert outcome.reason == "nobody asked about it any more"
+
+
+async def test_time_stands_still_while_nobody_moves(session_config: Make) -> None:
+    async with served(session_config, grace_s=0.05) as (backend, asker):
+        body = SimEmbodiment(asker, "hsr", "i1")
+        await body.perform(LOOK)
+        moved_s = backend.time_s
+        async with asker.watch(SIM_CLOCK) as watch:
+            clocks = [await anext(watch) for _ in range(3)]  # a second apart, or so
+        assert {change.value.time_s for change in clocks} == {moved_s}
+
+
+async def test_the_world_waits_for_the_next_call_of_a_robot_whose_motion_ended(
+    session_config: Make,
+) -> None:
+    async with served(session_config, grace_s=2.0) as (backend, asker):
+        body = SimEmbodiment(asker, "hsr", "i1")
+        other = SimEmbodiment(asker, "locobot", "i1")
+        await body.perform(LOOK)
+        looked_s = backend.time_s
+        driving = asyncio.create_task(other.perform(TO_KITCHEN))
+        await until(lambda: backend.senses("locobot").moving)
+        await body.senses()
+        assert backend.time_s == looked_s  # held back for the sake of hsr
+        await body.perform(LOOK)
+        assert backend.time_s == pytest.approx(looked_s + 2.0)
+        outcome = await driving  # hsr has no more to do, and its grace is over some time
+        assert outcome.state is MotionState.SUCCEEDED
+
+
+async def test_real_time_goes_on_by_itself(session_config: Make) -> None:
+    async with served(session_config, speed=4.0, step_s=0.05) as (backend, _):
+        began, began_s = time.monotonic(), backend.time_s
+        await until(lambda: backend.time_s >= began_s + 2.0)
+        assert 0.3 < time.monotonic() - began < 3.0
+
+
+async def test_what_is_told(session_config: Make) -> None:
+    async with served(session_config) as (_, asker):
+        body = SimEmbodiment(asker, "hsr", "i1")
+        async with asker.watch(SIM_SENSES) as watch:
+            await body.perform(TO_KITCHEN)
+            async with asyncio.timeout(10.0):
+                async for change in watch:
+                    if change.address.robot == "hsr" and change.value.place == "kitchen":
+                        break
+        await until_stored(asker)
+        truths = await asker.list(SIM_TRUTH)
+        assert {address.object: t.support for address, t in truths.items()} == {
+            "cup_1": "kitchen_table",
+            "cup_2": "kitchen_table",
+        }
+
+
+async def until_stored(asker: Session) -> None:
+    async with asyncio.timeout(10.0):
+        while await asker.get(SIM_SCENE, SimAddress()) is None or not await asker.list(SIM_TRUTH):  # noqa: ASYNC110
+            await asyncio.sleep(0.05)
+
+
+async def test_an_unknown_robot_is_named_together_with_those_there_are(
+    session_config: Make,
+) -> None:
+    async with served(session_config) as (_, asker):
+        await ask(asker, MotionCall(call="c0", incarnation="i1"))
+        with pytest.raises(
+            NoAnswer, match=r"no robot 'r2d2' in this world; there are hsr, locobot"
+        ):
+            await asker.ask(
+                SIM_MOTION, SimRobotAddress("r2d2"), MotionCall(call="c1", incarnation="i1")
+            )
+
+
+async def test_a_router_that_goes_away_ends_neither_world_nor_motion(
+    session_config: Make, router: Any
+) -> None:
+    async with served(session_config, speed=1.0, step_s=0.05, watchdog_s=1.0) as (backend, asker):
+        body = SimEmbodiment(asker, "hsr", "i1", patience_s=20.0)
+        going = asyncio.create_task(body.perform(TO_KITCHEN))
+        await until(lambda: backend.senses("hsr").moving)
+        await asyncio.to_thread(router.kill)
+        gone_s = backend.time_s
+        await until(lambda: backend.time_s > gone_s + 2.5)
+        assert backend.senses("hsr").moving
+        await asyncio.to_thread(router.restart)
+        outcome = await going
+        assert outcome.state is MotionState.SUCCEEDED
+        await until_stored(asker)
+
+
+async def test_without_a_simulation_the_body_is_unreachable(session_config: Make) -> None:
+    async with open_session(session_config()) as session:
+        body = SimEmbodiment(session, "hsr", "i1", patience_s=0.3)
+        with pytest.raises(BodyUnreachable, match="the simulation does not answer: nobody serves"):
+            await body.perform(LOOK)
+
+
+async def test_the_process_says_when_it_is_ready_and_ends_on_sigterm(router: Any) -> None:
+    code = (
+        "from sim.process import run; "
+        f"run('two-cups', ({router.endpoint!r},), backend='kinematic', speed=None)"
+    )
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-c", code, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
+    )
+    try:
+        assert process.stdout is not None and process.stderr is not None
+        async with asyncio.timeout(20.0):
+            line = await process.stdout.readline()
+            assert line == b"world home running: 2 robots, 2 objects\n"
+            os.kill(process.pid, signal.SIGTERM)
+            assert await process.wait() == 0
+            assert await process.stderr.read() == b""
+    finally:
+        if process.returncode is None:
+            process.kill()
+            await process.wait()

@@ -24,6 +24,13 @@ AWAY = 1.08
 high as the window; a lower view shows as much of the width from nearer by."""
 
 
+NEAREST = 0.68
+"""Nearer than this a wide view would cut the floor off at the top and the bottom."""
+
+LEGEND = 5
+"""With more robots the legend would hide the lines."""
+
+
 def blueprint(
     floor_m: Rectangle | None = None,
     span_s: tuple[float, float] = DEFAULT_SPAN_S,
@@ -62,7 +69,9 @@ def blueprint(
                     contents="/fleet/utilisation/**",
                     axis_x=_time(span_s),
                     axis_y=rrb.ScalarAxis(range=(-0.05, 1.05)),
-                    plot_legend=rrb.PlotLegend(visible=True, corner=rrb.Corner2D.LeftBottom),
+                    plot_legend=rrb.PlotLegend(
+                        visible=lanes <= LEGEND, corner=rrb.Corner2D.LeftBottom
+                    ),
                 ),
                 rrb.TextLogView(
                     name="Events", origin="/fleet/log", contents="/fleet/log/**", columns=_columns()
@@ -83,7 +92,7 @@ def blueprint(
 def _eye(floor_m: Rectangle, height: float) -> Any:
     x0, y0, x1, y1 = floor_m
     middle = ((x0 + x1) / 2, (y0 + y1) / 2)
-    away_m = AWAY * height * max(2.0, hypot(x1 - x0, y1 - y0))
+    away_m = max(AWAY * height, NEAREST) * max(2.0, hypot(x1 - x0, y1 - y0))
     up = radians(ELEVATION_DEG)
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,

@@ -1,7 +1,8 @@
-"""The task graph: what waits for what, who does it, how it stands. Layers go down, lanes across."""
+"""The task graph: what waits for what, who does it, how it stands. Robots stand side by side."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 import rerun as rr
@@ -9,6 +10,7 @@ import rerun as rr
 from fleet.timeline.lanes import call_text
 from fleet.timeline.palette import TASK_STATES
 from fleet.timeline.sink import Sink, entity
+from fleet.timeline.text import drawable
 from keyexpr_schema.plans import Plan, PlanStatus
 from keyexpr_schema.tasks import TaskRecord, TaskState
 
@@ -26,7 +28,7 @@ GLYPHS = {
     TaskState.ORDERED: "→",
     TaskState.RUNNING: "▶",
     TaskState.SUCCEEDED: "✔",
-    TaskState.FAILED: "✖",
+    TaskState.FAILED: "✗",
     TaskState.CANCELLED: "∅",
 }
 
@@ -148,31 +150,37 @@ class Graphs:
 
 
 def layout(nodes: list[Node]) -> dict[str, tuple[float, float]]:
-    """Positions `(x, y)` in the viewer's points: y by longest path from a root, x by robot lane.
+    """Positions `(x, y)` in the viewer's points: a column for each robot, one task in a row of it.
 
-    Two tasks of one lane and layer stand side by side. A dependency on itself, a cycle or an
-    unknown task counts for nothing.
+    A task stands below all that it waits for; so columns and rows stay readable where layers by
+    depth alone would put a robot's independent tasks side by side. A dependency on itself, on an
+    unknown task or around a cycle counts for nothing.
     """
     rank = _ranks({node.task: node.after for node in nodes})
-    cells: dict[tuple[str, int], list[Node]] = {}
-    for node in sorted(nodes, key=lambda node: (rank[node.task], node.task)):
-        cells.setdefault((node.lane, rank[node.task]), []).append(node)
+    row: dict[str, int] = {}
+    free: dict[str, int] = {}
+    for node in sorted(nodes, key=lambda node: (rank[node.task], _natural(node.task))):
+        below = [row[first] + 1 for first in node.after if first in row]
+        row[node.task] = max([free.get(node.lane, 0), *below])
+        free[node.lane] = row[node.task] + 1
     places: dict[str, tuple[float, float]] = {}
     left = 0.0
-    for lane in sorted(
-        {node.lane for node in nodes}, key=lambda lane: (lane.startswith("?"), lane)
-    ):
-        mine = [cell for (name, _), cell in cells.items() if name == lane]
-        width = max(GLYPH_PX * len(line) for c in mine for n in c for line in n.label.split("\n"))
+    for lane in sorted(free, key=lambda lane: (lane.startswith("?"), _natural(lane))):
+        mine = [node for node in nodes if node.lane == lane]
+        width = max(GLYPH_PX * len(line) for node in mine for line in node.label.split("\n"))
         width += GAP_PX
-        columns = max(len(cell) for cell in mine)
-        middle = left + width * columns / 2
-        for cell in mine:
-            for i, node in enumerate(cell):
-                offset = (i - (len(cell) - 1) / 2) * width
-                places[node.task] = (middle + offset, rank[node.task] * ROW_PX)
-        left += width * columns
+        for node in mine:
+            places[node.task] = (left + width / 2, row[node.task] * ROW_PX)
+        left += width
     return places
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    """Sorts `t2` before `t10`."""
+    return [
+        (int(part), "") if part.isdigit() and part.isascii() else (0, part)
+        for part in re.split(r"([0-9]+)", name)
+    ]
 
 
 def _ranks(after: dict[str, tuple[str, ...]]) -> dict[str, int]:
@@ -206,4 +214,4 @@ def _node(
 ) -> Node:
     who = robot or f"?{actor}"
     label = f"{GLYPHS[state]} {name}: {call_text(skill, args, robot)}\n{who} · {state.value}"
-    return Node(task=name, label=label, state=state, lane=who, after=after)
+    return Node(task=name, label=drawable(label), state=state, lane=who, after=after)

@@ -8,6 +8,7 @@ import rerun as rr
 
 from fleet.timeline.palette import CANCELLED, FAILED, Palette, Rgba
 from fleet.timeline.sink import Sink, entity
+from fleet.timeline.text import drawable
 from keyexpr_schema.tasks import TaskRecord, TaskState
 
 IDLE = ""
@@ -179,8 +180,8 @@ class Lanes:
 
 
 def _label(record: TaskRecord) -> str:
-    mark = {TaskState.FAILED: "✖ ", TaskState.CANCELLED: "∅ "}.get(record.state, "")
-    return f"{mark}{call_text(record.skill, record.args, record.robot)}"
+    mark = {TaskState.FAILED: "✗ ", TaskState.CANCELLED: "∅ "}.get(record.state, "")
+    return drawable(f"{mark}{call_text(record.skill, record.args, record.robot)}")
 
 
 def call_text(skill: str, args: dict[str, str], robot: str | None) -> str:

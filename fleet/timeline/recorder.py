@@ -19,6 +19,7 @@ from fleet.timeline.graph import Graphs
 from fleet.timeline.lanes import Lanes, call_text
 from fleet.timeline.palette import Palette
 from fleet.timeline.sink import Sink, entity
+from fleet.timeline.text import drawable
 from fleet.timeline.utilisation import Utilisation
 from fleet.timeline.world import World
 from keyexpr_schema.key import Key
@@ -259,7 +260,7 @@ class Recorder:
 
     def _log(self, topic: str, line: sentences.Line, at_s: float, wall_s: float | None) -> None:
         level, sentence = line
-        text = rr.TextLog(sentence, level=level, color=_COLOURS[level])
+        text = rr.TextLog(drawable(sentence), level=level, color=_COLOURS[level])
         self._sink.log(entity("fleet", "log", topic), text, at_s, wall_s)
 
     def _call(self, report: Report) -> str:

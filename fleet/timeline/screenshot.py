@@ -97,7 +97,8 @@ def _take(
                 break
             last = picture
     except Exception as error:
-        raise NoPicture(f"Rerun's viewer could not show {recording}: {error}") from None
+        why = error if shown.poll() is None else _why(said)
+        raise NoPicture(f"Rerun's viewer could not show {recording}: {why}") from None
     if not picture.startswith(b"\x89PNG"):
         raise NoPicture(f"Rerun's viewer gave no picture of {recording}")
     return picture
@@ -111,7 +112,8 @@ def _why(said: IO[bytes]) -> str:
             "Rerun's viewer finds no graphics driver: install one that draws in software "
             f"(on Debian and Ubuntu: apt-get install {DRIVER})"
         )
-    first = text.strip().splitlines()[:1] or ["it said nothing"]
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    first = [line for line in lines if "panicked at" in line] or lines or ["it said nothing"]
     return f"Rerun's viewer ended at once: {first[0]}"
 
 

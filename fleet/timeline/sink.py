@@ -14,6 +14,7 @@ import rerun as rr
 
 from fleet.timeline.clock import Clock
 from fleet.timeline.errors import UnwritableRecording
+from fleet.timeline.text import drawable
 
 APPLICATION = "robotfleet"
 SIM_TIME = "sim_time"
@@ -80,7 +81,7 @@ def open_stream(out: Path, name: str, live_port: int | None = None) -> rr.Record
     stream.set_sinks(*sinks)
     stream.set_log_time_enabled(False)
     stream.set_log_tick_enabled(False)
-    stream.send_recording_name(name)
+    stream.send_recording_name(drawable(name))
     return stream
 
 

@@ -10,6 +10,7 @@ import rerun as rr
 from fleet.timeline.palette import Palette, Rgba
 from fleet.timeline.shapes import Bounds, log_shapes
 from fleet.timeline.sink import Sink, entity
+from fleet.timeline.text import drawable
 from fleet.timeline.trails import Trail
 from keyexpr_schema.motions import PointM
 from keyexpr_schema.robots import RobotSpec, RobotState
@@ -125,7 +126,7 @@ class World:
                 [(x, y - 0.6 * h, 0.02)],
                 radii=[0.001],
                 colors=[(200, 200, 200, 255)],
-                labels=[place.label],
+                labels=[drawable(place.label)],
                 show_labels=True,
             ),
         )
@@ -204,7 +205,7 @@ class World:
         path = entity("world", "bodies", robot, root) if root else entity("world", "robots", robot)
         spec = self._specs.get(robot)
         name = (spec.label if spec else "") or robot
-        text = f"{name}: {doing}" if doing else name
+        text = drawable(f"{name}: {doing}" if doing else name)
         height = self._height(robot) if root else _STAND_IN_M[1]
         if self._labels.get(robot) == (path + text, height):
             return

@@ -285,7 +285,7 @@ def test_odd_orders_are_drawn_as_far_as_they_can_be(tmp_path: Path) -> None:
     ]  # fmt: skip
     path = written(tmp_path / "odd.rrd", changes)
     assert bars(path, "hsr") == [(5.0, "p1/t1#1"), (9.0, "")]
-    assert rows(path, "/robots/hsr", "labels")[-1].value == ["✖ navigate kitchen"]
+    assert rows(path, "/robots/hsr", "labels")[-1].value == ["✗ navigate kitchen"]
     assert bars(path, "stranger") == [(20.0, "p1/t1#2"), (31.0, "")]
     assert "t1" not in rows(path, "/fleet/dag/p1", "node_ids")[-1].value
     assert sorted(rows(path, "/fleet/dag/p2", "node_ids")[-1].value) == [s.task for s in STEPS]

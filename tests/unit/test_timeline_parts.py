@@ -16,6 +16,7 @@ from fleet.timeline.lanes import Bar, Lane, call_text
 from fleet.timeline.palette import Palette
 from fleet.timeline.read import rows
 from fleet.timeline.sink import Sink, open_stream
+from fleet.timeline.text import DRAWN, drawable
 from fleet.timeline.trails import CORNERS, Trail
 from fleet.timeline.utilisation import Utilisation
 from keyexpr_schema.tasks import TaskState
@@ -175,3 +176,14 @@ def test_colours_stay_and_the_first_ones_differ() -> None:
         palette.skill(s) for s in ("navigate", "search", "pick", "place", "place_on_robot", "fly")
     ]
     assert len(set(skills)) == 6
+
+
+@given(st.text())
+def test_every_text_becomes_one_that_the_viewer_can_draw(text: str) -> None:
+    assert DRAWN.issuperset(drawable(text))
+
+
+def test_text_that_can_be_drawn_stays_and_other_text_becomes_plainer() -> None:
+    fine = "Bring die Tasse in den Flur, “schön”; Ελλάς, кухня ✓"
+    assert drawable(fine) == fine
+    assert drawable("scho\u0308n ﬁne\tcup ☕杯\u200b") == "schön fine cup ??"

@@ -7,11 +7,14 @@ import sys
 from pathlib import Path
 
 import pytest
-from timeline_mission import mission
+from timeline_mission import mission, put
 
 from fleet.timeline.recorder import Recorder
 from fleet.timeline.screenshot import DRIVER, main
 from fleet.timeline.sink import open_stream
+from fleet.timeline.text import DRAWN
+from keyexpr_schema.goals import Goal, GoalAddress
+from keyexpr_schema.keyspace import GOAL_SPEC
 
 
 def driver_is_installed() -> bool:
@@ -42,6 +45,25 @@ def test_a_picture_has_the_size_asked_for_and_changes_with_time(recording, tmp_p
         assert data.startswith(b"\x89PNG")
         assert struct.unpack(">II", data[16:24]) == (800, 450)
     assert early.read_bytes() != late.read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    sys.platform != "linux" or not driver_is_installed(), reason=f"needs {DRIVER} or another driver"
+)
+def test_a_sentence_in_any_script_can_be_drawn(tmp_path):
+    """The viewer ends at a character that its font lacks, so every one that we let through."""
+    path = tmp_path / "glyphs.rrd"
+    recorder = Recorder(open_stream(path, "杯子 ☕"))
+    signs = sorted(DRAWN - {"\n"})
+    lines = ["".join(signs[i : i + 30]) for i in range(0, len(signs), 30)]
+    for number, text in enumerate(["把第一个杯子拿到走廊 ☕", *lines]):
+        goal = f"g{number}"
+        at_s = 1.0 + 0.01 * number
+        recorder.record(put(GOAL_SPEC, GoalAddress(goal=goal), Goal(goal=goal, text=text), at_s))
+    recorder.close()
+    assert main([str(path), str(tmp_path / "glyphs.png"), "--size", "1600x2000"]) == 0
+    assert (tmp_path / "glyphs.png").stat().st_size > 10_000
 
 
 @pytest.mark.slow

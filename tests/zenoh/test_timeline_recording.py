@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from fleet.timeline import viewer
 from fleet.timeline.errors import UnreadableRecording
 from fleet.timeline.read import Row, rows, summary
 from keyexpr_schema.goals import Goal, GoalAddress
@@ -24,14 +26,22 @@ from keyexpr_schema.tasks import TaskAddress, TaskRecord, TaskState
 DEADLINE_S = 30.0
 
 
+def start(endpoint: str, out: Path, view: bool = False) -> subprocess.Popen[str]:
+    """A recorder in a process of its own, on a machine without a screen."""
+    code = (
+        "from pathlib import Path; from fleet.timeline.process import run; "
+        f"run(({endpoint!r},), 'robotfleet', Path({str(out)!r}), view={view})"
+    )
+    env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    return subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=env
+    )
+
+
 @contextmanager
 def recorder(endpoint: str, out: Path) -> Iterator[subprocess.Popen[str]]:
     """A recorder that is ready."""
-    code = (
-        "from pathlib import Path; from fleet.timeline.process import run; "
-        f"run(({endpoint!r},), 'robotfleet', Path({str(out)!r}))"
-    )
-    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    process = start(endpoint, out)
     assert process.stdout is not None
     try:
         assert process.stdout.readline().strip() == f"recording to {out}"
@@ -131,6 +141,32 @@ async def test_a_recorder_carries_on_after_the_router_was_away(router, session_c
             assert lane[-1] == Row(7.0, [""])
         process.send_signal(signal.SIGTERM)
         assert await asyncio.to_thread(process.wait, DEADLINE_S) == 0
+
+
+@pytest.mark.slow
+async def test_a_viewer_can_look_on_while_it_records(router, session_config, tmp_path):
+    """Without a screen the recorder says how; whoever connects there gets what is recorded."""
+    out, seen = tmp_path / "run.rrd", tmp_path / "seen.rrd"
+    process = start(router.endpoint, out, view=True)
+    assert process.stdout is not None
+    looking = None
+    try:
+        line = process.stdout.readline()
+        assert line.startswith("there is no screen here; look on with: rerun --connect ")
+        assert process.stdout.readline().strip() == f"recording to {out}"
+        async with open_session(session_config(component="test")) as session:
+            looking = viewer.start([line.split()[-1], "--save", str(seen)])
+            await session.confirm(GOAL_SPEC, GoalAddress(goal="g1"), Goal(goal="g1", text="see"))
+            await until_written(out, "/fleet/log/goals", "text", 1)
+        process.send_signal(signal.SIGTERM)
+        assert await asyncio.to_thread(process.wait, DEADLINE_S) == 0
+        await until_written(seen, "/fleet/log/goals", "text", 1)
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+        if looking is not None:
+            viewer.end(looking)
 
 
 def test_without_a_router_the_recorder_says_so(tmp_path):

@@ -37,6 +37,13 @@ class Replies:
     errors: list[str] = field(default_factory=list)
     timed_out: bool = False
 
+    def note_error(self, data: bytes) -> None:
+        """Take in the payload of an error reply."""
+        if data == _TIMED_OUT:
+            self.timed_out = True
+        else:
+            self.errors.append(data.decode(errors="replace"))
+
 
 @dataclass(frozen=True)
 class Request:
@@ -204,21 +211,15 @@ class Link:
             if not done.done():
                 done.set_result(None)
 
-        def collect(value: Wire | bytes) -> None:
-            if isinstance(value, Wire):
-                replies.values.append(value)
-                if first:
-                    finish()
-            elif value == _TIMED_OUT:
-                replies.timed_out = True
-            else:
-                replies.errors.append(value.decode(errors="replace"))
-
         def on_reply(reply: zenoh.Reply) -> None:
-            if reply.ok is not None:
-                self.hand_over(collect, read_sample(reply.ok))
+            # On a network thread: a list takes appends from there, and one wake-up is enough.
+            sample = reply.ok
+            if sample is not None:
+                replies.values.append(read_sample(sample))
+                if first:
+                    self.hand_over(finish)
             elif reply.err is not None:
-                self.hand_over(collect, reply.err.payload.to_bytes())
+                replies.note_error(reply.err.payload.to_bytes())
 
         def ask() -> None:
             self._session.get(
@@ -300,8 +301,8 @@ class Link:
         for reply in await asyncio.to_thread(ask):
             if reply.ok is not None:
                 replies.values.append(read_sample(reply.ok))
-            elif reply.err is not None and reply.err.payload.to_bytes() == _TIMED_OUT:
-                replies.timed_out = True
+            elif reply.err is not None:
+                replies.note_error(reply.err.payload.to_bytes())
         return replies
 
     @asynccontextmanager

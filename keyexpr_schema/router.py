@@ -200,7 +200,8 @@ async def run_router(
 ) -> AsyncIterator[None]:
     """A router on the `listen` endpoints, until the block ends.
 
-    `connect` names other routers; one of them should have a `store` and the others none.
+    `connect` names other routers, which may start later; one of all should have a `store` and the
+    others none, because two stores do not align after they were apart.
 
     Raises:
         CannotListen: an endpoint is taken or not valid.
@@ -208,8 +209,9 @@ async def run_router(
     try:
         config = zenoh_config("router", listen=listen, connect=connect, lease_s=lease_s)
         config.insert_json5("listen/exit_on_failure", "true")
-        # Another router that is away must not keep this one from starting.
-        config.insert_json5("connect/timeout_ms", "0")
+        # Another router that is away must not keep this one from starting; with a timeout of 0
+        # it would be tried once and never again.
+        config.insert_json5("connect/timeout_ms", "-1")
         config.insert_json5("connect/exit_on_failure", "false")
         session = await asyncio.shield(asyncio.to_thread(zenoh.open, config))
     except zenoh.ZError as error:

@@ -176,7 +176,9 @@ class Session:
                 return True
             if gone and stored is None and not replies.timed_out and not replies.errors:
                 wires = await self._settled(keyexpr, 2.0)
-                if max((w.stamp for w in wires), default=ours) >= ours:
+                newest = max((w.stamp for w in wires), default=ours)
+                # Absent proves the deletion only where the query followed it down one link.
+                if newest >= ours and self.link.generation == generation:
                     return True
             if loop.time() >= resend_at_s:
                 return False

@@ -43,6 +43,7 @@ class TokenWatch(Generic[A]):
         self._filled = asyncio.Event()
         self._synced = asyncio.Event()
         self._wake = asyncio.Event()
+        self._failure: BaseException | None = None
         self._generation = link.generation
 
     def __aiter__(self) -> TokenWatch[A]:
@@ -50,6 +51,8 @@ class TokenWatch(Generic[A]):
 
     async def __anext__(self) -> TokenChange[A]:
         while not self._ready:
+            if self._failure is not None:
+                raise self._failure
             self._filled.clear()
             await self._filled.wait()
         return self._ready.popleft()
@@ -64,6 +67,7 @@ class TokenWatch(Generic[A]):
         async with self._link.tokens_watched(self._pattern, self._on_sample):
             with self._link.listening(self._wake.set):
                 task = asyncio.create_task(self._judge_for_ever())
+                task.add_done_callback(self._end)
                 try:
                     yield self
                 finally:
@@ -94,6 +98,13 @@ class TokenWatch(Generic[A]):
     def _report(self, address: A, alive: bool) -> None:
         self._ready.append(TokenChange(address, alive))
         self._filled.set()
+
+    def _end(self, task: asyncio.Task[None]) -> None:
+        """A fault of the judge must reach the reader, who would wait for ever."""
+        if not task.cancelled():
+            self._failure = task.exception()
+            self._filled.set()
+            self._synced.set()
 
     async def _judge_for_ever(self) -> None:
         loop = asyncio.get_running_loop()

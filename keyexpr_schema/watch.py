@@ -125,12 +125,15 @@ class Watch:
         self._filled = asyncio.Event()
         self._synced = asyncio.Event()
         self._wake = asyncio.Event()
+        self._failure: BaseException | None = None
 
     def __aiter__(self) -> Watch:
         return self
 
     async def __anext__(self) -> Change[Any, Any]:
         while not self._ready:
+            if self._failure is not None:
+                raise self._failure
             self._filled.clear()
             await self._filled.wait()
         return self._ready.popitem(last=False)[1]
@@ -161,11 +164,19 @@ class Watch:
                 await stack.enter_async_context(link.subscribed(selection.pattern, selection.offer))
             stack.enter_context(link.listening(self.relist))
             task = asyncio.create_task(self._list_for_ever())
+            task.add_done_callback(self._end)
             try:
                 yield self
             finally:
                 task.cancel()
                 await asyncio.gather(task, return_exceptions=True)
+
+    def _end(self, task: asyncio.Task[None]) -> None:
+        """A fault of the listing must reach the reader, who would wait for ever."""
+        if not task.cancelled():
+            self._failure = task.exception()
+            self._filled.set()
+            self._synced.set()
 
     async def _list_for_ever(self) -> None:
         stored = [selection for selection in self._selections if selection.key.stored]

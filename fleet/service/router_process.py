@@ -20,8 +20,8 @@ def run(listen: tuple[str, ...], connect: tuple[str, ...], data_dir: Path | None
     """Be a router until SIGTERM or SIGINT; prints one line once it listens.
 
     `listen` and `connect` are Zenoh endpoints such as `tcp/127.0.0.1:7447`; port 0 takes a free
-    one. `connect` names routers on other hosts. The store lies in `data_dir`; None: a router without
-    a store, for the other hosts of a fleet whose store is elsewhere.
+    one. `connect` names routers on other hosts. The store lies in `data_dir`; None: a router
+    without a store, for the other hosts of a fleet whose store is elsewhere.
 
     Raises:
         SystemExit: with 1 and one sentence on stderr, when it cannot start.

@@ -151,6 +151,19 @@ async def test_a_client_of_a_second_router_reaches_the_store_of_the_first(router
         assert (await asyncio.wait_for(anext(watch), 5)).value == goal("g1")
 
 
+async def test_a_router_that_starts_before_the_one_it_names_finds_it_later(router):
+    endpoint = with_port("tcp/127.0.0.1:0")
+    router.kill()
+    async with (
+        run_router((endpoint,), (router.endpoint,)),
+        open_session(SessionConfig(endpoints=(endpoint,))) as far,
+    ):
+        for number in range(2):  # and finds it again
+            router.restart()
+            await far.confirm(GOAL_SPEC, GoalAddress(f"g{number}"), goal(f"g{number}"), 20)
+        assert len(await far.list(GOAL_SPEC)) == 2
+
+
 async def test_a_list_of_two_routers_survives_the_death_of_the_first(router, tmp_path):
     second = with_port("tcp/127.0.0.1:0")
     with SqliteStore(tmp_path / "second") as store:

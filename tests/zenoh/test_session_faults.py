@@ -298,6 +298,23 @@ async def test_tokens_come_and_go_and_survive_the_watchers_lost_link(router, ses
             await take(watch, 1, 4.0)
 
 
+async def test_a_frozen_router_is_noticed_and_nobody_is_declared_lost(router, session_config):
+    a = AliveAddress("r1", "a")
+    async with (
+        open_session(session_config(lease_s=1.0)) as planner,
+        open_session(session_config()) as worker,
+        worker.token(ROBOT_ALIVE, a),
+        planner.watch_tokens(ROBOT_ALIVE, 0.2) as watch,
+    ):
+        assert (await take(watch, 1))[0].alive
+        router.freeze()
+        await until(lambda: _not_connected(planner))
+        router.thaw()
+        await planner.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"), 20)
+        with pytest.raises(TimeoutError):
+            await take(watch, 1, 3.0)
+
+
 async def test_a_token_lost_while_the_watcher_was_cut_off_is_reported(router, session_config):
     a = AliveAddress("r1", "a")
     async with (

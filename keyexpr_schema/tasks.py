@@ -68,6 +68,8 @@ class TaskRecord(Payload, frozen=True, kw_only=True):
     robot: Id | None
     state: TaskState
     after: tuple[Id, ...] = ()
+    behind: tuple[Id, ...] = ()
+    """Tasks that its robot has to do first, because of the allocation."""
     goal: Id | None = None
     attempt: int = 0
     tries: tuple[Try, ...] = ()

@@ -90,7 +90,7 @@ class FleetModel:
         )
         book = self.state.plans[order.plan]
         record = book.records[order.task]
-        for before in (*record.after, *book.extra_after.get(order.task, ())):
+        for before in (*record.after, *record.behind):
             if before in book.records:
                 assert book.records[before].state.value == "succeeded", "ordered before its time"
         busy = [

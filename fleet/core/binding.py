@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fleet.core.checker import CheckedPlan, eligible
+from fleet.core.checker import CheckedPlan
+from fleet.core.requirements import eligible
 from fleet.core.schedule import actors_of
 from fleet.core.world_model import WorldModel
 from keyexpr_schema.ids import ACTOR_PREFIX

@@ -301,6 +301,7 @@ def plan_made(state: State, event: events.PlanMade) -> State:
             robot=event.allocation[task.actor],
             state=TaskState.WAITING,
             after=task.after,
+            behind=event.extra_after.get(task.task, ()),
             goal=task.goal,
             duration_s=event.durations_s.get(task.task, task.duration_s),
         )
@@ -310,7 +311,6 @@ def plan_made(state: State, event: events.PlanMade) -> State:
         plan=plan,
         state=PlanState.RUNNING if running else PlanState.READY,
         records=records,
-        extra_after=event.extra_after,
         allocation=event.allocation,
         sequence=event.sequence,
         job=None,

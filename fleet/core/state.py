@@ -49,7 +49,6 @@ class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
     planner: str = "symbolic"
     start: bool = True
     records: dict[str, TaskRecord] = {}
-    extra_after: dict[str, tuple[str, ...]] = {}
     allocation: dict[str, str] = {}
     sequence: dict[str, tuple[str, ...]] = {}
     job: Job | None = None

@@ -226,7 +226,7 @@ def _mark_reached(state: State, book: PlanBook, skills: Skills) -> State:
 def _dispatch(state: State, plan: str, record: TaskRecord, skills: Skills) -> State:
     """Order a waiting task if nothing holds it back; replan if the world is not as it must be."""
     book = state.plans[plan]
-    befores = (*record.after, *book.extra_after.get(record.task, ()))
+    befores = (*record.after, *record.behind)
     if any(
         book.records[before].state is not TaskState.SUCCEEDED
         for before in befores

@@ -160,8 +160,19 @@ def first_unmet(
 
 def room_left(robot: str, facts: Mapping[Variable, Value], world: WorldModel) -> int:
     """How many more objects go into a robot's basket."""
-    inside = sum(
-        facts.get(Variable("at", thing)) == robot and facts.get(Variable("holding", robot)) != thing
+    return capacity(robot, world) - len(in_basket(robot, facts, world))
+
+
+def capacity(robot: str, world: WorldModel) -> int:
+    """How many objects a robot's basket takes."""
+    return int(world.capability(robot, "basket") or 0)
+
+
+def in_basket(robot: str, facts: Mapping[Variable, Value], world: WorldModel) -> list[str]:
+    """The objects in a robot's basket: at the robot, and not in its hand."""
+    return [
+        thing
         for thing in world.objects
-    )
-    return int(world.capability(robot, "basket") or 0) - inside
+        if facts.get(Variable("at", thing)) == robot
+        and facts.get(Variable("holding", robot)) != thing
+    ]

@@ -72,7 +72,7 @@ class Drawing:
             kept = record.state in (TaskState.SUCCEEDED, TaskState.RUNNING)
             if name not in wanted and record.revision < revision and not kept:
                 continue
-            after = wanted[name].after if name in wanted else record.after
+            after = (*(wanted[name].after if name in wanted else record.after), *record.behind)
             nodes.append(
                 _node(
                     name, record.skill, record.args, record.actor, record.robot, record.state, after

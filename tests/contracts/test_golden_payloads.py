@@ -1,4 +1,4 @@
-"""Bytes of every payload as they were once written still decode, and are written the same.
+"""Bytes of every payload as they were once written still decode, and nothing in them is lost.
 
 A new payload type, or a new field: run `python tests/contracts/test_golden_payloads.py` and commit
 what it adds under golden/. Bytes that are there are never rewritten.
@@ -68,15 +68,22 @@ CASES = [(name, kind, v) for name, kind in top_level().items() for v in ("full",
 
 
 @pytest.mark.parametrize(("name", "kind", "variant"), CASES)
-def test_golden_bytes_decode_and_are_written_again(name, kind, variant):
+def test_golden_bytes_decode_and_nothing_in_them_is_lost(name, kind, variant):
     path = GOLDEN / f"{name}.{variant}.json"
     assert path.exists(), f"run python {__file__} and commit {path.name}"
     data = path.read_bytes()
-    value = variants(kind)[variant]
     decoded = decode_payload(kind, data, path.name)
-    assert decoded == value
-    assert msgspec.json.decode(msgspec.json.encode(value)) == msgspec.json.decode(data)
-    assert msgspec.json.encode(decoded) == data
+    written = msgspec.json.decode(msgspec.json.encode(decoded))
+    assert covers(written, msgspec.json.decode(data))
+
+
+def covers(new: Any, old: Any) -> bool:
+    """Whether `new` says all that `old` says; it may have fields that `old` lacks."""
+    if isinstance(old, dict):
+        return isinstance(new, dict) and all(k in new and covers(new[k], v) for k, v in old.items())
+    if isinstance(old, list):
+        return len(new) == len(old) and all(map(covers, new, old))
+    return new == old
 
 
 def test_no_golden_bytes_without_a_payload():

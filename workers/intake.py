@@ -23,6 +23,11 @@ TaskName = tuple[str, str]
 AttemptName = tuple[str, str, int]
 """`(plan, task, attempt)`."""
 
+LARGEST_ATTEMPT = 10**18
+"""An attempt is a chunk of its report's key, of at most 18 digits."""
+LARGEST = 2**63
+"""What the journal's file can hold."""
+
 
 class Phase(str, Enum):
     """How far an attempt has come on this robot."""
@@ -136,6 +141,15 @@ def decide(ledger: Ledger, order: Order) -> Decision:
     if objection is not None:
         return Refuse(objection)
     return Cancel() if order.cancelled else Accept()
+
+
+def malformed(order: Order) -> str | None:
+    """What is wrong with the numbers of an order that decoded, or `None`."""
+    if not 1 <= order.attempt < LARGEST_ATTEMPT:
+        return f"attempt {order.attempt} is not a count: attempts go from 1 up"
+    if not (0 <= order.epoch < LARGEST and 0 <= order.revision < LARGEST):
+        return f"epoch {order.epoch} and revision {order.revision} must be from 0 up, in 63 bits"
+    return None
 
 
 def superseded(ledger: Ledger, order: Order) -> tuple[AttemptName, ...]:

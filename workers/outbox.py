@@ -6,7 +6,7 @@ import asyncio
 import logging
 from collections.abc import Callable
 
-from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.errors import SchemaError, UndecodablePayload
 from keyexpr_schema.keyspace import FACT, REPORT
 from keyexpr_schema.session import Session
 from keyexpr_schema.world import Fact, FactAddress
@@ -76,5 +76,8 @@ class Outbox:
         stored fact from the future is one from before the fleet's clock was set back (a
         simulation that was started anew) and counts for nothing.
         """
-        stored = await self._session.get(FACT, address)
+        try:
+            stored = await self._session.get(FACT, address)
+        except UndecodablePayload:
+            return False
         return stored is not None and fact.time_s < stored.time_s <= self._now_s()

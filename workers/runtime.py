@@ -27,6 +27,7 @@ from workers.intake import (
     Repeat,
     attempt_name,
     decide,
+    malformed,
     superseded,
 )
 from workers.journal import Journal
@@ -92,20 +93,29 @@ class Worker:
         alive = self._session.token(ROBOT_ALIVE, AliveAddress(robot, self.incarnation))
         sending = asyncio.create_task(self._outbox.run())
         try:
-            async with watched as watch, alive, asyncio.TaskGroup() as group:
-                group.create_task(self._follow(watch))
-                await first_senses(self._body)
-                group.create_task(self._presence.run())
-                await watch.synced()
-                await self._recover()
-                group.create_task(self._take_in())
-                group.create_task(self._execute())
-                group.create_task(_passing_on(sending))
-                self._ready.set()
+            async with watched as watch, alive:
+                try:
+                    async with asyncio.TaskGroup() as group:
+                        await self._serve(watch, sending, group)
+                finally:
+                    # While the token is still there: who sees it go must find the last report.
+                    await self._last_word()
         finally:
-            await self._last_word()
             sending.cancel()
             await asyncio.gather(sending, return_exceptions=True)
+
+    async def _serve(
+        self, watch: Watch, sending: asyncio.Task[None], group: asyncio.TaskGroup
+    ) -> None:
+        group.create_task(self._follow(watch))
+        await first_senses(self._body)
+        group.create_task(self._presence.run())
+        await watch.synced()
+        await self._recover()
+        group.create_task(self._take_in())
+        group.create_task(self._execute())
+        group.create_task(_passing_on(sending))
+        self._ready.set()
 
     async def _last_word(self) -> None:
         self._outbox.wake()
@@ -130,6 +140,8 @@ class Worker:
             address, order = await self._inbox.get()
             if order is None:
                 self._withdraw(address)
+            elif (wrong := malformed(order)) is not None:
+                self._session.reject(ORDER.build(address), ORDER.encode(order), wrong)
             elif OrderAddress(order.robot, order.plan, order.task) != address:
                 await self._refuse_misplaced(address, order)
             else:
@@ -220,7 +232,11 @@ class Worker:
         self._outbox.wake()
 
     def _context(self) -> SkillContext:
-        return SkillContext(self.spec, self._body, self._world)
+        return SkillContext(self._latest_spec(), self._body, self._world)
+
+    def _latest_spec(self) -> RobotSpec:
+        """The robot's spec as it is registered now: somebody may have changed it."""
+        return self._world.specs.get(self.spec.robot, self.spec)
 
     def _interrupted(
         self, order: Order, reason: str, facts: tuple[Fact, ...], started_s: float | None = None
@@ -253,7 +269,7 @@ class Worker:
 
     async def _carry_out(self, order: Order) -> None:
         try:
-            skill = self._registry.get(order.skill, self.spec.skills)
+            skill = self._registry.get(order.skill, self._latest_spec().skills)
             arguments = skill.bind(order.args, self.spec.robot, self._world)
         except (UnknownSkill, BadArguments) as error:
             refusal = report_on(

@@ -9,14 +9,15 @@ from pathlib import Path
 
 import pytest
 from conftest import RouterProcess
+from msgspec.structs import replace
 from worker_world import DEADLINE_S, Fleet, running_fleet
 
-from keyexpr_schema.keyspace import ORDER, REJECT, REPORT, ROBOT_ALIVE, ROBOT_STATE
+from keyexpr_schema.keyspace import FACT, ORDER, REJECT, REPORT, ROBOT_ALIVE, ROBOT_STATE
 from keyexpr_schema.motions import MotionKind
 from keyexpr_schema.robots import RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.session import SessionConfig
-from keyexpr_schema.tasks import OrderAddress, ReportAddress, ReportState
-from keyexpr_schema.world import NOTHING
+from keyexpr_schema.tasks import OrderAddress, Report, ReportAddress, ReportState
+from keyexpr_schema.world import NOTHING, Fact, FactAddress
 from sim.backend import Backend
 from sim.kinematic import Durations, KinematicBackend
 from sim.world_file import Mission
@@ -239,27 +240,88 @@ async def test_a_report_that_was_lost_is_put_again_and_nothing_moves(fleet_of: M
         assert len(fleet.world.begun) == moved
 
 
-async def test_an_order_that_cannot_be_read_disturbs_nobody(fleet_of: MakeFleet) -> None:
+async def first_report(fleet: Fleet, **fixed: str) -> Report:
+    """The first report on a key whose address has these values."""
+    async with asyncio.timeout(DEADLINE_S), fleet.session.watch((REPORT, dict(fixed))) as watch:
+        async for change in watch:
+            if change.value is not None:
+                return change.value  # type: ignore[no-any-return]
+    raise AssertionError("a watch does not end")
+
+
+async def test_orders_that_make_no_sense_disturb_nobody(fleet_of: MakeFleet) -> None:
     async with fleet_of() as fleet, fleet.worker("hsr"):
         running = await fleet.order("hsr", "t1", "navigate", to="kitchen")
-        bad = ORDER.build(OrderAddress("hsr", "p", "t0"))
-        fleet.session.link.send_soon(bad, b'{"robot": 5}', "application/json", block=True)
-        misplaced = await fleet.order("hsr", "t1", "navigate", to="hallway", attempt=9)
-        await fleet.session.confirm(ORDER, OrderAddress("hsr", "p", "other"), misplaced)
-        assert (await fleet.report(running)).state in (ReportState.SUCCEEDED, ReportState.CANCELLED)
+        await fleet.report(running, ReportState.STARTED)
+        keys = [ORDER.build(OrderAddress("hsr", "p", f"bad{n}")) for n in (1, 2, 3)]
+        zeroth = replace(running, task="bad2", attempt=0)
+        huge = replace(running, task="bad3", epoch=2**70)
+        for key, data in zip(
+            keys, (b'{"robot": 5}', ORDER.encode(zeroth), ORDER.encode(huge)), strict=True
+        ):
+            fleet.session.link.send_soon(key, data, "application/json", block=True)
+        await fleet.session.confirm(ORDER, OrderAddress("hsr", "p", "other"), running)
+        reasons: dict[str, str] = {}
         async with asyncio.timeout(DEADLINE_S), fleet.session.watch(REJECT) as watch:
             async for change in watch:
                 if change.value is not None and change.address.component == "worker-hsr":
-                    assert change.value.keyexpr == bad
-                    break
-        async with asyncio.timeout(DEADLINE_S):
-            watching = fleet.session.watch((REPORT, {"robot": "hsr", "task": "other"}))
-            async with watching as watch:
-                async for change in watch:
-                    assert change.value is not None
-                    assert change.value.state is ReportState.REFUSED
-                    assert "orders/p/t1" in change.value.reason
-                    break
+                    reasons[change.value.keyexpr] = change.value.reason
+                    if len(reasons) == 3:
+                        break
+        assert set(reasons) == set(keys)
+        assert "attempt 0 is not a count" in reasons[keys[1]]
+        report = await first_report(fleet, robot="hsr", task="other")
+        assert report.state is ReportState.REFUSED and not report.retryable
+        assert report.reason is not None and "orders/p/t1" in report.reason
+        assert (await fleet.report(running)).state is ReportState.SUCCEEDED
+
+
+async def test_a_later_attempt_takes_the_place_of_the_one_that_runs(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("hsr"):
+        first = await fleet.order("hsr", "t1", "navigate", to="kitchen")
+        await fleet.report(first, ReportState.STARTED)
+        second = await fleet.order("hsr", "t1", "navigate", attempt=2, to="hallway")
+        assert (await fleet.report(first)).state is ReportState.CANCELLED
+        assert (await fleet.report(second)).state is ReportState.SUCCEEDED
+        late = await fleet.order("hsr", "t1", "navigate", attempt=1, epoch=2, to="kitchen")
+        assert (await fleet.report(late)).state is ReportState.CANCELLED
+        assert fleet.world.backend.senses("hsr").place == "hallway"
+
+
+async def test_rubbish_on_the_key_of_a_fact_is_written_over(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("locobot"):
+        fleet.session.link.send_soon(
+            FACT.build(FactAddress("locobot", "at")), b"5", "application/json", block=True
+        )
+        report = await fleet.report(await fleet.order("locobot", "t1", "navigate", to="kitchen"))
+        assert report.state is ReportState.SUCCEEDED
+        at = await fleet.fact("at", "locobot")
+        assert at is not None and at.value == "kitchen"
+
+
+@skill("gossip")
+async def gossip(ctx: SkillContext) -> None:
+    """Sees a cup at once, and needs the robot's while to come back and tell."""
+    ctx.learn("at", "cup_1", "kitchen")
+    ctx.learn("at", "cup_2", "kitchen")
+    await ctx.do(MotionKind.GO_TO, place="kitchen")
+
+
+async def test_what_others_saw_later_is_not_overwritten(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("locobot", gossip, skills=("gossip",)):
+        fleet.world.paused = True
+        order = await fleet.order("locobot", "t1", "gossip")
+        started = (await fleet.report(order, ReportState.STARTED)).started_s
+        assert started is not None
+        later = Fact(subject="cup_1", relation="at", value="hsr", source="x", time_s=started + 0.1)
+        earlier_clock = replace(later, subject="cup_2", time_s=started + 1e6)
+        for fact in (later, earlier_clock):
+            await fleet.session.confirm(FACT, FactAddress(fact.subject, "at"), fact)
+        fleet.world.paused = False
+        assert (await fleet.report(order)).state is ReportState.SUCCEEDED
+        one, two = await fleet.fact("at", "cup_1"), await fleet.fact("at", "cup_2")
+        assert one == later
+        assert two is not None and (two.value, two.source) == ("kitchen", "locobot")
 
 
 @skill("trip")

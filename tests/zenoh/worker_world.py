@@ -187,7 +187,9 @@ class Fleet(Planner):
     ) -> AsyncIterator[Worker]:
         """A worker that is ready; the block's end cancels it."""
         spec = next(r.spec for r in self.mission.robots if r.spec.robot == robot)
-        spec = replace(spec, skills=(*spec.skills, *skills))
+        if skills:
+            spec = replace(spec, skills=(*spec.skills, *skills))
+            await self.session.confirm(ROBOT_SPEC, RobotAddress(robot), spec)
         async with AsyncExitStack() as stack:
             journal = stack.enter_context(Journal(self._data_dir / f"{robot}.journal"))
             session = await stack.enter_async_context(

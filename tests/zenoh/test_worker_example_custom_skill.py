@@ -1,0 +1,72 @@
+"""The example of a skill of one's own: its worker as a process, in front of a served world."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from conftest import RouterProcess
+from msgspec.structs import replace
+from worker_world import DEADLINE_S, Planner
+
+from keyexpr_schema.keyspace import ROBOT_SPEC
+from keyexpr_schema.robots import RobotAddress
+from keyexpr_schema.session import SessionConfig, open_session
+from keyexpr_schema.tasks import ReportState
+from sim.kinematic import KinematicBackend
+from sim.server import SimServer
+from sim.world_file import load_mission
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "custom_skill.py"
+
+
+async def test_the_example_counts_two_cups_in_the_kitchen(
+    session_config: Callable[..., SessionConfig], router: RouterProcess, tmp_path: Path
+) -> None:
+    mission = load_mission("two-cups")
+    robots = [(r.spec, r.start_m_rad) for r in mission.robots]
+    async with open_session(session_config(component="sim")) as session:
+        serving = asyncio.create_task(
+            SimServer(session, KinematicBackend(mission.world, robots), None).run()
+        )
+        planner = Planner(session, mission)
+        await planner.register()
+        spec = next(r.spec for r in mission.robots if r.spec.robot == "locobot")
+        spec = replace(spec, skills=(*spec.skills, "count"))
+        await session.confirm(ROBOT_SPEC, RobotAddress("locobot"), spec)
+        worker = await asyncio.create_subprocess_exec(
+            sys.executable,
+            str(EXAMPLE),
+            "locobot",
+            router.endpoint,
+            str(tmp_path / "data"),
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+        )
+        try:
+            order = await planner.order("locobot", "t1", "count", place="kitchen")
+            report = await planner.report(order)
+            assert report.state is ReportState.SUCCEEDED, report.reason
+            fact = await planner.fact("count_cup", "kitchen")
+            assert fact is not None and fact.value == 2 and fact.source == "locobot"
+            worker.terminate()
+            out, err = await asyncio.wait_for(worker.communicate(), DEADLINE_S)
+            assert worker.returncode == 0, err
+            assert out.startswith(b"worker locobot ready")
+            assert b"sees 2 of kind cup in kitchen" in err
+        finally:
+            if worker.returncode is None:
+                worker.kill()
+                await worker.communicate()
+            serving.cancel()
+            await asyncio.gather(serving, return_exceptions=True)
+
+
+async def test_without_words_it_says_how_it_is_called() -> None:
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, str(EXAMPLE), stderr=asyncio.subprocess.PIPE
+    )
+    _, err = await asyncio.wait_for(process.communicate(), DEADLINE_S)
+    assert process.returncode == 1 and b"examples/custom_skill.py locobot" in err

@@ -175,6 +175,8 @@ def _of_the_domain(error: BaseException) -> bool:
     Told by the module a class was defined in, so that no package is imported only to ask.
     """
     declared = {kind.__module__ for kind in type(error).__mro__}
+    if isinstance(error, BrokenPipeError):
+        return False  # `robotctl … | head`: typer ends quietly
     return isinstance(error, OSError) or any(
         module.split(".")[0] in _OURS and module.endswith(".errors") for module in declared
     )

@@ -85,13 +85,25 @@ async def _run(options: DemoOptions, ticker: Ticker, call: Call) -> Summary:
 
     from cli.demo.mission_run import running
 
-    # SIGTERM ends the demo as Ctrl-C does: by cancellation, so that no process stays behind.
     me = asyncio.current_task()
-    if me is not None:
-        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, me.cancel)
+    told = False
+
+    def stop() -> None:
+        nonlocal told
+        told = True
+        if me is not None:
+            me.cancel()
+
+    # SIGTERM ends the demo as Ctrl-C does: by cancellation, so that no process stays behind.
+    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, stop)
     call.warn(f"starting {options.mission}; logs go to {options.out}")
-    async with running(options, ticker.hear) as demo:
-        return await demo.fleet.guard(_play(demo, ticker))
+    try:
+        async with running(options, ticker.hear) as demo:
+            return await demo.fleet.guard(_play(demo, ticker))
+    except asyncio.CancelledError:
+        if told:
+            raise typer.Exit(128 + signal.SIGTERM) from None
+        raise
 
 
 async def _play(demo: Demo, ticker: Ticker) -> Summary:

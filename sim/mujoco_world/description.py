@@ -1,7 +1,7 @@
 """What the controllers must know of a robot model: the YAML file beside its MJCF, as types.
 
-A model NAME is two files in one folder, NAME.xml (MJCF) and NAME.yaml (this). Metres, radians;
-joint, actuator, site, geom and body names are those of the MJCF.
+A model NAME is two files in one folder, NAME.xml (MJCF) and NAME.model.yaml (this).
+Metres, radians; joint, actuator, site, geom and body names are those of the MJCF.
 """
 
 from __future__ import annotations
@@ -18,6 +18,9 @@ from sim.yaml_file import Entry, read_yaml
 
 MODELS = Path(__file__).resolve().parent.parent / "models"
 """The models that come with this package."""
+
+BESIDE_ROBOTS = Path("configs") / "robots"
+"""Where people keep robot files, and can put models of their own; from the working directory."""
 
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 
@@ -110,18 +113,20 @@ class RobotModel:
 
 
 def load_description(name: str, folders: Sequence[Path] = ()) -> RobotModel:
-    """The model called `name`, looked for in `folders`, then in `MODELS`.
+    """The model called `name`, looked for in `folders`, `BESIDE_ROBOTS`, then `MODELS`.
 
     Raises:
         BadFile: there is none, or its description says what cannot be.
     """
-    places = (*folders, MODELS)
+    places = (*folders, BESIDE_ROBOTS, MODELS)
     for folder in places:
-        mjcf, beside = folder / f"{name}.xml", folder / f"{name}.yaml"
+        mjcf, beside = folder / f"{name}.xml", folder / f"{name}.model.yaml"
         if not mjcf.is_file():
             continue
         if not beside.is_file():
-            raise BadFile(f"{mjcf} has no description: write {beside} (see sim/models/hsr.yaml)")
+            raise BadFile(
+                f"{mjcf} has no description: write {beside} (see sim/models/hsr.model.yaml)"
+            )
         found = read_yaml(beside, Description, "model description")
         _check(beside, found)
         return RobotModel(name=name, mjcf=mjcf, description=found)

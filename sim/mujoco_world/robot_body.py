@@ -62,9 +62,8 @@ class RobotBody:
             )
         except KeyError as error:
             part = str(error.args[0]).replace(self.prefix, "")
-            raise BadFile(
-                f"{found.mjcf.with_suffix('.yaml')} names what {found.mjcf.name} lacks: {part}"
-            ) from None
+            beside = found.mjcf.with_suffix(".model.yaml")
+            raise BadFile(f"{beside} names what {found.mjcf.name} lacks: {part}") from None
         self.basket_half_m = tuple(
             float(v) for v in (model.site_size[self.basket] if self.basket >= 0 else (0, 0, 0))
         )

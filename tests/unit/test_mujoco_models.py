@@ -88,9 +88,9 @@ def test_an_unknown_model_is_named_with_those_that_exist() -> None:
 
 def test_a_model_of_ones_own_is_found_first_and_needs_a_description(tmp_path: Path) -> None:
     shutil.copy(MODELS / "locobot.xml", tmp_path / "porter.xml")
-    with pytest.raises(BadFile, match=r"porter.xml has no description: write .*porter.yaml"):
+    with pytest.raises(BadFile, match=r"porter.xml has no description: write .*porter.model.yaml"):
         load_description("porter", [tmp_path])
-    shutil.copy(MODELS / "locobot.yaml", tmp_path / "porter.yaml")
+    shutil.copy(MODELS / "locobot.model.yaml", tmp_path / "porter.model.yaml")
     assert load_description("porter", [tmp_path]).mjcf == tmp_path / "porter.xml"
     spec = RobotSpec(robot="p", model="porter", skills=("navigate",), capabilities={"drive": 0.4})
     assert alone(spec, tmp_path).senses("p").basket == ()
@@ -99,17 +99,19 @@ def test_a_model_of_ones_own_is_found_first_and_needs_a_description(tmp_path: Pa
 def test_a_part_that_the_mjcf_lacks_is_named(tmp_path: Path) -> None:
     shutil.copy(MODELS / "locobot.xml", tmp_path / "porter.xml")
     text = (
-        (MODELS / "locobot.yaml").read_text().replace("basket: {site: basket", "basket: {site: tub")
+        (MODELS / "locobot.model.yaml")
+        .read_text()
+        .replace("basket: {site: basket", "basket: {site: tub")
     )
-    (tmp_path / "porter.yaml").write_text(text)
+    (tmp_path / "porter.model.yaml").write_text(text)
     spec = RobotSpec(robot="p", model="porter", skills=("navigate",), capabilities={"drive": 0.4})
-    with pytest.raises(BadFile, match=r"porter.yaml names what porter.xml lacks.*tub"):
+    with pytest.raises(BadFile, match=r"porter.model.yaml names what porter.xml lacks.*tub"):
         alone(spec, tmp_path)
 
 
 def test_mjcf_that_mujoco_refuses_is_named(tmp_path: Path) -> None:
     (tmp_path / "porter.xml").write_text("<mujoco><worldbody><bodyy/></worldbody></mujoco>")
-    shutil.copy(MODELS / "locobot.yaml", tmp_path / "porter.yaml")
+    shutil.copy(MODELS / "locobot.model.yaml", tmp_path / "porter.model.yaml")
     spec = RobotSpec(robot="p", model="porter", skills=("navigate",), capabilities={"drive": 0.4})
     with pytest.raises(BadFile, match=r"porter.xml: MuJoCo refuses this model: .*bodyy"):
         alone(spec, tmp_path)
@@ -118,8 +120,10 @@ def test_mjcf_that_mujoco_refuses_is_named(tmp_path: Path) -> None:
 def test_joint_values_must_be_as_many_as_joints(tmp_path: Path) -> None:
     shutil.copy(MODELS / "hsr.xml", tmp_path / "mine.xml")
     text = (
-        (MODELS / "hsr.yaml").read_text().replace("speeds: [0.3, 1.2, 1.6, 1.6]", "speeds: [0.3]")
+        (MODELS / "hsr.model.yaml")
+        .read_text()
+        .replace("speeds: [0.3, 1.2, 1.6, 1.6]", "speeds: [0.3]")
     )
-    (tmp_path / "mine.yaml").write_text(text)
+    (tmp_path / "mine.model.yaml").write_text(text)
     with pytest.raises(BadFile, match=r"arm.speeds has 1 values; arm.joints has 4"):
         load_description("mine", [tmp_path])

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import importlib
 import os
+import resource
 import subprocess
 import sys
-import time
 
 import pytest
 import typer.main
@@ -37,12 +37,17 @@ def test_help_imports_nothing_heavy() -> None:
 
 
 def test_help_is_instant() -> None:
-    """The best of several runs: what it costs where nobody else wants the processor."""
+    """The best of several runs, in processor time: what a wait is where nobody else runs."""
+
+    def children_s() -> float:
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return used.ru_utime + used.ru_stime
+
     times = []
     for _ in range(7):
-        begun_s = time.perf_counter()
+        before_s = children_s()
         run_help()
-        times.append(time.perf_counter() - begun_s)
+        times.append(children_s() - before_s)
     assert min(times) < HELP_S
 
 

@@ -34,8 +34,6 @@ REACH_M = 1.2
 MISS_M = 0.15
 """A hand that closes further than this from the object closes on nothing."""
 
-XY = tuple[float, float]
-
 
 @dataclass(frozen=True)
 class Durations:
@@ -73,6 +71,8 @@ class _Robot:
     capabilities: dict[str, float]
     pose: PoseMRad
     chance: random.Random
+    node: int
+    """Of the lattice: where it stands or is going."""
     holding: str | None = None
     basket: list[str] = field(default_factory=list)
     counts: dict[MotionKind, int] = field(default_factory=dict)
@@ -120,6 +120,7 @@ class KinematicBackend(Backend):
                 dict(spec.capabilities),
                 start,
                 random.Random(f"{seed}/{spec.robot}"),
+                self._routes.nearest(start),
             )
             for spec, start in robots
         }
@@ -174,6 +175,7 @@ class KinematicBackend(Backend):
             if me.route is None:
                 self._end(me, f"there is no way to {motion.place or motion.point_m} from here")
                 return
+            me.node = me.route.node
             takes_s = me.route.length_m / me.capabilities["drive"] + self._durations.settle_s
         if nth in scripted or unlucky:
             me.failure = _MISHAPS.get(motion.kind, "something was in the way")
@@ -187,6 +189,7 @@ class KinematicBackend(Backend):
         me = self._robots[robot]
         if me.state is MotionState.RUNNING:
             me.pose = self._pose(me)
+            me.node = self._routes.nearest(me.pose)
             me.state, me.reason, me.route = MotionState.STOPPED, "it was told to stop", None
 
     def _end(self, me: _Robot, failure: str | None) -> None:
@@ -206,7 +209,7 @@ class KinematicBackend(Backend):
 
     def _route(self, me: _Robot, motion: Motion) -> Route | None:
         if motion.place is not None and motion.kind is MotionKind.GO_TO:
-            taken = [self._goal(other) for other in self._robots.values() if other is not me]
+            taken = {other.node for other in self._robots.values() if other is not me}
             return self._routes.to_place(me.pose, motion.place, taken)
         assert motion.point_m is not None
         return self._routes.to_point(me.pose, motion.point_m, REACH_M)
@@ -311,10 +314,6 @@ class KinematicBackend(Backend):
             return me.pose
         whole = me.ends_s - me.begun_s
         return me.route.at(min(1.0, (self.time_s - me.begun_s) / whole) if whole > 0 else 1.0)
-
-    def _goal(self, me: _Robot) -> XY:
-        pose = me.route.at(1.0) if me.route is not None else me.pose
-        return (pose[0], pose[1])
 
     def _held_by(self, thing: _Thing) -> str | None:
         return next((r.name for r in self._robots.values() if r.holding == thing.name), None)

@@ -87,17 +87,20 @@ def _sentence(
             break
     message, _, below = str(error).partition(" - at `$")
     where = (place + below.rstrip("`")).lstrip(".")
-    message = re.sub(r"`([^`]*)`", r"\1", message)
-    message = message.replace("object contains unknown field", "there is no field")
-    message = message.replace("object missing required field", "it lacks the field")
-    for pythonic, plain in (
-        ("object", "a group of `name: value` lines"),
-        ("array", "a list"),
-        ("str", "text"),
-        ("float", "a number"),
-        ("int", "a whole number"),
-        ("bool", "true or false"),
-    ):
-        message = re.sub(rf"\b{pythonic}\b", plain, message)
     message = message[0].lower() + message[1:]
+    for spoken, plain in _WORDS:
+        message = message.replace(spoken, plain)
     return f"{path}: {where}: {message}" if where else f"{path}: {message}"
+
+
+_WORDS = (
+    ("object contains unknown field", "there is no field"),
+    ("object missing required field", "it lacks the field"),
+    ("`object`", "a group of `name: value` lines"),
+    ("`array`", "a list"),
+    ("`str`", "text"),
+    ("`float`", "a number"),
+    ("`int`", "a whole number"),
+    ("`bool`", "true or false"),
+)
+"""How msgspec puts it, and how a person would."""

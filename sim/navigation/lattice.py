@@ -18,6 +18,9 @@ TRACKING_M = 0.05
 PITCH_M = 2 * LARGEST_RADIUS_M + 2 * TRACKING_M
 """Distance of neighbouring nodes: two of the largest robots stand side by side."""
 
+OFFSET_M = 0.1
+"""Steps in which the lattice is shifted about: a line may miss a door's centre by half of that."""
+
 WALL_M = LARGEST_RADIUS_M + TRACKING_M
 
 
@@ -32,7 +35,7 @@ class Lattice:
     def __init__(self, world: WorldFile, clearance: Clearance | None = None) -> None:
         self._clearance = clearance or Clearance(world)
         best: tuple[tuple[int, int], tuple[float, float]] | None = None
-        steps = [round(k * 0.05, 2) for k in range(round(PITCH_M / 0.05))]
+        steps = [round(k * OFFSET_M, 2) for k in range(round(PITCH_M / OFFSET_M))]
         for offset in itertools.product(steps, steps):
             self._lay(world, offset)
             parts = self._parts()
@@ -43,11 +46,12 @@ class Lattice:
             if best is None or score > best[0]:
                 best = (score, offset)
         assert best is not None
-        self._lay(world, best[1])
+        self._slant(self._lay(world, best[1]))
         self.parts = self._parts()
         self._field = lru_cache(maxsize=512)(self._compute_field)
 
-    def _lay(self, world: WorldFile, offset: tuple[float, float]) -> None:
+    def _lay(self, world: WorldFile, offset: tuple[float, float]) -> dict[tuple[int, int], int]:
+        """Nodes and straight edges of the lattice at `offset`; the nodes by column and row."""
         nx, ny = (math.ceil(size / PITCH_M) + 1 for size in world.size_m)
         ij = np.array(list(itertools.product(range(nx), range(ny))))
         points = ij * PITCH_M + np.asarray(offset)
@@ -62,14 +66,20 @@ class Lattice:
             for di, dj in ((1, 0), (0, 1))
             if (i + di, j + dj) in nodes
         ]
-        ends = np.array(pairs).reshape(-1, 2)
+        ends = np.array(pairs, dtype=int).reshape(-1, 2)
         clear = self._clearance.along(self.points_m[ends[:, 0]], self.points_m[ends[:, 1]])
-        edges = set()
+        edges = []
         for (u, v), room in zip(pairs, clear, strict=True):
             if room >= WALL_M:
                 self.neighbours[u].append(v)
                 self.neighbours[v].append(u)
-                edges |= {(u, v), (v, u)}
+                edges.append((u, v))
+        self.edges = np.array(edges, dtype=int).reshape(-1, 2)
+        return nodes
+
+    def _slant(self, nodes: dict[tuple[int, int], int]) -> None:
+        edges = {tuple(pair) for pair in self.edges.tolist()}
+        edges |= {(v, u) for u, v in edges}
         slanted = [
             (u, w, a, b)
             for (i, j), u in nodes.items()
@@ -85,7 +95,6 @@ class Lattice:
             if room >= WALL_M:
                 self.diagonals[u][w] = (a, b)
                 self.diagonals[w][u] = (a, b)
-        self.edges = np.array(sorted((u, v) for u, v in edges if u < v)).reshape(-1, 2)
 
     def __len__(self) -> int:
         return len(self.points_m)

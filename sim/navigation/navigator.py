@@ -315,11 +315,12 @@ class Navigator:
         near = sorted(
             (other.name for other in others if other.static or traveller.goal is None),
             key=lambda other: math.dist(self._poses[other][:2], (x, y)),
-        )
+        )[:3]
+        reason = f"no way to {task.what}"
         if traveller.goal is None and task.place is not None:
-            reason = f"no free spot in {task.place}"
-        else:
-            reason = f"no way to {task.what}"
+            taken = frozenset().union(*(other.claims | {other.goal} for other in others))
+            if taken.issuperset(self._spots.waiting[task.place]):
+                reason = f"no free spot in {task.place}"
         if near:
             reason += f": {', '.join(near)} {'stands' if len(near) == 1 else 'stand'} in the way"
         self.cancel(name)

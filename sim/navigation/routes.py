@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import accumulate, pairwise
 
 import numpy as np
@@ -19,9 +19,10 @@ XY = tuple[float, float]
 
 
 class Route:
-    """A way along straight pieces. `points_m` are its corners; it ends facing `yaw_rad`."""
+    """A way along straight pieces. `points_m` are its corners; it ends at a node."""
 
-    def __init__(self, points_m: Sequence[XY], yaw_rad: float) -> None:
+    def __init__(self, points_m: Sequence[XY], yaw_rad: float, node: int) -> None:
+        self.node = node
         self._points, self._yaw = list(points_m), yaw_rad
         steps = (math.dist(a, b) for a, b in pairwise(points_m))
         self._ends = list(accumulate(steps, initial=0.0))
@@ -51,22 +52,21 @@ class Routes:
         self._lattice = Lattice(world, clearance)
         self._spots = Spots(world, self._lattice, clearance)
 
-    def to_place(self, start: PoseMRad, place: str, taken_m: Sequence[XY]) -> Route | None:
-        """To a waiting spot in `place`, rather one that is not among `taken_m`; `None`: no way."""
-        first = self._nearest(start[:2])
+    def to_place(self, start: PoseMRad, place: str, taken: Collection[int]) -> Route | None:
+        """To a waiting spot in `place`, rather one that is not among the nodes `taken`; `None`: no way."""
+        first = self.nearest(start[:2])
         field = self._lattice.field(frozenset({first}))
-        full = {self._nearest(point) for point in taken_m}
         spots = [n for n in self._spots.waiting[place] if math.isfinite(field[n])]
         if not spots:
             return None
-        best = min(spots, key=lambda n: (n in full, field[n], n))
+        best = min(spots, key=lambda n: (n in taken, field[n], n))
         return self._route(start, best, start[2])
 
     def to_point(self, start: PoseMRad, point_m: Sequence[float], reach_m: float) -> Route | None:
         """To the node nearest to `point_m`, facing it; `None`: there is none within reach."""
         target = (point_m[0], point_m[1])
         gaps = np.linalg.norm(self._lattice.points_m - target, axis=1)
-        field = self._lattice.field(frozenset({self._nearest(start[:2])}))
+        field = self._lattice.field(frozenset({self.nearest(start[:2])}))
         for node in np.argsort(gaps, kind="stable").tolist():
             if gaps[node] > reach_m:
                 return None
@@ -75,13 +75,14 @@ class Routes:
                 return self._route(start, node, math.atan2(target[1] - y, target[0] - x))
         return None
 
-    def _nearest(self, point_m: Sequence[float]) -> int:
+    def nearest(self, point_m: Sequence[float]) -> int:
+        """The node next to a point."""
         gaps = self._lattice.points_m - (point_m[0], point_m[1])
         return int(np.argmin((gaps**2).sum(axis=1)))
 
     def _route(self, start: PoseMRad, goal: int, yaw_rad: float) -> Route:
         field = self._lattice.field(frozenset({goal}))
-        node = self._nearest(start[:2])
+        node = self.nearest(start[:2])
         corners = [(start[0], start[1])]
         while True:
             x, y = (float(v) for v in self._lattice.points_m[node])
@@ -90,4 +91,4 @@ class Routes:
                 break
             around = [*self._lattice.neighbours[node], *self._lattice.diagonals[node]]
             node = min(around, key=lambda v: (field[v], v))
-        return Route(corners, yaw_rad)
+        return Route(corners, yaw_rad, goal)

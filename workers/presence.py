@@ -21,6 +21,8 @@ DRIVING_S = 0.5
 """Wall seconds between two states of which only the pose differs."""
 REPEAT_S = 5.0
 """Wall seconds after which a state is put again: a put while no router was there is lost."""
+PATIENCE_S = 3.0
+"""Wall seconds after which sensors that do not answer count as silent."""
 STOOD_STILL_M = 0.01
 
 
@@ -47,10 +49,11 @@ class Presence:
     async def feel(self) -> None:
         """Read the sensors once, now; what changed goes out."""
         try:
-            self._senses = await self._body.senses()
-        except (BodyUnreachable, SchemaError) as error:
+            async with asyncio.timeout(PATIENCE_S):
+                self._senses = await self._body.senses()
+        except (BodyUnreachable, SchemaError, TimeoutError) as error:
             if not self._silent:
-                self._log.warning("the robot's sensors give nothing: %s", error)
+                self._log.warning("the robot's sensors give nothing: %s", str(error) or "no answer")
             self._silent = True
         else:
             self._silent = False

@@ -38,7 +38,7 @@ async def make_safe(body: Embodiment) -> None:
         if outcome.reason is not None:
             _log.info("%s: stow: %s", body.robot, outcome.reason)
     except (BodyUnreachable, SchemaError, TimeoutError) as error:
-        _log.warning("%s could not be brought to rest: %s", body.robot, error or "no answer")
+        _log.warning("%s could not be brought to rest: %s", body.robot, str(error) or "no answer")
 
 
 async def first_senses(body: Embodiment) -> Senses:

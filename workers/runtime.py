@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections import deque
-
-from msgspec.structs import replace
 
 from keyexpr_schema.errors import SchemaError
-from keyexpr_schema.keyspace import ORDER, REPORT, ROBOT_ALIVE
+from keyexpr_schema.keyspace import ORDER, ROBOT_ALIVE
 from keyexpr_schema.robots import AliveAddress, RobotActivity, RobotSpec
 from keyexpr_schema.session import Session, Watch
 from keyexpr_schema.tasks import Order, OrderAddress, Report, ReportState
@@ -17,19 +14,8 @@ from keyexpr_schema.world import Fact
 from workers.context import SkillContext
 from workers.embodiment import Embodiment
 from workers.errors import BadArguments, UnknownSkill
-from workers.intake import (
-    Accept,
-    AttemptName,
-    Cancel,
-    Phase,
-    Refuse,
-    Renew,
-    Repeat,
-    attempt_name,
-    decide,
-    malformed,
-    superseded,
-)
+from workers.in_tray import InTray
+from workers.intake import Phase
 from workers.journal import Journal
 from workers.outbox import Outbox
 from workers.presence import Presence
@@ -40,7 +26,7 @@ from workers.recovery import (
     self_knowledge,
     stopped_half_way,
 )
-from workers.reports import report_address, report_on
+from workers.reports import report_on
 from workers.retry import run_attempt
 from workers.skill import SkillRegistry
 from workers.worldview import WORLD_KEYS, WorldView
@@ -70,11 +56,8 @@ class Worker:
         self._world = WorldView()
         self._presence = Presence(session, embodiment, incarnation)
         self._outbox = Outbox(session, journal, embodiment.now_s)
-        self._inbox: asyncio.Queue[tuple[OrderAddress, Order | None]] = asyncio.Queue()
-        self._queue: deque[AttemptName] = deque()
-        self._queued = asyncio.Event()
-        self._running: AttemptName | None = None
-        self._cancelled = asyncio.Event()
+        self._in_tray = InTray(session, journal, self._outbox, spec.robot, incarnation)
+        self._arrived: asyncio.Queue[tuple[OrderAddress, Order | None]] = asyncio.Queue()
         self._ready = asyncio.Event()
         self._log = logging.getLogger(f"robotfleet.worker.{spec.robot}")
 
@@ -131,88 +114,13 @@ class Worker:
     async def _follow(self, watch: Watch) -> None:
         async for change in watch:
             if change.key is ORDER:
-                self._inbox.put_nowait((change.address, change.value))
+                self._arrived.put_nowait((change.address, change.value))
             else:
                 self._world.apply(change)
 
     async def _take_in(self) -> None:
         while True:
-            address, order = await self._inbox.get()
-            if order is None:
-                self._withdraw(address)
-            elif (wrong := malformed(order)) is not None:
-                self._session.reject(ORDER.build(address), ORDER.encode(order), wrong)
-            elif OrderAddress(order.robot, order.plan, order.task) != address:
-                await self._refuse_misplaced(address, order)
-            else:
-                await self._take(order)
-
-    def _withdraw(self, address: OrderAddress) -> None:
-        for name in [n for n in self._queue if n[:2] == (address.plan, address.task)]:
-            self._queue.remove(name)
-            self._journal.dropped(name)
-
-    async def _refuse_misplaced(self, address: OrderAddress, order: Order) -> None:
-        said = OrderAddress(order.robot, order.plan, order.task)
-        reason = (
-            f"the order at {ORDER.build(address)} says that it is the one at {ORDER.build(said)}"
-        )
-        placed = replace(order, robot=address.robot, plan=address.plan, task=address.task)
-        if attempt_name(placed) not in self._journal.ledger.entries:
-            await self._say(
-                report_on(
-                    placed, self.incarnation, ReportState.REFUSED, reason=reason, retryable=False
-                )
-            )
-
-    async def _take(self, order: Order) -> None:
-        decision = decide(self._journal.ledger, order)
-        name = attempt_name(order)
-        if isinstance(decision, Accept):
-            for older in superseded(self._journal.ledger, order):
-                self._cancel(older, "a later attempt was ordered")
-            self._journal.queued(order)
-            self._queue.append(name)
-            self._queued.set()
-        elif isinstance(decision, Renew):
-            self._journal.renewed(order)
-        elif isinstance(decision, Cancel):
-            if name in self._journal.ledger.entries:
-                self._journal.renewed(order)
-                self._cancel(name)
-            else:
-                self._end_unstarted(order, "the order was cancelled before it started")
-        elif isinstance(decision, Repeat):
-            await self._say(decision.report)
-        elif isinstance(decision, Refuse):
-            self._log.warning("refuses %s of %s: %s", order.task, order.plan, decision.reason)
-            refusal = report_on(
-                order, self.incarnation, ReportState.REFUSED, reason=decision.reason
-            )
-            await self._say(refusal)
-
-    def _cancel(self, name: AttemptName, why: str = "the order was cancelled") -> None:
-        if name == self._running:
-            self._cancelled.set()
-        elif name in self._queue:
-            self._queue.remove(name)
-            order = self._journal.ledger.entries[name].order
-            self._end_unstarted(order, f"{why} before it started")
-
-    def _end_unstarted(self, order: Order, reason: str) -> None:
-        self._end(order, report_on(order, self.incarnation, ReportState.CANCELLED, reason=reason))
-
-    async def _say(self, report: Report) -> None:
-        """Report what is no news to the journal, unless it stands there already."""
-        address = report_address(report)
-        try:
-            stored = await self._session.get(REPORT, address)
-        except SchemaError as error:
-            self._log.info("cannot see whether %s is known: %s", REPORT.build(address), error)
-            stored = None
-        if stored is None or replace(stored, incarnation=report.incarnation) != report:
-            self._journal.send(report)
-            self._outbox.wake()
+            await self._in_tray.put(*await self._arrived.get())
 
     # --- what is done ----------------------------------------------------------------------------
 
@@ -255,17 +163,7 @@ class Worker:
     async def _execute(self) -> None:
         while True:
             self._presence.doing(RobotActivity.IDLE)
-            while not self._queue:
-                self._queued.clear()
-                await self._queued.wait()
-            name = self._queue.popleft()
-            order = self._journal.ledger.entries[name].order
-            self._running = name
-            self._cancelled.clear()
-            try:
-                await self._carry_out(order)
-            finally:
-                self._running = None
+            await self._carry_out(await self._in_tray.next())
 
     async def _carry_out(self, order: Order) -> None:
         try:
@@ -294,14 +192,13 @@ class Worker:
                 now_s=self._body.now_s,
                 make_safe=lambda: make_safe(self._body),
                 deadline_s=order.deadline_s,
-                cancelled=self._cancelled,
+                cancelled=self._in_tray.cancelled,
                 on_failure=ctx.taught,
             )
         except asyncio.CancelledError:
             reason = f"the worker of {self.spec.robot} was stopped while it did this"
             self._interrupted(order, reason, ctx.learned, started_s)
             raise
-        await self._presence.feel()  # others may go by the state as soon as they have the report
         report = report_on(
             order,
             self.incarnation,
@@ -313,7 +210,11 @@ class Worker:
             started_s=ended.started_s,
             ended_s=ended.ended_s,
         )
-        self._end(order, report, ctx.learned)
+        try:
+            # Others may go by the robot's state as soon as they have the report.
+            await self._presence.feel()
+        finally:
+            self._end(order, report, ctx.learned)
 
     def _end(self, order: Order, report: Report, facts: tuple[Fact, ...] = ()) -> None:
         """Write the end of an attempt into the journal; its facts and report go out from there."""

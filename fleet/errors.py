@@ -1,4 +1,7 @@
-"""Errors of the fleet package. What goes wrong in the domain is a value; these are for callers' mistakes."""
+"""Errors of the fleet package.
+
+What goes wrong in the domain is a value; these are for what a caller or a user got wrong.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +11,11 @@ class FleetError(Exception):
 
 
 class BadSkillFile(FleetError):
-    """A skill model cannot be read; the message says which skill, which line of it, and what is right."""
+    """A skill model cannot be read; the message says which skill and field, and what is right."""
 
 
 class NotUnderstood(FleetError):
-    """A sentence could not be turned into facts; the message says which words, and what would be."""
-
-
-class UnknownVariant(FleetError):
-    """A planner, strategy or allocator of this name does not exist; the message lists those that do."""
+    """A sentence could not be turned into facts; the message says which words, and the choices."""
 
 
 class Superseded(FleetError):

@@ -74,7 +74,7 @@ class Key(Generic[A, P]):
         fields = re.findall(r"\{(\w+)\}", self.template)
         if tuple(fields) != self.address.__struct_fields__:
             raise TypeError(
-                f"{self.name}: template fields {fields} are not the fields of {self.address.__name__}"
+                f"{self.name}: the template has {fields}, {self.address.__name__} has other fields"
             )
 
     @property

@@ -1,4 +1,4 @@
-"""A small household for tests of the planner's pure parts: three rooms, cups, two kinds of robots."""
+"""A small household for tests of the pure parts: three rooms, cups, two kinds of robots."""
 
 from __future__ import annotations
 

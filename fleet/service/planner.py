@@ -22,15 +22,17 @@ from fleet.service.event_journal import EventJournal
 from fleet.service.inbox import WATCHED, At, event_of, missed_deletions
 from fleet.service.outbox import Outbox
 from fleet.service.planning_desk import carry_out
+from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import (
     ANSWER,
-    FACT,
     GOAL_STATUS,
+    ORDER,
     PLAN_STATUS,
     PLANNER_ALIVE,
     PLANNER_STATUS,
     ROBOT_ALIVE,
     SIM_CLOCK,
+    TASK_RECORD,
 )
 from keyexpr_schema.service import PlannerAddress, PlannerAliveAddress, PlannerStatus
 from keyexpr_schema.session import Session, TokenWatch, Watch
@@ -81,7 +83,9 @@ class PlannerService:
                 self._session.token(PLANNER_ALIVE, PlannerAliveAddress(self._incarnation))
             )
             await self._catch_up(watch, tokens)
+            leftovers = await self._leftovers()
             self._speak()
+            self._carry_out(leftovers)
             if ready is not None:
                 ready.set()
             try:
@@ -157,9 +161,32 @@ class PlannerService:
 
         Until here nothing was ordered, since a report that is not read yet could forbid it.
         """
-        facts = [e for e in self._held or () if isinstance(e, Publish) and e.key is FACT]
+        held = [effect for effect in self._held or () if not isinstance(effect, MakePlan)]
         self._held = None
-        self._carry_out((*facts, *effects_of(self._state)))
+        self._carry_out((*held, *effects_of(self._state)))
+
+    async def _leftovers(self) -> list[Retract]:
+        """Documents of ours in the store that the state does not have.
+
+        A planner that was killed between its journal and a deletion leaves such; one that lost
+        its journal leaves its orders, which nobody would ever follow up.
+        """
+        wanted = {
+            effect.key.build(effect.address)
+            for effect in effects_of(self._state)
+            if isinstance(effect, Publish)
+        }
+        ours: tuple[Key[Any, Any], ...] = (ORDER, TASK_RECORD, PLAN_STATUS, GOAL_STATUS)
+        return [
+            Retract(key, address)
+            for key in ours
+            for address in await self._session.list(key, timeout_s=60.0)
+            if key.build(address) not in wanted
+            and getattr(address, "plan", None) not in self._past_plans(key)
+        ]
+
+    def _past_plans(self, key: Key[Any, Any]) -> tuple[str, ...]:
+        return () if key is ORDER else self._state.past_plans
 
     async def _listen(self, watch: Watch) -> None:
         async for change in watch:

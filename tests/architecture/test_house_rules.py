@@ -1,0 +1,126 @@
+"""The rules of the house that a machine can check."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from keyexpr_schema.keyspace import KEYSPACE
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("keyexpr_schema", "fleet", "workers", "sim", "cli")
+MODULES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+MAX_LINES = 400
+ZENOH_MODULES = {"wire.py", "link.py", "connecting.py", "router.py"}
+HEAVY = {"mujoco", "rerun", "pulp", "scipy", "networkx"}
+
+
+def names(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+def imports(path: Path) -> set[str]:
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            found.add(node.module.split(".")[0])
+    return found
+
+
+def test_packages_import_one_way() -> None:
+    """The contracts in pyproject.toml, checked by import-linter."""
+    checked = subprocess.run(
+        [Path(sys.executable).parent / "lint-imports", "--no-cache"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert checked.returncode == 0, checked.stdout
+
+
+def test_zenoh_is_imported_by_the_session_only() -> None:
+    users = {names(path) for path in MODULES if "zenoh" in imports(path)}
+    assert users == {f"keyexpr_schema/{name}" for name in ZENOH_MODULES}
+
+
+def test_no_key_is_spelled_outside_the_table() -> None:
+    """Every first chunk with a slash behind it, in a string that looks like a key expression."""
+    heads = sorted({re.escape(key.template.split("/")[0]) for key in KEYSPACE})
+    spelled = re.compile(rf"(?:{'|'.join(heads)})/[\w{{}}*/]+")
+    found = []
+    for path in MODULES:
+        if path.name == "keyspace.py":
+            continue
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        prose = {
+            id(node.value)
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        }
+        found += [
+            f"{names(path)}:{node.lineno}: {node.value}"
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Constant)
+            and isinstance(node.value, str)
+            and id(node) not in prose
+            and spelled.fullmatch(node.value)
+        ]
+    assert found == []
+
+
+@pytest.mark.parametrize("path", MODULES, ids=names)
+def test_modules_stay_small(path: Path) -> None:
+    lines = len(path.read_text(encoding="utf-8").splitlines())
+    assert lines <= MAX_LINES, f"{lines} lines: split what has grown two purposes"
+
+
+def test_no_module_is_named_for_having_no_purpose() -> None:
+    vague = {"utils.py", "util.py", "common.py", "helpers.py", "helper.py", "manager.py", "misc.py"}
+    assert [names(path) for path in MODULES if path.name in vague] == []
+
+
+def test_every_module_and_public_thing_says_what_it_is_for() -> None:
+    silent = []
+    for path in MODULES:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        if tree.body and not ast.get_docstring(tree):
+            silent.append(names(path))
+        for node in tree.body:
+            public = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
+            if public and not node.name.startswith("_") and not ast.get_docstring(node):
+                silent.append(f"{names(path)}: {node.name}")
+    assert silent == []
+
+
+@pytest.mark.parametrize("package", ["keyexpr_schema.keyspace", "fleet.core.step", "cli.main"])
+def test_heavy_libraries_wait_until_they_are_needed(package: str) -> None:
+    code = f"import sys, {package}; print(*({HEAVY!r} & set(sys.modules)))"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert loaded.stdout.strip() == ""
+
+
+def test_no_registry_or_index_is_named() -> None:
+    """A user's own package index serves the locks as well as anybody's."""
+    index = re.compile(r"--(?:extra-)?index-url|pypi\.org|files\.pythonhosted\.org", re.I)
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if listed.returncode != 0:
+        pytest.skip("not a git checkout, so there is no list of committed files to look through")
+    own = names(Path(__file__))
+    for name in filter(None, listed.stdout.split("\0")):
+        path = ROOT / name
+        if name == own or not path.is_file() or path.suffix in {".png", ".rrd"}:
+            continue
+        text = path.read_text(encoding="utf-8", errors="replace").replace("--no-emit-index-url", "")
+        assert not index.search(text), f"{name} names a package index"

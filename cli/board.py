@@ -6,9 +6,10 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from cli.errors import TooLate
+from keyexpr_schema.errors import Unreachable
 from keyexpr_schema.goals import ENDED_GOALS, Goal, GoalStatus
 from keyexpr_schema.key import Payload
 from keyexpr_schema.keyspace import (
@@ -34,12 +35,14 @@ from keyexpr_schema.simulation import ContactCount, Scene, SimClock, Truth
 from keyexpr_schema.tasks import TaskRecord
 
 if TYPE_CHECKING:
-    from keyexpr_schema.session import Change, Session
+    from keyexpr_schema.session import Change, Session, Watch
 
 FLEET = (GOAL_SPEC, GOAL_STATUS, PLAN_SPEC, PLAN_STATUS, TASK_RECORD, ROBOT_SPEC, ROBOT_STATE)
 """What any fleet has."""
 SIMULATION = (SIM_CLOCK, SIM_TRUTH, SIM_CONTACTS, SIM_SCENE, SIM_SENSES)
 """What only a simulated one has."""
+SYNC_S = 10.0
+"""Longest time for the store to list what it has."""
 
 
 @dataclass
@@ -140,7 +143,7 @@ class Board:
         except TimeoutError:
             raise TooLate(f"waited {timeout_s:g} s for {waiting_for}, in vain") from None
 
-    async def forever(self) -> None:
+    async def forever(self) -> NoReturn:
         """Return only by cancellation, or by what goes wrong in the background."""
         while self.failure is None:
             self.changed.clear()
@@ -156,6 +159,9 @@ async def following(
 
     `on_change` hears of each change before it is on the board. An error in the background is
     raised by `Board.until`.
+
+    Raises:
+        Unreachable: the store did not list what it has.
     """
     board = Board()
     async with session.watch(*keys) as watch:
@@ -172,8 +178,21 @@ async def following(
 
         follower = asyncio.create_task(follow())
         try:
-            await watch.synced()
+            await _synced(watch)
             yield board
         finally:
             follower.cancel()
             await asyncio.wait([follower])
+
+
+async def _synced(watch: Watch) -> None:
+    """Wait until all that is stored is on the board.
+
+    Once it was handed to the iterator the follower, which was woken first, drains it before this
+    task runs on.
+    """
+    try:
+        async with asyncio.timeout(SYNC_S):
+            await watch.synced()
+    except TimeoutError:
+        raise Unreachable(f"the store did not list what it has within {SYNC_S:g} s") from None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -10,6 +10,8 @@ from cli.command import Call, command
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+
+    from keyexpr_schema.session import Change
 
 status_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 watch_app = typer.Typer(rich_markup_mode=None, add_completion=False)
@@ -62,17 +64,33 @@ async def watch(
         str | None, typer.Argument(metavar="[PLAN]", help="Only this plan; else all.")
     ] = None,
 ) -> None:
-    """Follow goals, plans and tasks until Ctrl-C; a line a change where there is no terminal."""
+    """Follow goals, plans and tasks until Ctrl-C.
+
+    On a terminal a picture; piped, a line a change; with --json, a JSON document a line.
+    """
     from cli.board import FLEET, SIMULATION, following
     from cli.show.live import Ticker, showing
 
-    ticker = Ticker(call.json)
+    if call.json:
+        async with (
+            call.session() as session,
+            following(session, *FLEET, on_change=_as_json) as all_,
+        ):
+            await all_.forever()
+    ticker = Ticker(to_stderr=False, only=plan)
     async with (
         call.session() as session,
         following(session, *FLEET, *SIMULATION, on_change=ticker.hear) as board,
         showing(board, ticker, plan),
     ):
         await board.forever()
+
+
+def _as_json(change: Change[Any, Any]) -> None:
+    import msgspec
+
+    what = {"key": change.key.build(change.address), "value": change.value}
+    typer.echo(msgspec.json.encode(what).decode())
 
 
 @command(journal_app)

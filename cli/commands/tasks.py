@@ -31,6 +31,7 @@ async def list_(
     from cli.board import FLEET, following
     from cli.errors import check_known
     from cli.show.fleet_tables import tasks_table
+    from cli.show.words import natural
 
     async with call.session() as session, following(session, *FLEET) as board:
         pass
@@ -41,7 +42,10 @@ async def list_(
             set(board.plans) | set(board.plan_status),
             "make one with `robotctl plan create`",
         )
-    records = [record for (of, _), record in sorted(board.tasks.items()) if plan in (None, of)]
+    records = sorted(
+        (record for (of, _), record in board.tasks.items() if plan in (None, of)),
+        key=lambda record: (natural(record.plan), natural(record.task)),
+    )
     call.show(records, lambda: tasks_table(records, board.now_s) if records else "No tasks.")
 
 

@@ -8,7 +8,17 @@ import msgspec
 from rich.table import Table
 
 from cli.show.page import table
-from cli.show.words import call, capabilities, carried, doing, outcome, seconds, spent_s, value
+from cli.show.words import (
+    call,
+    capabilities,
+    carried,
+    doing,
+    natural,
+    outcome,
+    seconds,
+    spent_s,
+    value,
+)
 from keyexpr_schema.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.plans import Plan, PlanStatus
 from keyexpr_schema.robots import RobotSpec, RobotState
@@ -89,7 +99,7 @@ def goals_table(rows: Iterable[GoalRow]) -> Table:
 def plans_table(plans: Mapping[str, Plan], status: Mapping[str, PlanStatus]) -> Table:
     """One line a plan; also those that never came to have tasks."""
     rows = []
-    for name in sorted(set(plans) | set(status)):
+    for name in sorted(set(plans) | set(status), key=natural):
         plan, now = plans.get(name), status.get(name)
         rows.append(
             (

@@ -32,11 +32,12 @@ REDRAW_S = 0.2
 class Ticker:
     """Tells each change of a goal, plan or task in a line, where nothing draws a picture.
 
-    `to_stderr` keeps stdout for data.
+    `to_stderr` keeps stdout for data; `only` names the one plan that is of interest.
     """
 
-    def __init__(self, to_stderr: bool) -> None:
+    def __init__(self, to_stderr: bool, only: str | None = None) -> None:
         self._to_stderr = to_stderr
+        self._only = only
         self._told: dict[str, str] = {}
         self.silent = False
 
@@ -54,6 +55,8 @@ class Ticker:
         """Take in a change; say it if it is worth a line and was not said."""
         told = tell(change.value)
         if told is None or self.silent:
+            return
+        if self._only not in (None, getattr(change.address, "plan", self._only)):
             return
         time_s, sentence = told
         where = change.key.build(change.address)

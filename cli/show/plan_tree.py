@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from rich.text import Text
 from rich.tree import Tree
 
-from cli.show.words import STATE_STYLE, call, outcome, seconds, spent_s
+from cli.show.words import STATE_STYLE, call, natural, outcome, seconds, spent_s
 from keyexpr_schema.goals import Goal, GoalStatus
 from keyexpr_schema.plans import Plan, PlanStatus, Task
 from keyexpr_schema.tasks import TaskRecord, TaskState
@@ -32,9 +32,10 @@ def plan_tree(
 ) -> Tree:
     """Draw `plan`; `records` and goals are by id, `now_s` is the fleet's clock."""
     tree = Tree(_title(plan, status))
+    tasks = [*_earlier(plan, records), *plan.tasks]
     ids = list(plan.goals)
-    ids += sorted({task.goal for task in plan.tasks if task.goal} - set(ids))
-    ordered = in_order(plan.tasks)
+    ids += sorted({task.goal for task in tasks if task.goal} - set(ids))
+    ordered = in_order(tasks)
     for goal in ids:
         branch = tree.add(_goal(goal, goals.get(goal), goal_status.get(goal)))
         for task in ordered:
@@ -46,6 +47,24 @@ def plan_tree(
         for task in rest:
             branch.add(_task(task, records.get(task.task), status, now_s))
     return tree
+
+
+def _earlier(plan: Plan, records: Mapping[str, TaskRecord]) -> list[Task]:
+    """Tasks of earlier revisions that were begun; what was only planned is of no interest now."""
+    current = {task.task for task in plan.tasks}
+    return [
+        Task(
+            task=record.task,
+            skill=record.skill,
+            args=record.args,
+            actor=record.actor,
+            after=record.after,
+            goal=record.goal,
+            duration_s=record.duration_s,
+        )
+        for record in sorted(records.values(), key=lambda record: natural(record.task))
+        if record.task not in current and record.started_s is not None
+    ]
 
 
 def in_order(tasks: Sequence[Task]) -> list[Task]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from keyexpr_schema.plans import PlanStatus
@@ -78,5 +79,14 @@ def capabilities(spec: RobotSpec) -> str:
 def outcome(status: PlanStatus) -> str:
     """Why a plan stands as it does: its reason and every violation, or nothing."""
     parts = [status.reason] if status.reason else []
-    parts += [each.sentence for each in status.violations if each.sentence != status.reason]
+    for each in status.violations:
+        if not any(each.sentence in part for part in parts):
+            parts.append(each.sentence)
     return "; ".join(parts)
+
+
+def natural(name: str) -> tuple[tuple[int, str], ...]:
+    """A sort key that puts `t2` before `t10`."""
+    return tuple(
+        (int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", name)
+    )

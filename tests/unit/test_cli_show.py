@@ -7,6 +7,7 @@ import io
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 from rich.console import RenderableType
 
 from cli.commands.processes import parse_speed
@@ -15,6 +16,7 @@ from cli.errors import BadArgument
 from cli.show.live import tell
 from cli.show.page import page, table
 from cli.show.plan_tree import in_order, plan_tree
+from cli.show.words import natural, outcome
 from cli.telling import parse_value
 from keyexpr_schema.goals import Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.plans import Plan, PlanState, PlanStatus, Task, Violation
@@ -88,6 +90,33 @@ def test_the_tree_shows_goals_tasks_dependencies_actors_states_and_times() -> No
     assert "after t1" in lines[3]
 
 
+def test_work_of_earlier_revisions_stays_in_the_tree() -> None:
+    def earlier(task: str, started_s: float | None) -> TaskRecord:
+        return TaskRecord(
+            plan="p1",
+            revision=1,
+            task=task,
+            skill="search",
+            args={},
+            actor="a0",
+            robot="hsr",
+            state=TaskState.SUCCEEDED if started_s is not None else TaskState.CANCELLED,
+            goal=GOAL,
+            started_s=started_s,
+            ended_s=started_s,
+        )
+
+    text = drawn(
+        plan_tree(PLAN, None, {"t0": earlier("t0", 1.0), "t9": earlier("t9", None)}, {}, {})
+    )
+    assert "✓ t0 search()  a0→hsr  succeeded" in text
+    assert "t9" not in text
+
+
+def test_names_with_numbers_are_in_the_order_people_expect() -> None:
+    assert sorted(["t10", "t2", "a1", "t1"], key=natural) == ["a1", "t1", "t2", "t10"]
+
+
 def test_a_rejected_plan_shows_why() -> None:
     status = PlanStatus(
         plan="p1",
@@ -96,6 +125,8 @@ def test_a_rejected_plan_shows_why() -> None:
         violations=(Violation(code="cycle", sentence="t1 waits for itself."),),
     )
     assert "t1 waits for itself." in drawn(plan_tree(PLAN, status, {}, {}, {}))
+    said = replace(status, reason="it was rejected: t1 waits for itself.")
+    assert outcome(said) == "it was rejected: t1 waits for itself."
 
 
 @given(st.data())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -373,6 +374,46 @@ async def test_a_plan_is_shown_as_a_tree(robotctl: Robotctl, session_config: Mak
     assert task["task"]["state"] == "succeeded"
     assert task["reports"] == []
     assert "known are: t1" in wrong.err
+
+
+@pytest.mark.parametrize("flags", [[], ["--json"]])
+async def test_watch_tells_each_change_until_it_is_interrupted(
+    robotctl: Robotctl, session_config: MakeConfig, flags: list[str]
+) -> None:
+    async with open_session(session_config(component="planner")) as session:
+        await session.confirm(
+            GOAL_STATUS, GoalAddress("g1"), GoalStatus(goal="g1", state=GoalState.WAITING)
+        )
+        child = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "cli.main", "watch", *flags),
+            env={**robotctl.env, "PYTHONUNBUFFERED": "1"},
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+        )
+        assert child.stdout is not None
+        assert child.stderr is not None
+        try:
+            async with asyncio.timeout(20):
+                stored = (await child.stdout.readline()).decode()
+                await session.confirm(
+                    GOAL_STATUS, GoalAddress("g1"), GoalStatus(goal="g1", state=GoalState.REACHED)
+                )
+                changed = (await child.stdout.readline()).decode()
+            child.send_signal(signal.SIGINT)
+            code = await child.wait()
+            complaints = (await child.stderr.read()).decode()
+        finally:
+            if child.returncode is None:
+                child.kill()
+                await child.wait()
+    if flags:
+        assert json.loads(stored)["value"]["state"] == "waiting"
+        assert json.loads(changed)["key"] == "goals/g1/status"
+    else:
+        assert "goal g1 is waiting" in stored
+        assert "goal g1 is reached" in changed
+    assert code == 130
+    assert complaints == ""
 
 
 def test_fleets_of_different_realms_do_not_see_each_other(robotctl: Robotctl) -> None:

@@ -34,7 +34,7 @@ def runs(pid: int) -> bool:
 
 async def until(condition: Callable[[], bool]) -> None:
     async with asyncio.timeout(DEADLINE_S):
-        while not condition():  # noqa: ASYNC110 - /proc has no event to wait for
+        while not condition():
             await asyncio.sleep(0.02)
 
 

@@ -92,6 +92,7 @@ class RobotBody:
 
     def tick(self, ctrl: Any) -> None:
         """Read the hand's sensors, write all commands for the next control period."""
+        self.drive.carrying = self.held is not None
         self.drive.tick(ctrl)
         if self.arm is not None:
             self.arm.tick(ctrl)

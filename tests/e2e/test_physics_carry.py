@@ -209,3 +209,31 @@ def test_what_stands_on_the_spot_is_not_pushed_away() -> None:
     assert "cup_2 stands where cup_1 was to be set down" in (outcome.reason or "")
     assert math.dist(truth_of(backend, "cup_2").point_m, taken) < 0.002
     assert truth_of(backend, "cup_1").held_by == "hsr"
+
+
+def in_hand_m(backend: MujocoBackend, name: str) -> tuple[float, float, float]:
+    """Where a cup's base is, seen from the hand."""
+    import mujoco
+    import numpy as np
+
+    poses = backend.frame().poses
+    (hand, turn), (cup, _) = poses["hsr/hand"], poses[f"object/{name}"]
+    back, found = np.zeros(4), np.zeros(3)
+    mujoco.mju_negQuat(back, np.array(turn))
+    mujoco.mju_rotVecQuat(found, np.array(cup) - np.array(hand), back)
+    return (float(found[0]), float(found[1]), float(found[2]))
+
+
+@pytest.mark.slow
+def test_a_held_cup_does_not_creep_out_of_the_hand() -> None:
+    backend = start()
+    do(backend, "hsr", Motion(kind=MotionKind.APPROACH, point_m=TABLE_M))
+    do(backend, "hsr", Motion(kind=MotionKind.GRASP, object="cup_1", point_m=TABLE_M))
+    taken = in_hand_m(backend, "cup_1")
+    for place in ("living_room", "kitchen", "hallway"):
+        do(backend, "hsr", Motion(kind=MotionKind.GO_TO, place=place))
+        do(backend, "hsr", Motion(kind=MotionKind.LOOK))
+    for _ in range(1200):
+        backend.advance()
+    assert math.dist(in_hand_m(backend, "cup_1"), taken) < 0.010
+    assert truth_of(backend, "cup_1").held_by == "hsr"

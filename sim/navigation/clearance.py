@@ -62,7 +62,7 @@ class Clearance:
 
 def segment_gap(one_m: tuple[ArrayLike, ArrayLike], other_m: tuple[ArrayLike, ArrayLike]) -> float:
     """Least distance between two segments, m, from samples every few centimetres."""
-    share = np.linspace(0.0, 1.0, 40)[:, None]
+    share = np.linspace(0.0, 1.0, 41)[:, None]
     a, b = (
         np.asarray(start) + share * (np.asarray(end) - np.asarray(start))
         for start, end in (one_m, other_m)

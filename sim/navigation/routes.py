@@ -53,7 +53,7 @@ class Routes:
         self._spots = Spots(world, self._lattice, clearance)
 
     def to_place(self, start: PoseMRad, place: str, taken: Collection[int]) -> Route | None:
-        """To a waiting spot in `place`, rather one that is not among the nodes `taken`; `None`: no way."""
+        """To a waiting spot in `place`, rather none of `taken`; `None`: there is no way."""
         first = self.nearest(start[:2])
         field = self._lattice.field(frozenset({first}))
         spots = [n for n in self._spots.waiting[place] if math.isfinite(field[n])]

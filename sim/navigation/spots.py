@@ -14,6 +14,9 @@ from sim.world_model import LARGEST_RADIUS_M, WorldFile
 DOOR_M = 0.5
 """Waiting robots leave this much free beyond a door's own width, around its centre."""
 
+FORECOURT_M = 1.0
+"""Nearer than this (beyond the door's width), others have to drive around a waiting robot."""
+
 TABLE_FRONT_M = 0.9
 """Nearer than this to a table, a waiting robot is in the way of those who work at it."""
 
@@ -42,9 +45,11 @@ class Spots:
         self._lattice, self._clearance = lattice, clearance
         points = lattice.points_m
         self.by_door = np.zeros(len(points), dtype=bool)  # (n,)
+        self.forecourt = np.zeros(len(points), dtype=bool)
         for door in world.doors.values():
             gap = np.linalg.norm(points - door.center_m, axis=1)
             self.by_door |= gap < door.width_m / 2 + DOOR_M
+            self.forecourt |= gap < door.width_m / 2 + FORECOURT_M
         # A waiting robot must not cut the free floor in two (the way into an alcove, say).
         self.by_door |= np.array([self._cuts(node) for node in range(len(points))], dtype=bool)
         self.at_table = np.zeros(len(points), dtype=bool)
@@ -88,7 +93,7 @@ class Spots:
                 continue
             crowd = sum(other in taken for other in self._lattice.neighbours[node])
             cost = field[node] + 2.0 * bool(self.at_table[node]) + 0.5 * crowd
-            cost += 3.0 * (node in disliked)
+            cost += 3.0 * (node in disliked) + 1.0 * bool(self.forecourt[node])
             if best is None or (cost, node) < best:
                 best = (cost, node)
         return None if best is None else best[1]

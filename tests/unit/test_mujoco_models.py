@@ -96,6 +96,17 @@ def test_a_model_of_ones_own_is_found_first_and_needs_a_description(tmp_path: Pa
     assert alone(spec, tmp_path).senses("p").basket == ()
 
 
+def test_a_model_beside_the_robot_files_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "configs" / "robots"
+    folder.mkdir(parents=True)
+    shutil.copy(MODELS / "hsr.xml", folder / "butler.xml")
+    shutil.copy(MODELS / "hsr.model.yaml", folder / "butler.model.yaml")
+    monkeypatch.chdir(tmp_path)
+    assert load_description("butler").description == load_description("hsr").description
+
+
 def test_a_part_that_the_mjcf_lacks_is_named(tmp_path: Path) -> None:
     shutil.copy(MODELS / "locobot.xml", tmp_path / "porter.xml")
     text = (

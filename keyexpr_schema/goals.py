@@ -19,17 +19,24 @@ class Condition(Payload, frozen=True, kw_only=True):
     """`relation(subject) = value` must hold, e.g. `at(cup_1) = hallway`.
 
     A goal `at(object) = place` also holds when the object lies in the basket of a robot that is
-    at the place; it does not while a hand holds the object.
+    at the place; it does not while a hand holds the object. Two relations are derived from others:
+    `located(object) = true` holds when it is known where the object is, `held(object) = true` when
+    a hand holds it. With `any_of`, it is enough that the condition holds for one of those subjects
+    (`subject` is then the first of them): "a cup", "some robot".
     """
 
     relation: Id
     subject: Id
     value: Value
+    any_of: tuple[Id, ...] = ()
+
+    @property
+    def subjects(self) -> tuple[str, ...]:
+        """Whom the condition may hold for."""
+        return self.any_of or (self.subject,)
 
     def __str__(self) -> str:
-        return (
-            f"{self.relation}({self.subject}) = {'unknown' if self.value is None else self.value}"
-        )
+        return f"{self.relation}({' or '.join(self.subjects)}) = {'unknown' if self.value is None else self.value}"
 
 
 class Goal(Payload, frozen=True, kw_only=True):
@@ -61,11 +68,17 @@ ENDED_GOALS = frozenset({GoalState.REACHED, GoalState.FAILED, GoalState.REJECTED
 
 
 class GoalStatus(Payload, frozen=True, kw_only=True):
-    """What the planner says of a goal. `reason` is a sentence where it failed or was rejected."""
+    """What the planner says of a goal. `reason` is a sentence where it failed or was rejected.
+
+    A goal that says "first …, then …" has several `stages`, reached one after the other;
+    `conditions` are those of the stage that it is at, `stage` counts from 0.
+    """
 
     goal: Id
     state: GoalState
     conditions: tuple[Condition, ...] = ()
+    stages: tuple[tuple[Condition, ...], ...] = ()
+    stage: int = 0
     plan: Id | None = None
     reason: str | None = None
     time_s: float = 0.0

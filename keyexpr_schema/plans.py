@@ -31,6 +31,33 @@ class Task(Payload, frozen=True, kw_only=True):
     duration_s: float = 0.0
 
 
+class Making(Payload, frozen=True, kw_only=True):
+    """How a plan was made.
+
+    `rounds` counts answers of a language model, `tokens_in`, `tokens_out` and `cost_usd` add them
+    up. `fallback` says why another planner than the one asked for made the plan.
+    """
+
+    planner: str = "symbolic"
+    model: str | None = None
+    rounds: int = 0
+    tokens_in: int = 0
+    tokens_out: int = 0
+    cost_usd: float | None = None
+    wall_s: float = 0.0
+    fallback: str | None = None
+    prompts: str | None = None
+    """Version of the prompts that were used."""
+
+
+class PlanChange(Payload, frozen=True, kw_only=True):
+    """What a new revision did to the tasks that were not finished: how many of each."""
+
+    kept: int = 0
+    dropped: int = 0
+    added: int = 0
+
+
 class Plan(Payload, frozen=True, kw_only=True):
     """Goals, tasks, dependencies and actors.
 
@@ -49,12 +76,15 @@ class Plan(Payload, frozen=True, kw_only=True):
     allocator: str = "milp"
     pins: dict[str, Id] = {}
     autostart: bool = True
+    making: Making = Making()
 
 
 class PlanState(str, Enum):
     """Where a plan stands."""
 
     PLANNING = "planning"
+    PROPOSED = "proposed"
+    """Checked and allocated; waits for a person's approval."""
     READY = "ready"
     RUNNING = "running"
     SUCCEEDED = "succeeded"
@@ -94,6 +124,9 @@ class PlanStatus(Payload, frozen=True, kw_only=True):
     allocator: str = ""
     predicted_makespan_s: float | None = None
     planning_time_s: float | None = None
+    making: Making = Making()
+    change: PlanChange | None = None
+    """What the latest revision changed."""
     reason: str | None = None
     violations: tuple[Violation, ...] = ()
     time_s: float = 0.0

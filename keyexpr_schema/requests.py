@@ -6,7 +6,7 @@ from enum import Enum
 
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
-from keyexpr_schema.plans import Violation
+from keyexpr_schema.plans import Plan, PlanStatus, Violation
 
 
 class RequestAddress(Address, frozen=True):
@@ -16,7 +16,10 @@ class RequestAddress(Address, frozen=True):
 
 
 class PlanRequest(Payload, frozen=True, kw_only=True):
-    """Make a plan for these goals (none named: every goal that waits)."""
+    """Make a plan for these goals (none named: every goal that waits).
+
+    A `dry_run` is answered with the plan, and leaves nothing behind.
+    """
 
     request: Id
     plan: Id | None = None
@@ -25,6 +28,7 @@ class PlanRequest(Payload, frozen=True, kw_only=True):
     planner: str = "symbolic"
     allocator: str = "milp"
     start: bool = True
+    dry_run: bool = False
 
 
 class ReplanRequest(Payload, frozen=True, kw_only=True):
@@ -39,13 +43,14 @@ class Control(str, Enum):
     """What can be asked of a plan."""
 
     START = "start"
+    APPROVE = "approve"
     CANCEL = "cancel"
     DELETE = "delete"
     ADD_TASK = "add-task"
 
 
 class ControlRequest(Payload, frozen=True, kw_only=True):
-    """Start, cancel or delete a plan; or add a task to one (`skill`, `args`, `after`).
+    """Start, approve, cancel or delete a plan; or add a task to one (`skill`, `args`, `after`).
 
     An added task without `robot` is allocated like any other.
     """
@@ -67,3 +72,6 @@ class Answer(Payload, frozen=True, kw_only=True):
     sentence: str
     plan: Id | None = None
     violations: tuple[Violation, ...] = ()
+    preview: Plan | None = None
+    preview_status: PlanStatus | None = None
+    """What a dry run came to."""

@@ -95,7 +95,10 @@ class Place(Payload, frozen=True, kw_only=True):
 
 
 class Object(Payload, frozen=True, kw_only=True):
-    """A thing that can be spoken about. `ordinal` counts within a kind: cup 1 is the first cup."""
+    """A thing that can be spoken about. `ordinal` counts within a kind: cup 1 is the first cup.
+
+    `home` is the place where it belongs, for those who tidy up.
+    """
 
     object: Id
     kind: Id
@@ -104,3 +107,4 @@ class Object(Payload, frozen=True, kw_only=True):
     aliases: tuple[str, ...] = ()
     mass_kg: float = 0.0
     movable: bool = True
+    home: Id | None = None

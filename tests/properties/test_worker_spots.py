@@ -19,7 +19,7 @@ from workers.skills.spots import (
     floor_spots,
     surface_spots,
 )
-from workers.skills.viewing import MOST_CELLS, RANGE_MARGIN, Viewing, cells
+from workers.skills.viewing import BORDER_M, MOST_CELLS, RANGE_MARGIN, Viewing, cells
 
 metres = st.floats(0.0, 10.0)
 points = st.tuples(metres, metres)
@@ -107,7 +107,7 @@ def test_looking_from_the_proposed_spots_sees_the_whole_place(
         viewing.unreachable(spot)
         if viewing.next() is None:
             break
-    every = cells(place, 0.0)
+    every = cells(place, BORDER_M)
     in_range = all(min(dist(c, at) for at in looked) <= see_m * RANGE_MARGIN for c in every)
     assert viewing.complete == in_range
     if min(width_m, depth_m) > 1.2 and see_m > 2.0:

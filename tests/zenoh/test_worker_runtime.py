@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
@@ -388,3 +389,44 @@ async def test_a_worker_is_alive_while_it_runs(fleet_of: MakeFleet) -> None:
             assert not (await anext(tokens)).alive
         state = await fleet.session.get(ROBOT_STATE, RobotAddress("hsr"))
         assert state is not None and state.activity is RobotActivity.STOPPED
+
+
+async def test_what_was_believed_to_lie_here_and_does_not_becomes_unknown(
+    fleet_of: MakeFleet,
+) -> None:
+    async with fleet_of() as fleet, fleet.worker("hsr"):
+        wrong = Fact(subject="cup_1", relation="at", value="living_room", source="person")
+        await fleet.session.confirm(FACT, FactAddress("cup_1", "at"), wrong)
+        report = await fleet.report(await fleet.order("hsr", "t1", "search", place="living_room"))
+        assert report.state is ReportState.SUCCEEDED, report.reason
+        told = {(f.relation, f.subject): f.value for f in report.facts}
+        assert told["at", "cup_1"] is None and ("at", "cup_2") not in told
+        stored = await fleet.fact("at", "cup_1")
+        assert stored is not None and (stored.value, stored.source) == (None, "hsr")
+
+
+async def test_a_hand_takes_one_thing_and_takes_it_once(
+    fleet_of: MakeFleet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Nobody is going to answer: no need to wait ten seconds for it, three times.
+    monkeypatch.setattr(sys.modules["workers.skills.place_on_robot"], "WORD_S", 0.1)
+    async with fleet_of() as fleet, fleet.worker("hsr"):
+        first = await fleet.order("hsr", "t1", "pick", object="cup_1", place="kitchen")
+        assert (await fleet.report(first)).state is ReportState.SUCCEEDED
+        done = len(fleet.world.begun)
+        again = await fleet.order("hsr", "t1", "pick", attempt=2, object="cup_1", place="kitchen")
+        assert (await fleet.report(again)).state is ReportState.SUCCEEDED
+        assert len(fleet.world.begun) == done, "it holds the cup already"
+        other = await fleet.report(
+            await fleet.order("hsr", "t2", "pick", object="cup_2", place="kitchen")
+        )
+        assert (other.state, other.retryable) == (ReportState.FAILED, False)
+        assert other.reason is not None and "holds cup_1 already" in other.reason
+        give = await fleet.report(
+            await fleet.order(
+                "hsr", "t3", "place_on_robot", object="cup_1", carrier="locobot", place="kitchen"
+            )
+        )
+        assert give.state is ReportState.FAILED
+        assert give.reason == "locobot does not say where it is: is its worker running?"
+        assert truth(fleet, "cup_1")[2] == "hsr"

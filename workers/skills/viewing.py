@@ -16,6 +16,8 @@ PointM2 = tuple[float, float]
 STEP_M = 0.25
 MOST_CELLS = 400
 """A large place gets a coarser grid, so that choosing a viewpoint takes milliseconds."""
+BORDER_M = 0.15
+"""What lies closer to a place's border than this lies in a wall or in a doorway."""
 CLEAR_M = 0.6
 """Viewpoints keep this far from a place's border, where walls are."""
 RANGE_MARGIN = 0.9
@@ -29,7 +31,7 @@ class Viewing:
 
     def __init__(self, place: Place, see_m: float) -> None:
         self._see_m = see_m * RANGE_MARGIN
-        self._cells = cells(place, 0.0)
+        self._cells = cells(place, BORDER_M)
         self._unseen = set(self._cells)
         self._stands = list(cells(place, CLEAR_M)) or list(self._cells)
         self._looked_from: list[PointM2] = []

@@ -13,6 +13,7 @@ from keyexpr_schema.errors import Unreachable
 from keyexpr_schema.goals import ENDED_GOALS, Goal, GoalStatus
 from keyexpr_schema.key import Payload
 from keyexpr_schema.keyspace import (
+    FACT,
     GOAL_SPEC,
     GOAL_STATUS,
     PLAN_SPEC,
@@ -33,11 +34,21 @@ from keyexpr_schema.robots import RobotSpec, RobotState
 from keyexpr_schema.service import Reject
 from keyexpr_schema.simulation import ContactCount, Scene, SimClock, Truth
 from keyexpr_schema.tasks import TaskRecord
+from keyexpr_schema.world import Fact
 
 if TYPE_CHECKING:
     from keyexpr_schema.session import Change, Session, Watch
 
-FLEET = (GOAL_SPEC, GOAL_STATUS, PLAN_SPEC, PLAN_STATUS, TASK_RECORD, ROBOT_SPEC, ROBOT_STATE)
+FLEET = (
+    GOAL_SPEC,
+    GOAL_STATUS,
+    PLAN_SPEC,
+    PLAN_STATUS,
+    TASK_RECORD,
+    ROBOT_SPEC,
+    ROBOT_STATE,
+    FACT,
+)
 """What any fleet has."""
 SIMULATION = (SIM_CLOCK, SIM_TRUTH, SIM_CONTACTS, SIM_SCENE, SIM_SENSES)
 """What only a simulated one has."""
@@ -47,7 +58,9 @@ SYNC_S = 10.0
 
 @dataclass
 class Board:
-    """The latest value of every key that matters to a person who watches; by id.
+    """The latest value of every key that matters to a person who watches; by its address.
+
+    `tasks` are by (plan, task), `facts` by (subject, relation), all else by the one id.
 
     `changed` is set after each change; whoever waits clears it first (see `until`).
     """
@@ -59,7 +72,8 @@ class Board:
     tasks: dict[tuple[str, str], TaskRecord] = field(default_factory=dict)
     specs: dict[str, RobotSpec] = field(default_factory=dict)
     robots: dict[str, RobotState] = field(default_factory=dict)
-    rejects: dict[str, Reject] = field(default_factory=dict)
+    facts: dict[tuple[str, str], Fact] = field(default_factory=dict)
+    rejects: dict[tuple[str, str], Reject] = field(default_factory=dict)
     truths: dict[str, Truth] = field(default_factory=dict)
     senses: dict[str, Senses] = field(default_factory=dict)
     clock: SimClock | None = None
@@ -101,6 +115,7 @@ class Board:
             SIM_TRUTH.name: self.truths,
             SIM_SENSES.name: self.senses,
             REJECT.name: self.rejects,
+            FACT.name: self.facts,
         }
         return shelves.get(key)
 

@@ -97,9 +97,9 @@ async def bring_up(fleet: Fleet, session: Session, board: Board, mission: Missio
         ),
         *(
             board.until(
-                partial(_knows_itself, board, robot.spec.robot),
+                partial(_can_be_planned, board, robot.spec.robot),
                 READY_S,
-                f"{robot.spec.robot} to say where it is "
+                f"{robot.spec.robot} to say where it is and what it holds "
                 f"(log: {fleet.log(f'worker-{robot.spec.robot}')})",
             )
             for robot in mission.robots
@@ -108,10 +108,9 @@ async def bring_up(fleet: Fleet, session: Session, board: Board, mission: Missio
     )
 
 
-def _knows_itself(board: Board, robot: str) -> bool:
-    """Whether the worker has a body: a planner can do nothing with a robot that is nowhere."""
-    state = board.robots.get(robot)
-    return state is not None and state.place is not None
+def _can_be_planned(board: Board, robot: str) -> bool:
+    """Whether a planner knows where the robot is and what it holds: else it can do nothing."""
+    return all((robot, relation) in board.facts for relation in ("at", "holding"))
 
 
 async def _token(

@@ -15,11 +15,10 @@ from rich.text import Text
 
 from cli.show.page import page, table
 from cli.show.plan_tree import plan_tree
-from cli.show.words import call, carried, doing, seconds, value
+from cli.show.words import call, carried, doing, seconds
 from keyexpr_schema.goals import GoalStatus
 from keyexpr_schema.plans import PlanStatus
 from keyexpr_schema.tasks import TaskRecord, TaskState
-from keyexpr_schema.world import Fact
 
 if TYPE_CHECKING:
     from cli.board import Board
@@ -86,8 +85,6 @@ def tell(what: object) -> tuple[float | None, str] | None:
             f"plan {what.plan} revision {what.revision} is {what.state.value}"
             f"{f' ({who})' if who else ''}{_because(what.reason)}"
         )
-    if isinstance(what, Fact):
-        return what.time_s, f"{what.relation}({what.subject}) = {value(what.value)}"
     return None
 
 

@@ -36,7 +36,8 @@ class Condition(Payload, frozen=True, kw_only=True):
         return self.any_of or (self.subject,)
 
     def __str__(self) -> str:
-        return f"{self.relation}({' or '.join(self.subjects)}) = {'unknown' if self.value is None else self.value}"
+        value = "unknown" if self.value is None else self.value
+        return f"{self.relation}({' or '.join(self.subjects)}) = {value}"
 
 
 class Goal(Payload, frozen=True, kw_only=True):

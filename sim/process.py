@@ -5,14 +5,17 @@ from __future__ import annotations
 import asyncio
 import signal
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
 from keyexpr_schema.session import SessionConfig, open_session
 from sim.backend import Backend
 from sim.errors import SimError
-from sim.kinematic import Durations, KinematicBackend
 from sim.server import GRACE_S, WATCHDOG_S, SimServer
 from sim.world_file import load_mission
 from sim.world_model import Mission
+
+if TYPE_CHECKING:
+    from sim.kinematic import Durations
 
 BACKENDS = ("mujoco", "kinematic")
 
@@ -92,6 +95,8 @@ def make_backend(
     """
     robots = tuple((robot.spec, robot.start_m_rad) for robot in mission.robots)
     if backend == "kinematic":
+        from sim.kinematic import KinematicBackend
+
         # A world that jumps cannot keep up with a wall clock: there it goes in small steps.
         step_s = None if speed is None else 0.05
         return KinematicBackend(mission.world, robots, durations, seed, step_s)

@@ -286,6 +286,7 @@ class Navigator:
         here = self._poses[name]
         parked = traveller.parked
         best: tuple[float, Dock] | None = None
+        idle = [o for o in self._robots.values() if o is not traveller and o.goal is None]
         for dock in task.docks:
             if (
                 parked is not None
@@ -297,7 +298,10 @@ class Navigator:
                 self._yaws[name] = dock.yaw_rad
                 self._lingers[name] = self._time_s + LINGER_S
                 return
-            if dock.owned & taken:
+            if dock.owned & taken or any(
+                dock.owned & other.claims and not self._spots.way_out(other.frontier, dock.node)
+                for other in idle
+            ):
                 continue
             cost = around[dock.node] + dock.cost_m
             if math.isfinite(cost) and (best is None or cost < best[0]):

@@ -68,14 +68,19 @@ class Spots:
             )
             for name in world.place_entries
         }
-        everywhere = frozenset(node for nodes in self.waiting.values() for node in nodes)
-        self.retreat = lattice.field(everywhere)
+        self._everywhere = frozenset(node for nodes in self.waiting.values() for node in nodes)
+        self.retreat = lattice.field(self._everywhere)
         """Distance from each node to the nearest one where a robot may wait, m."""
+
+    def way_out(self, node: int, blocked: int) -> bool:
+        """Whether one can get from `node` to a waiting spot while somebody is at `blocked`."""
+        field = self._lattice.field(self._everywhere - {blocked}, frozenset({blocked}))
+        return node == blocked or math.isfinite(field[node])
 
     def _cuts(self, node: int) -> bool:
         around = self._lattice.neighbours[node]
         if len(around) < 2:
-            return False
+            return True  # a dead end: who comes to work there would shut its only way out
         field = self._lattice.field(frozenset(around[:1]), frozenset({node}))
         # Further apart than once around a block of four: a bottleneck for all practical ends.
         return any(field[other] > 8 * PITCH_M for other in around[1:])

@@ -63,7 +63,7 @@ async def ask(session: Session, call: MotionCall) -> MotionOutcome:
 
 async def until(condition: Callable[[], bool], timeout_s: float = 10.0) -> None:
     async with asyncio.timeout(timeout_s):
-        while not condition():  # noqa: ASYNC110
+        while not condition():
             await asyncio.sleep(0.01)
 
 
@@ -191,7 +191,7 @@ async def test_what_is_told(session_config: Make) -> None:
 
 async def until_stored(asker: Session) -> None:
     async with asyncio.timeout(10.0):
-        while await asker.get(SIM_SCENE, SimAddress()) is None or not await asker.list(SIM_TRUTH):  # noqa: ASYNC110
+        while await asker.get(SIM_SCENE, SimAddress()) is None or not await asker.list(SIM_TRUTH):
             await asyncio.sleep(0.05)
 
 

@@ -122,10 +122,20 @@ class Demo:
         board = self.board
         ended_s = max((s.time_s for s in self._statuses().values()), default=0.0)
 
+        # The simulation repeats every truth. Only what it said after the goals had ended counts,
+        # whatever the clocks of those who reported the end.
+        old_truths, old_contacts = dict(board.truths), board.contacts
+
         def settled() -> bool:
-            return bool(board.truths) and all(
-                truth.time_s >= ended_s and (truth.settled or truth.held_by is not None)
-                for truth in board.truths.values()
+            return (
+                bool(board.truths)
+                and board.contacts is not old_contacts
+                and all(
+                    truth is not old_truths.get(name)
+                    and truth.time_s >= ended_s
+                    and (truth.settled or truth.held_by is not None)
+                    for name, truth in board.truths.items()
+                )
             )
 
         # Where one does not settle, the judge says which, and fails its goal.

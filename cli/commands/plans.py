@@ -158,16 +158,28 @@ async def replan(
     reason: Annotated[
         str, typer.Option("--reason", help="Why; it is shown with the plan.")
     ] = "a person asked for it",
+    goals: Annotated[
+        list[str] | None,
+        typer.Option("--goal", metavar="GOAL", help="Take this goal in, too; repeatable."),
+    ] = None,
 ) -> None:
     """Plan again from what is known now; what is done or running is kept."""
     from cli.asking import ask_planner
+    from cli.errors import check_known
     from cli.naming import request_name
+    from keyexpr_schema.keyspace import GOAL_SPEC
     from keyexpr_schema.requests import ReplanRequest
 
     async with call.session() as session:
         await check_plan(session, plan)
+        known = [address.goal for address in await session.list(GOAL_SPEC)]
+        for goal in goals or ():
+            check_known("goal", goal, known, "say one with `robotctl goal add`")
         answer = await ask_planner(
-            session, ReplanRequest(request=request_name(), plan=plan, reason=reason)
+            session,
+            ReplanRequest(
+                request=request_name(), plan=plan, reason=reason, goals=tuple(goals or ())
+            ),
         )
     call.show(answer, lambda: answer.sentence)
 

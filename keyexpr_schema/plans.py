@@ -77,6 +77,8 @@ class Plan(Payload, frozen=True, kw_only=True):
     pins: dict[str, Id] = {}
     autostart: bool = True
     making: Making = Making()
+    seeks: tuple[Id, ...] = ()
+    """Objects that this plan only looks for; once one is found, a new revision goes on."""
 
 
 class PlanState(str, Enum):

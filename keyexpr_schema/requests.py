@@ -32,11 +32,12 @@ class PlanRequest(Payload, frozen=True, kw_only=True):
 
 
 class ReplanRequest(Payload, frozen=True, kw_only=True):
-    """Plan again from what is known now."""
+    """Plan again from what is known now, and for these further goals."""
 
     request: Id
     plan: Id
     reason: str
+    goals: tuple[Id, ...] = ()
 
 
 class Control(str, Enum):

@@ -9,9 +9,8 @@ from typing import Any
 from fleet.core import events
 from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.state import State
+from fleet.core.state import Policy, State
 from fleet.core.step import step
-from fleet.core.working import LOST_AFTER_S
 from fleet.service.composition import Composition, compose
 from fleet.service.planning_desk import carry_out
 from keyexpr_schema.goals import Goal
@@ -80,7 +79,8 @@ class FleetModel:
                 self.documents.pop(effect.key.build(effect.address), None)
         for effect in effects:
             if isinstance(effect, MakePlan):
-                self._apply(carry_out(effect.job, self.state, PARTS, self.time_s, self.wall_s))
+                at = {"time_s": self.time_s, "wall_time_s": self.wall_s}
+                self._apply(carry_out(effect.job, self.state, PARTS, at))
 
     def _check_order(self, order: Any) -> None:
         assert isinstance(order, Order)
@@ -182,7 +182,7 @@ class FleetModel:
     def lose(self, robot: str) -> None:
         """A robot goes away for so long that it counts as lost."""
         self.tell(events.RobotGone, robot=robot, incarnation="i1")
-        self.wall_s += LOST_AFTER_S + 1.0
+        self.wall_s += Policy().lost_after_s + 1.0
         self.tell(events.TimePassed)
 
     def return_(self, robot: str) -> None:

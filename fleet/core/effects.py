@@ -61,7 +61,15 @@ class MakePlan:
     job: Job
 
 
-Effect = Publish | Retract | MakePlan
+@dataclass(frozen=True)
+class Interpret:
+    """Have a goal's sentence read by a language model, and say what it means as an event."""
+
+    goal: str
+    text: str
+
+
+Effect = Publish | Retract | MakePlan | Interpret
 
 
 def effects_between(old: State, new: State) -> tuple[Effect, ...]:
@@ -146,6 +154,8 @@ def status_of(book: PlanBook) -> PlanStatus:
         allocator=book.plan.allocator,
         predicted_makespan_s=book.makespan_s,
         planning_time_s=book.planning_time_s,
+        making=book.plan.making,
+        change=book.change,
         reason=book.replan_reason or book.reason,
         violations=book.violations,
         time_s=book.changed_s,
@@ -174,7 +184,7 @@ def _order(record: TaskRecord, book: PlanBook, epoch: int) -> Order:
         skill=record.skill,
         args=record.args,
         deadline_s=DEADLINE_FACTOR * record.duration_s + DEADLINE_MARGIN_S,
-        cancelled=book.cancelling,
+        cancelled=book.cancelling or record.task in book.dropping,
     )
 
 
@@ -191,3 +201,9 @@ def _jobs(old: State, new: State) -> Iterator[Effect]:
         before = old.plans.get(plan)
         if book.job is not None and (before is None or before.job != book.job):
             yield MakePlan(book.job)
+    for request, job in new.previews.items():
+        if request not in old.previews:
+            yield MakePlan(job)
+    for goal in new.interpreting:
+        if goal not in old.interpreting and goal in new.goals:
+            yield Interpret(goal, new.goals[goal].text)

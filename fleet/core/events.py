@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
-from keyexpr_schema.goals import Goal, GoalStatus
+from fleet.core.state import Policy
+from keyexpr_schema.goals import Condition, Goal, GoalStatus
 from keyexpr_schema.plans import Plan, Violation
 from keyexpr_schema.requests import Answer, ControlRequest, PlanRequest, ReplanRequest
 from keyexpr_schema.robots import RobotSpec
@@ -24,6 +25,7 @@ class PlannerStarted(Event, frozen=True, kw_only=True):
 
     epoch: int
     incarnation: str
+    policy: Policy = Policy()
 
 
 class GoalTold(Event, frozen=True, kw_only=True):
@@ -168,6 +170,14 @@ class PlanNotMade(Event, frozen=True, kw_only=True):
     planning_time_s: float = 0.0
 
 
+class GoalInterpreted(Event, frozen=True, kw_only=True):
+    """A language model has read a goal's sentence: its stages, or why it means nothing."""
+
+    goal: str
+    stages: tuple[tuple[Condition, ...], ...] = ()
+    reason: str | None = None
+
+
 class Remembered(Event, frozen=True, kw_only=True):
     """What an earlier planner left in the store, told to one that has no journal of it."""
 
@@ -203,6 +213,7 @@ AnyEvent = (
     | PlanProposed
     | PlanMade
     | PlanNotMade
+    | GoalInterpreted
     | Remembered
     | TimePassed
 )

@@ -25,18 +25,21 @@ class Strand:
 
 
 def tasks_from(
-    strands: Sequence[Strand], first_task: int = 1
+    strands: Sequence[Strand], first_task: int = 1, one_actor_each: bool = False
 ) -> tuple[tuple[Task, ...], dict[str, str]]:
     """Tasks that do what the strands do, with only the order that matters, and pinned actors.
 
     A task waits for the last one before it that wrote what it reads, for those that read what it
     overwrites, and for its robots' earlier tasks in the same strand (deordering by causal links).
+    Each robot becomes a new actor in every strand, or with `one_actor_each` one in all of them.
     """
     rows: list[tuple[str, str, Action]] = []
     pins: dict[str, str] = {}
     actor_count = 0
+    actors: dict[str, str] = {}
     for strand in strands:
-        actors: dict[str, str] = {}
+        if not one_actor_each:
+            actors = {}
         for action in strand.actions:
             args = dict(action.args)
             for parameter in action.skill.robot_parameters:

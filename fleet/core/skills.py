@@ -61,6 +61,11 @@ class Action:
         return self.args[self.skill.actor_parameter]
 
     @cached_property
+    def variables(self) -> frozenset[Variable]:
+        """Every state variable that it reads or writes."""
+        return frozenset(literal.variable for literal in (*self.before, *self.after))
+
+    @cached_property
     def participants(self) -> tuple[str, ...]:
         """Every robot that takes part, the actor first."""
         return tuple(self.args[name] for name in self.skill.robot_parameters)

@@ -11,7 +11,7 @@ from fleet.core.language import Vocabulary
 from fleet.core.skills import SkillModel
 from fleet.core.world_model import WorldModel
 from keyexpr_schema.goals import Goal, GoalStatus
-from keyexpr_schema.plans import ENDED_PLANS, Plan, PlanState, Task, Violation
+from keyexpr_schema.plans import ENDED_PLANS, Plan, PlanChange, PlanState, Task, Violation
 from keyexpr_schema.requests import Answer
 from keyexpr_schema.robots import RobotSpec
 from keyexpr_schema.tasks import TaskRecord, TaskState
@@ -20,6 +20,21 @@ from keyexpr_schema.world import Fact, Object, Place, Statement
 T = TypeVar("T")
 
 OUTSTANDING = frozenset({TaskState.ORDERED, TaskState.RUNNING})
+
+
+class Policy(msgspec.Struct, frozen=True, kw_only=True):
+    """How the planner was told to behave.
+
+    `approval`: a person has to approve every new plan. `auto_plan`: goals that wait are planned
+    without being asked for, into a running plan where there is one. `interpreter`: sentences that
+    the grammar refuses go to a language model. `lost_after_s`: a robot whose worker is gone for
+    longer (wall time, s) counts as lost.
+    """
+
+    approval: bool = False
+    auto_plan: bool = False
+    interpreter: bool = False
+    lost_after_s: float = 30.0
 
 
 class Job(msgspec.Struct, frozen=True, kw_only=True):
@@ -35,13 +50,20 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     first_task: int
     proposal: Plan | None = None
     request: str | None = None
+    dry_run: bool = False
+    running: tuple[str, ...] = ()
+    """Tasks of the plan that were under way when the job was given."""
+    reason: str | None = None
+    """Why the plan is made again."""
 
 
 class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
     """A plan with everything the planner keeps about it.
 
     `records` hold the tasks of every revision; `plan` only those of the current one.
-    `replan_reason` set means: order nothing more, and plan again when nothing is outstanding.
+    `replan_reason` set means: order nothing more, and plan again. `dropping` are tasks that are
+    under way and no longer wanted; their orders are cancelled. `team` are the robots that were
+    there when the plan was made.
     """
 
     plan: Plan
@@ -54,6 +76,11 @@ class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
     job: Job | None = None
     replan_reason: str | None = None
     amendment: Task | None = None
+    """A task that someone wants added, and the request for it."""
+    amendment_request: str | None = None
+    dropping: tuple[str, ...] = ()
+    team: tuple[str, ...] = ()
+    change: PlanChange | None = None
     replans: int = 0
     cancelling: bool = False
     reason: str | None = None
@@ -98,6 +125,11 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     past_plans: tuple[str, ...] = ()
     answers: dict[str, Answer] = {}
     jobs: int = 0
+    previews: dict[str, Job] = {}
+    """Planning jobs of dry runs, by request."""
+    interpreting: tuple[str, ...] = ()
+    """Goals whose sentences a language model reads now."""
+    policy: Policy = Policy()
 
     def vocabulary(self) -> Vocabulary:
         """The names that sentences can use."""
@@ -111,8 +143,15 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
             self.objects.values(),
             self.robots.values(),
             self.facts.values(),
-            available=[robot for robot, runs in self.alive.items() if runs],
+            available=[robot for robot in self.alive if self.ready(robot)],
         )
+
+    def ready(self, robot: str) -> bool:
+        """Whether a robot can be planned with: connected, and what its hand holds is known."""
+        spec = self.robots.get(robot)
+        if spec is None or not self.alive.get(robot):
+            return False
+        return "grip" not in spec.capabilities or self.fact("holding", robot) is not None
 
     def fact(self, relation: str, subject: str) -> Fact | None:
         """The fact about a variable, if there is one."""

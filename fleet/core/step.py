@@ -11,16 +11,15 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from fleet.core import events, planning, telling, working
+from fleet.core import events, planning, reporting, requests, surprises, telling, working
+from fleet.core.calls import Skills
 from fleet.core.effects import Effect, effects_between
 from fleet.core.events import Event
 from fleet.core.state import State
-from fleet.core.working import Skills
 
 _NEWS: dict[type[Event], Callable[[State, Any], State]] = {
     events.GoalTold: telling.goal_told,
     events.GoalForgotten: telling.goal_forgotten,
-    events.FactTold: telling.fact_told,
     events.FactForgotten: telling.fact_forgotten,
     events.StatementTold: telling.statement_told,
     events.StatementForgotten: telling.statement_forgotten,
@@ -33,11 +32,11 @@ _NEWS: dict[type[Event], Callable[[State, Any], State]] = {
     events.RobotSeen: telling.robot_seen,
     events.RobotGone: telling.robot_gone,
     events.Remembered: telling.remembered,
-    events.PlanAsked: planning.plan_asked,
-    events.ReplanAsked: planning.replan_asked,
-    events.ControlAsked: planning.control_asked,
-    events.PlanProposed: planning.plan_proposed,
-    events.PlanMade: planning.plan_made,
+    events.GoalInterpreted: telling.goal_interpreted,
+    events.PlanAsked: requests.plan_asked,
+    events.ReplanAsked: requests.replan_asked,
+    events.ControlAsked: requests.control_asked,
+    events.PlanProposed: requests.plan_proposed,
     events.PlanNotMade: planning.plan_not_made,
 }
 
@@ -62,9 +61,15 @@ def step(state: State, event: Event, skills: Skills) -> tuple[State, tuple[Effec
 def _take_in(state: State, event: Event, skills: Skills) -> State:
     match event:
         case events.PlannerStarted():
-            return replace(state, epoch=event.epoch, incarnation=event.incarnation)
+            return replace(
+                state, epoch=event.epoch, incarnation=event.incarnation, policy=event.policy
+            )
+        case events.PlanMade():
+            return planning.plan_made(state, event, skills)
+        case events.FactTold():
+            return surprises.fact_told(state, event, skills)
         case events.ReportTold():
-            return working.report_told(state, event, skills)
+            return reporting.report_told(state, event, skills)
         case events.TimePassed():
             return state
     return _NEWS[type(event)](state, event)

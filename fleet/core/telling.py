@@ -11,7 +11,10 @@ from fleet.core.state import State, put, without
 from fleet.errors import NotUnderstood
 from keyexpr_schema.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
 from keyexpr_schema.plans import PlanState
-from keyexpr_schema.world import Fact, Value
+from keyexpr_schema.world import NOTHING, Fact, Value
+
+SEARCHED = "searched"
+"""Relation that says of a place that somebody looked around in it."""
 
 
 def goal_told(state: State, event: events.GoalTold) -> State:
@@ -23,7 +26,53 @@ def goal_told(state: State, event: events.GoalTold) -> State:
     state = replace(state, goals=put(state.goals, goal.goal, goal))
     if remembered:
         return state  # it ended under an earlier planner
-    return set_goal(state, _understand(state, goal))
+    return _take_goal(state, goal)
+
+
+def _take_goal(state: State, goal: Goal) -> State:
+    """Say what a goal means; a sentence that the grammar refuses may go to a language model."""
+    status = _understand(state, goal)
+    state = set_goal(state, status)
+    if status.state is GoalState.REJECTED and state.policy.interpreter and not goal.conditions:
+        state = set_goal(state, replace(status, state=GoalState.WAITING))
+        return replace(state, interpreting=tuple({*state.interpreting, goal.goal}))
+    return _begin_stage(state, goal.goal)
+
+
+def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
+    """Take over what a language model read in a goal's sentence, or that it read nothing."""
+    if event.goal not in state.interpreting:
+        return state
+    rest = tuple(goal for goal in state.interpreting if goal != event.goal)
+    state = replace(state, interpreting=rest)
+    status = state.goal_states.get(event.goal)
+    if status is None:
+        return state
+    if not event.stages:
+        reason = f"{status.reason}; a language model did not understand it either: {event.reason}"
+        return set_goal(state, replace(status, state=GoalState.REJECTED, reason=reason))
+    state = set_goal(
+        state, replace(status, stages=event.stages, conditions=event.stages[0], reason=None)
+    )
+    return _begin_stage(state, event.goal)
+
+
+def _begin_stage(state: State, goal: str) -> State:
+    """A place is searched anew for every goal that asks for it."""
+    for condition in state.goal_states[goal].conditions:
+        for subject in condition.subjects:
+            fact = state.fact(condition.relation, subject)
+            if condition.relation == SEARCHED and fact is not None and fact.value is True:
+                state = believe(state, replace(fact, value=False, source=PLANNER_SOURCE))
+    return state
+
+
+def next_stage(state: State, goal: str) -> State:
+    """A goal goes on with what it wants next."""
+    status = state.goal_states[goal]
+    number = status.stage + 1
+    status = replace(status, stage=number, conditions=status.stages[number], time_s=state.time_s)
+    return _begin_stage(set_goal(state, status), goal)
 
 
 def goal_forgotten(state: State, event: events.GoalForgotten) -> State:
@@ -56,25 +105,29 @@ def goal_forgotten(state: State, event: events.GoalForgotten) -> State:
 
 def _understand(state: State, goal: Goal) -> GoalStatus:
     try:
-        conditions = goal.conditions or goal_conditions(goal.text, state.vocabulary())
-        for condition in conditions:
-            _check_names(state, condition.subject, condition.value)
+        stages = (goal.conditions or goal_conditions(goal.text, state.vocabulary()),)
+        for condition in (condition for stage in stages for condition in stage):
+            for name in (*condition.subjects, condition.value):
+                _check_name(state, name)
     except NotUnderstood as error:
         return GoalStatus(
             goal=goal.goal, state=GoalState.REJECTED, reason=str(error), time_s=state.time_s
         )
     return GoalStatus(
-        goal=goal.goal, state=GoalState.WAITING, conditions=conditions, time_s=state.time_s
+        goal=goal.goal,
+        state=GoalState.WAITING,
+        conditions=stages[0],
+        stages=stages,
+        time_s=state.time_s,
     )
 
 
-def _check_names(state: State, subject: str, value: Value) -> None:
+def _check_name(state: State, name: Value) -> None:
     known = {**state.places, **state.objects, **state.robots}
-    for name in (subject, value):
-        if isinstance(name, str) and name not in known and name != "nothing":
-            raise NotUnderstood(
-                f"{name!r} is nothing that is known; known are {', '.join(sorted(known)) or 'none'}"
-            )
+    if isinstance(name, str) and name not in known and name != NOTHING:
+        raise NotUnderstood(
+            f"{name!r} is nothing that is known; known are {', '.join(sorted(known)) or 'none'}"
+        )
 
 
 def set_goal(state: State, status: GoalStatus) -> State:
@@ -102,11 +155,6 @@ def mark_goals(
             state, replace(status, state=to, plan=plan, reason=reason, time_s=state.time_s)
         )
     return state
-
-
-def fact_told(state: State, event: events.FactTold) -> State:
-    """Believe the fact: its key always holds the latest word."""
-    return believe(state, event.fact)
 
 
 def believe(state: State, fact: Fact) -> State:
@@ -256,12 +304,9 @@ def remembered(state: State, event: events.Remembered) -> State:
 def _words_changed(state: State) -> State:
     """Try again to understand what was not, now that there are other names."""
     for goal in state.goals.values():
-        if state.goal_states[goal.goal].state is GoalState.REJECTED:
-            status = _understand(state, goal)
-            if status.state is not GoalState.REJECTED or (
-                status.reason != state.goal_states[goal.goal].reason
-            ):
-                state = set_goal(state, status)
+        status = state.goal_states[goal.goal]
+        if status.state is GoalState.REJECTED and _understand(state, goal).reason != status.reason:
+            state = _take_goal(state, goal)
     for name, understood in state.understood.items():
         if not understood:
             state = _read_statement(state, name)

@@ -13,6 +13,9 @@ from keyexpr_schema.world import NOTHING, Fact, Object, Place, Value
 
 TRAVEL_SPEED_M_S = 0.5
 """Speed assumed for a robot whose spec gives none, m/s; a slow walk indoors."""
+LOCATED = "located"
+HELD = "held"
+"""Relations of goal conditions that are derived from `at` and `holding`."""
 UNKNOWN_TRAVEL_M = 5.0
 """Distance assumed where the map has none, m; about one room to the next."""
 
@@ -125,18 +128,32 @@ def condition_holds(facts: Mapping[Variable, Value], condition: Condition) -> bo
     """Whether a condition holds in `facts`.
 
     `at(object) = place` also holds while the object lies in the basket of a robot that is there:
-    it is at a robot, and that robot's hand does not hold it.
+    it is at a robot, and that robot's hand does not hold it. `located(object) = true` and
+    `held(object) = true` are read off `at` and `holding`. Of several subjects one is enough.
     """
-    value = facts.get(Variable(condition.relation, condition.subject))
+    return any(
+        _holds_for(facts, condition.relation, subject, condition.value)
+        for subject in condition.subjects
+    )
+
+
+def _holds_for(facts: Mapping[Variable, Value], relation: str, subject: str, wanted: Value) -> bool:
+    where = facts.get(Variable("at", subject))
+    if relation == LOCATED:
+        return (where is not None) is wanted
+    if relation == HELD:
+        held = isinstance(where, str) and facts.get(Variable("holding", where)) == subject
+        return held is wanted
+    value = facts.get(Variable(relation, subject))
     if value is None:
         return False
-    if value == condition.value:
+    if value == wanted:
         return True
     return (
-        condition.relation == "at"
+        relation == "at"
         and isinstance(value, str)
-        and facts.get(Variable("at", value)) == condition.value
-        and facts.get(Variable("holding", value), NOTHING) != condition.subject
+        and facts.get(Variable("at", value)) == wanted
+        and facts.get(Variable("holding", value), NOTHING) != subject
     )
 
 

@@ -26,6 +26,8 @@ class PlanningProblem:
     strategy: str = "big-dag"
     allocator: str = "milp"
     first_task: int = 1
+    searched: frozenset[str] = frozenset()
+    """Places in which this plan has looked around already."""
 
 
 @dataclass(frozen=True)

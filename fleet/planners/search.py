@@ -11,10 +11,19 @@ from heapq import heappop, heappush
 from itertools import count, product
 
 from fleet.core.skills import Action, Variable
-from fleet.core.world_model import WorldModel, condition_holds, first_unmet, room_left
+from fleet.core.world_model import (
+    HELD,
+    LOCATED,
+    WorldModel,
+    condition_holds,
+    first_unmet,
+    room_left,
+)
 from keyexpr_schema.goals import Condition
 from keyexpr_schema.world import Value
 
+DERIVED_FROM = {LOCATED: {"at"}, HELD: {"at", "holding"}}
+"""Relations that a derived one is read off."""
 MAX_EXPANSIONS = 200_000
 """States looked at before the search gives up."""
 
@@ -35,7 +44,7 @@ def ground_actions(
 ) -> list[Action]:
     """Every action of these robots on these objects that can help with the goal's relations."""
     names = {"robot": robots, "object": objects, "place": tuple(world.places)}
-    wanted = {goal.relation}
+    wanted = DERIVED_FROM.get(goal.relation, {goal.relation})
     relevant: dict[str, None] = {}
     while True:
         more = {

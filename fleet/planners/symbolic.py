@@ -1,170 +1,136 @@
 """The symbolic planner: finds plans by search over skill models, with no network.
 
-Every condition of every goal becomes a strand: the cheapest action sequence that makes it true,
-and a few different ones (made so by charging for actions that were used before), for instance one
-with a helper that carries. Strands are chosen together by the makespan they lead to.
+Every condition of every goal becomes a strand: a sequence of actions that makes it true. Several
+different ones are sought (for instance one with a helper that carries), and chosen as the strategy
+says:
+
+* `big-dag` chooses for all goals together, by the makespan that they lead to;
+* `per-goal` chooses for each goal alone, as if there were no other, and merges the results;
+* `monolithic` makes one flat list, each goal going on from where the one before left every robot.
+
+Where it is not known where a needed object is, the plan looks for it: a search of every place, by
+all robots that can, in parallel. What is found leads to the next revision.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from itertools import product
 
 from fleet.core.binding import least_loaded
 from fleet.core.checker import check_plan
 from fleet.core.lifting import Strand, tasks_from
-from fleet.core.schedule import best_schedule, predicted_duration_s
-from fleet.core.skills import Action, Variable
+from fleet.core.schedule import best_schedule
+from fleet.core.skills import Variable
 from fleet.core.world_model import WorldModel
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
-from fleet.planners.search import Facts, cheapest, ground_actions
-from keyexpr_schema.goals import Condition
+from fleet.planners.search import Facts
+from fleet.planners.strands import Aim, Exploration, aims_in_order, exploration_for, options_for
 from keyexpr_schema.plans import Plan
-from keyexpr_schema.world import NOTHING, Value
 
-ALTERNATIVES = 4
-"""Different strands sought for each condition."""
-REUSE_CHARGE_S = 200.0
-"""What an action costs more for each strand that already uses it; more than any task takes."""
+BIG_DAG, PER_GOAL, MONOLITHIC = "big-dag", "per-goal", "monolithic"
 MAX_COMBINATIONS = 64
 """Up to this many combinations are all tried; beyond, one strand is changed at a time."""
 
 
-@dataclass(frozen=True)
-class _Aim:
-    goal: str
-    condition: Condition
-
-
 class SymbolicPlanner(Planner):
-    """Search over skill models; one DAG for all goals."""
+    """Search over skill models."""
 
     name = "symbolic"
-    strategies = ("big-dag",)
+    strategies = (BIG_DAG, PER_GOAL, MONOLITHIC)
 
     def _solve(self, problem: PlanningProblem) -> Plan | NoPlan:
         world = problem.world
-        aims = _in_order(problem)
-        if not aims:
-            return _plan(problem, ())
-        options: list[list[Strand]] = []
         facts: Facts = dict(world.facts)
-        for aim in aims:
-            found = _strands(aim, facts, world)
-            if not found:
-                return NoPlan(_why_not(aim, facts, world))
-            strands, facts = found
-            options.append(strands)
-        return _best_combination(problem, options)
+        options: list[tuple[Strand, ...]] = []
+        unknown: list[Aim] = []
+        settled: set[str] = set()
+        for aim in aims_in_order(problem):
+            found = options_for(aim, facts, world, frozenset(settled))
+            if found is not None:
+                options.append(found.strands)
+                facts = found.facts
+                if problem.strategy == MONOLITHIC:
+                    for action in found.strands[0].actions:
+                        settled.update(action.participants)
+            elif _where_is_unknown(aim, facts, world):
+                unknown.append(aim)
+            else:
+                return NoPlan(_no_way(aim, world))
+        explored = exploration_for(unknown, problem) if unknown else None
+        if unknown and explored is None:
+            return NoPlan(_not_found(unknown[0], problem))
+        return _choose(problem, options, explored)
 
 
-def _in_order(problem: PlanningProblem) -> list[_Aim]:
-    """Conditions still to be reached; those whose object a hand holds come first."""
-    world = problem.world
-    held = {world.value("holding", robot) for robot in world.team}
-    aims = [
-        _Aim(goal.goal, condition)
-        for goal in sorted(problem.goals, key=lambda g: (-g.priority, g.ordinal, g.goal))
-        for condition in goal.conditions
-        if not world.holds(condition)
-    ]
-    return sorted(aims, key=lambda aim: aim.condition.subject not in held)
+def _where_is_unknown(aim: Aim, facts: Facts, world: WorldModel) -> bool:
+    return any(
+        subject in world.objects and facts.get(Variable("at", subject)) is None
+        for subject in aim.condition.subjects
+    )
 
 
-def _strands(aim: _Aim, facts: Facts, world: WorldModel) -> tuple[list[Strand], Facts] | None:
-    """Different strands for one condition, the cheapest first, and the facts after that one.
-
-    Where a robot stands is left open at the start, so that every actor begins with the way to its
-    work, whatever its robot does before.
-    """
-    robots = _representatives(aim.condition.subject, facts, world)
-    start: Facts = dict(facts)
-    for robot in world.robots:
-        start[Variable("at", robot)] = None
-    if aim.condition.subject in world.robots:
-        start[Variable("at", aim.condition.subject)] = None
-    held = {
-        value
-        for robot in robots
-        if isinstance(value := facts.get(Variable("holding", robot)), str) and value != NOTHING
-    }
-    subject = aim.condition.subject
-    objects = sorted(held | ({subject} if subject in world.objects else set()))
-    actions = ground_actions(world, robots, objects, aim.condition)
-    used: dict[tuple[str, tuple[str, ...]], int] = {}
-
-    def cost_s(action: Action, now: Mapping[Variable, Value]) -> float:
-        where = now.get(Variable("at", action.actor))
-        if where is None:
-            where = facts.get(Variable("at", action.actor))
-        seconds = predicted_duration_s(action, where, action.actor, world)
-        return seconds + REUSE_CHARGE_S * used.get(_signature(action), 0)
-
-    strands: list[Strand] = []
-    after: Facts | None = None
-    for _ in range(ALTERNATIVES):
-        found = cheapest(actions, start, aim.condition, world, cost_s)
-        if found is None:
-            break
-        if after is None:
-            after = found.facts
-        strand = Strand(aim.goal, found.actions, frozenset({subject} & world.robots.keys()))
-        if strand not in strands:
-            strands.append(strand)
-        for action in found.actions:
-            used[_signature(action)] = used.get(_signature(action), 0) + 1
-    return (strands, after) if after is not None else None
-
-
-def _signature(action: Action) -> tuple[str, tuple[str, ...]]:
-    return action.skill.name, tuple(action.args.values())
-
-
-def _representatives(subject: str, facts: Facts, world: WorldModel) -> list[str]:
-    """One robot of each kind that is interchangeable now, and the one that is spoken of."""
-    kinds: dict[object, str] = {}
-    for robot in world.team:
-        spec = world.robots[robot]
-        kind = (
-            spec.skills,
-            tuple(sorted(spec.capabilities.items())),
-            facts.get(Variable("holding", robot)),
-            robot if robot == subject or facts.get(Variable("at", subject)) == robot else None,
-        )
-        kinds.setdefault(kind, robot)
-    return sorted(kinds.values())
-
-
-def _why_not(aim: _Aim, facts: Facts, world: WorldModel) -> str:
-    subject = aim.condition.subject
-    if subject in world.objects and facts.get(Variable("at", subject)) is None:
-        return (
-            f"nobody knows where {subject} is, so {aim.condition} cannot be planned for; "
-            "tell it as a statement, such as "
-            f'"{world.objects[subject].label} is in the {next(iter(world.places), "kitchen")}"'
-        )
+def _no_way(aim: Aim, world: WorldModel) -> str:
     return (
         f"no sequence of skills of the connected robots ({', '.join(world.team)}) "
         f"leads to {aim.condition}"
     )
 
 
-def _best_combination(
-    problem: PlanningProblem, options: Sequence[Sequence[Strand]]
+def _not_found(aim: Aim, problem: PlanningProblem) -> str:
+    things = " or ".join(aim.condition.subjects)
+    if problem.searched:
+        places = ", ".join(sorted(problem.searched))
+        return f"nobody knows where {things} is; looked for in {places}, and not found"
+    return (
+        f"nobody knows where {things} is, and no connected robot "
+        f"({', '.join(problem.world.team)}) can look for it"
+    )
+
+
+def _choose(
+    problem: PlanningProblem, options: Sequence[Sequence[Strand]], explored: Exploration | None
 ) -> Plan | NoPlan:
-    best: tuple[tuple[float, float], Plan] | None = None
+    if problem.strategy == MONOLITHIC:
+        return _checked(problem, [strands[0] for strands in options], explored)
+    if problem.strategy == PER_GOAL:
+        choice: list[Strand] = []
+        for goal in dict.fromkeys(strands[0].goal for strands in options):
+            mine = [strands for strands in options if strands[0].goal == goal]
+            best = _best(problem, mine, None)
+            if isinstance(best, NoPlan):
+                return best
+            choice.extend(best)
+        return _checked(problem, choice, explored)
+    best = _best(problem, options, explored)
+    return best if isinstance(best, NoPlan) else _plan(problem, best, explored)
+
+
+def _checked(
+    problem: PlanningProblem, choice: Sequence[Strand], explored: Exploration | None
+) -> Plan | NoPlan:
+    plan = _plan(problem, choice, explored)
+    value = _evaluate(plan, problem.world)
+    return value if isinstance(value, NoPlan) else plan
+
+
+def _best(
+    problem: PlanningProblem,
+    options: Sequence[Sequence[Strand]],
+    explored: Exploration | None,
+) -> list[Strand] | NoPlan:
+    """One strand of each, so that the makespan is small."""
+    best: tuple[tuple[float, float], list[Strand]] | None = None
     failure: NoPlan | None = None
 
     def consider(choice: Sequence[Strand]) -> bool:
         nonlocal best, failure
-        plan = _plan(problem, choice)
-        value = _evaluate(plan, problem.world)
+        value = _evaluate(_plan(problem, choice, explored), problem.world)
         if isinstance(value, NoPlan):
             failure = failure or value
             return False
         if best is None or value < best[0]:
-            best = value, plan
+            best = value, list(choice)
             return True
         return False
 
@@ -175,19 +141,25 @@ def _best_combination(
         for choice in product(*options):
             consider(choice)
     else:
-        current = [strands[0] for strands in options]
-        consider(current)
-        improved = True
-        while improved:
-            improved = False
-            for place, strands in enumerate(options):
-                for strand in strands:
-                    changed = [*current[:place], strand, *current[place + 1 :]]
-                    if changed != current and consider(changed):
-                        current, improved = changed, True
+        _change_one_at_a_time(options, consider)
     if best is not None:
         return best[1]
     return failure or NoPlan("no combination of action sequences passes the checker")
+
+
+def _change_one_at_a_time(
+    options: Sequence[Sequence[Strand]], consider: Callable[[Sequence[Strand]], bool]
+) -> None:
+    current = [strands[0] for strands in options]
+    consider(current)
+    improved = True
+    while improved:
+        improved = False
+        for place, strands in enumerate(options):
+            for strand in strands:
+                changed = [*current[:place], strand, *current[place + 1 :]]
+                if changed != current and consider(changed):
+                    current, improved = changed, True
 
 
 def _evaluate(plan: Plan, world: WorldModel) -> tuple[float, float] | NoPlan:
@@ -207,16 +179,30 @@ def _evaluate(plan: Plan, world: WorldModel) -> tuple[float, float] | NoPlan:
     return round(found.makespan_s, 3), found.work_s
 
 
-def _plan(problem: PlanningProblem, strands: Sequence[Strand]) -> Plan:
-    tasks, pins = tasks_from(strands, problem.first_task)
+def _plan(problem: PlanningProblem, choice: Sequence[Strand], explored: Exploration | None) -> Plan:
+    """The plan of these strands; it promises the conditions of goals that it has strands for."""
+    strands = [*choice, *(explored.strands if explored else ())]
+    tasks, pins = tasks_from(
+        strands, problem.first_task, one_actor_each=problem.strategy == MONOLITHIC
+    )
+    seeks = frozenset(explored.seeks if explored else ())
+    served = {strand.goal for strand in choice}
+    conditions = tuple(
+        condition
+        for goal in problem.goals
+        for condition in goal.conditions
+        if seeks.isdisjoint(condition.subjects)
+        and (goal.goal in served or problem.world.holds(condition))
+    )
     return Plan(
         plan=problem.plan,
         revision=problem.revision,
         goals=tuple(goal.goal for goal in problem.goals),
-        conditions=tuple(c for goal in problem.goals for c in goal.conditions),
+        conditions=(*conditions, *(explored.conditions if explored else ())),
         tasks=tasks,
         pins=pins,
         strategy=problem.strategy,
         made_by="symbolic",
         allocator=problem.allocator,
+        seeks=tuple(explored.seeks) if explored else (),
     )

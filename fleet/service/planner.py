@@ -248,9 +248,7 @@ class PlannerService:
     async def _make_plan(self, job: Job) -> None:
         at = self._at()
         try:
-            event: Event = await asyncio.to_thread(
-                carry_out, job, self._state, self._parts, at["time_s"], at["wall_time_s"]
-            )
+            event: Event = await asyncio.to_thread(carry_out, job, self._state, self._parts, at)
         except Exception as error:
             log.exception("planning job %d", job.job)
             event = events.PlanNotMade(

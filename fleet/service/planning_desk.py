@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable, Mapping
 
 from msgspec.structs import replace
 
 from fleet.allocators.base import Allocator, NotAllocated
 from fleet.core.events import PlanMade, PlanNotMade
 from fleet.core.state import Job, State
+from fleet.core.telling import SEARCHED
 from fleet.core.world_model import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.service.composition import Composition
+from keyexpr_schema.goals import Condition, GoalState, GoalStatus
+from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.plans import Plan
+from keyexpr_schema.tasks import TaskState
 
 
 def carry_out(
-    job: Job, state: State, parts: Composition, time_s: float, wall_time_s: float
+    job: Job, state: State, parts: Composition, at: Mapping[str, float]
 ) -> PlanMade | PlanNotMade:
-    """Plan, check and allocate; how it ended, as an event stamped with the given times."""
+    """Plan, check and allocate; how it ended, as an event stamped with `at`.
+
+    `at` has the event's `time_s` and `wall_time_s`.
+    """
     started = time.perf_counter()
     world = state.world(parts.skills)
     allocator = parts.allocators.get(job.allocator)
@@ -26,30 +34,31 @@ def carry_out(
     if isinstance(plan, NoPlan) or allocator is None:
         assert isinstance(plan, NoPlan)
         return PlanNotMade(
-            time_s=time_s,
-            wall_time_s=wall_time_s,
+            **at,
             job=job.job,
             reason=plan.reason,
             violations=plan.violations,
             planning_time_s=time.perf_counter() - started,
         )
-    return _allocate(job, plan, allocator, world, time_s, wall_time_s, started)
+    return _allocate(job, plan, allocator, state, world, at, started)
 
 
 def _allocate(
     job: Job,
     plan: Plan,
     allocator: Allocator,
+    state: State,
     world: WorldModel,
-    time_s: float,
-    wall_time_s: float,
+    at: Mapping[str, float],
     started: float,
 ) -> PlanMade | PlanNotMade:
-    made = allocator.allocate(plan, world)
+    kept = replace(plan, pins={**_busy_robots(job, plan, state), **plan.pins})
+    made = allocator.allocate(kept, world)
+    if isinstance(made, NotAllocated) and kept.pins != plan.pins:
+        made = allocator.allocate(plan, world)
     if isinstance(made, NotAllocated):
         return PlanNotMade(
-            time_s=time_s,
-            wall_time_s=wall_time_s,
+            **at,
             job=job.job,
             reason=made.violations[0].sentence,
             violations=made.violations,
@@ -57,8 +66,7 @@ def _allocate(
         )
     schedule = made.schedule
     return PlanMade(
-        time_s=time_s,
-        wall_time_s=wall_time_s,
+        **at,
         job=job.job,
         plan=plan,
         allocation=dict(made.allocation),
@@ -69,6 +77,39 @@ def _allocate(
         },
         makespan_s=schedule.makespan_s,
         planning_time_s=time.perf_counter() - started,
+    )
+
+
+def _wanted(status: GoalStatus, world: WorldModel) -> tuple[Condition, ...]:
+    """What a goal still wants: all that it says, or, once reached, that what holds is kept."""
+    if status.state is GoalState.REACHED:
+        return tuple(condition for condition in status.conditions if world.holds(condition))
+    return status.conditions
+
+
+def _busy_robots(job: Job, plan: Plan, state: State) -> dict[str, str]:
+    """Actors of the new plan whose work a robot has begun already, so that it goes on with it."""
+    book = state.plans.get(job.plan)
+    begun = {
+        _work(record.skill, record.args, (record.robot, *state.robots)): record.robot
+        for name in job.running
+        if book is not None and (record := book.records.get(name)) is not None and record.robot
+    }
+    pins: dict[str, str] = {}
+    for task in plan.tasks:
+        robot = begun.get(_work(task.skill, task.args, ()))
+        if robot is not None and robot not in pins.values():
+            pins[task.actor] = robot
+    return pins
+
+
+def _work(skill: str, args: Mapping[str, str], robots: Iterable[str | None]) -> tuple[object, ...]:
+    """What a task is about, whoever does it."""
+    others = set(robots)
+    return skill, *sorted(
+        (name, value)
+        for name, value in args.items()
+        if value not in others and not value.startswith(ACTOR_PREFIX)
     )
 
 
@@ -86,7 +127,7 @@ def _plan(job: Job, state: State, world: WorldModel, parts: Composition) -> Plan
             f"there is no planner {job.planner}: choose one of {', '.join(sorted(parts.planners))}"
         )
     goals = tuple(
-        replace(state.goals[goal], conditions=state.goal_states[goal].conditions)
+        replace(state.goals[goal], conditions=_wanted(state.goal_states[goal], world))
         for goal in job.goals
         if goal in state.goals
     )
@@ -99,7 +140,20 @@ def _plan(job: Job, state: State, world: WorldModel, parts: Composition) -> Plan
             strategy=job.strategy,
             allocator=job.allocator,
             first_task=job.first_task,
+            searched=_searched(job, state, parts),
         )
+    )
+
+
+def _searched(job: Job, state: State, parts: Composition) -> frozenset[str]:
+    """Places that a finished task of this plan has searched."""
+    book = state.plans.get(job.plan)
+    return frozenset(
+        literal.variable.subject
+        for record in (book.records.values() if book else ())
+        if record.state is TaskState.SUCCEEDED and record.skill in parts.skills
+        for literal in parts.skills[record.skill].ground(record.args).after
+        if literal.variable.relation == SEARCHED
     )
 
 

@@ -13,7 +13,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from fleet.core import events
 from keyexpr_schema.goals import ENDED_GOALS
 from keyexpr_schema.plans import ENDED_PLANS, PlanState
-from keyexpr_schema.tasks import TaskState
+from keyexpr_schema.requests import ReplanRequest
+from keyexpr_schema.tasks import ReportState, TaskState
 from tests.fleet_model import FleetModel
 from tests.household import bring, carrier, manipulator
 
@@ -62,6 +63,18 @@ class Planner(RuleBasedStateMachine):
     def an_old_report_comes_again(self, pick: int) -> None:
         report = self.model.told[pick % len(self.model.told)]
         self.model.tell(events.ReportTold, report=report)
+
+    @precondition(lambda self: any(order.cancelled for order in self.model.orders()))
+    @rule()
+    def what_is_cancelled_is_confirmed(self) -> None:
+        order = next(order for order in self.model.orders() if order.cancelled)
+        self.model.report(order, ReportState.CANCELLED)
+
+    @rule()
+    def a_person_wants_another_plan(self) -> None:
+        number = len(self.model.state.answers)
+        request = ReplanRequest(request=f"again-{number}", plan="plan-1", reason="because")
+        self.model.tell(events.ReplanAsked, request=request)
 
     @rule()
     def the_planner_crashes(self) -> None:

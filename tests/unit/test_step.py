@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from fleet.core import events
-from fleet.core.effects import MakePlan, Publish
+from fleet.core.effects import Interpret, MakePlan, Publish
 from fleet.core.planning import MAX_REPLANS
-from fleet.core.state import State
+from fleet.core.state import Policy, State
 from fleet.core.step import step
 from keyexpr_schema.goals import Goal, GoalState
 from keyexpr_schema.keyspace import PLACE, PLAN_STATUS
-from keyexpr_schema.plans import Plan, PlanState, Task
+from keyexpr_schema.plans import Plan, PlanChange, PlanState, Task
 from keyexpr_schema.requests import Control, ControlRequest, ReplanRequest
 from keyexpr_schema.tasks import ReportState, TaskState
 from tests.fleet_model import FleetModel
-from tests.household import SKILLS, bring, carrier, manipulator
+from tests.household import SKILLS, at, bring, carrier, manipulator
 
 BOTH = (bring(1, "hallway"), bring(2, "living_room"))
 
@@ -143,14 +143,47 @@ def test_a_fact_that_contradicts_the_plan_leads_to_a_new_one() -> None:
     assert goal_state(model, "g1") is GoalState.REACHED
 
 
-def test_an_unknown_place_of_the_object_is_told() -> None:
-    model = fleet()
+def test_what_nobody_can_look_for_is_told() -> None:
+    model = FleetModel((manipulator(),), cups=1)
+    blind = manipulator().__class__(
+        robot="hsr", model="hsr", skills=("navigate",), capabilities={"drive": 1.0}
+    )
+    model.tell(events.RobotTold, spec=blind)
     model.tell(events.FactForgotten, subject="cup_1", relation="at")
     model.plan(bring(1, "hallway"))
     assert not model.state.answers["r0"].accepted
     assert "where cup_1 is" in model.state.answers["r0"].sentence
     assert goal_state(model, "g1") is GoalState.WAITING
     assert model.state.plans["plan-1"].state is PlanState.REJECTED
+
+
+def test_a_discovery_ends_the_search_and_leads_to_the_goal() -> None:
+    model = fleet()
+    model.learn("cup_1", "at", None)
+    model.plan(bring(1, "hallway"))
+    searching = {order.robot for order in model.orders()}
+    assert searching == {"hsr", "locobot"}
+    while not any(o.robot == "locobot" and o.skill == "search" for o in model.orders()):
+        model.succeed(next(o for o in model.orders() if o.robot == "locobot"))
+    model.learn("cup_1", "at", "living_room")
+    book = model.state.plans["plan-1"]
+    assert book.plan.revision == 2
+    assert "pick" in {task.skill for task in book.plan.tasks}
+    for order in model.orders():
+        if order.cancelled:
+            model.report(order, ReportState.CANCELLED)
+    model.finish()
+    assert goal_state(model, "g1") is GoalState.REACHED
+
+
+def test_what_is_found_nowhere_ends_the_goal_with_where_it_was_looked_for() -> None:
+    model = fleet()
+    model.learn("cup_1", "at", None)
+    model.plan(bring(1, "hallway"))
+    model.finish()
+    assert goal_state(model, "g1") is GoalState.FAILED
+    reason = model.state.goal_states["g1"].reason or ""
+    assert "looked for in hallway, kitchen, living_room" in reason
 
 
 def test_sentences_wait_for_the_names_they_use() -> None:
@@ -215,7 +248,8 @@ def test_a_task_that_cannot_be_added_leaves_the_plan_as_it_was() -> None:
     model.finish()
     book = model.state.plans["plan-1"]
     assert book.state is PlanState.SUCCEEDED
-    assert "there is no skill fly" in (book.reason or "")
+    assert "there is no skill fly" in model.state.answers["c"].sentence
+    assert not model.state.answers["c"].accepted
 
 
 def test_a_plan_that_someone_proposes_is_checked_like_any_other() -> None:
@@ -250,18 +284,144 @@ def test_requests_are_answered_once_and_wrong_ones_with_the_reason() -> None:
     assert model.state is before
 
 
-def test_a_replan_on_request_waits_for_running_tasks_and_keeps_finished_ones() -> None:
+def test_a_replan_that_changes_nothing_disturbs_nobody() -> None:
     model = fleet()
     model.plan(*BOTH)
-    first = model.orders()[0]
-    model.start(first)
+    before = model.orders()
+    model.start(before[0])
     model.tell(
         events.ReplanAsked, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
     )
-    assert model.state.plans["plan-1"].plan.revision == 1
+    book = model.state.plans["plan-1"]
+    assert book.plan.revision == 2
+    assert book.change == PlanChange(kept=9, dropped=0, added=0)
+    assert model.orders() == before
     model.finish()
-    assert model.state.plans["plan-1"].plan.revision == 2
     assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
+
+
+def test_a_replan_in_the_middle_of_a_pick_goes_on_with_it() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    model.succeed(model.orders()[0])
+    (pick,) = model.orders()
+    model.start(pick)
+    model.tell(
+        events.ReplanAsked, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
+    )
+    assert model.orders() == [pick]
+    assert model.state.plans["plan-1"].change == PlanChange(kept=3, dropped=0, added=0)
+    model.finish()
+    assert goal_state(model, "g1") is GoalState.REACHED
+
+
+def test_work_that_is_no_longer_wanted_is_cancelled_before_what_conflicts_starts() -> None:
+    model = FleetModel((manipulator("r1"), manipulator("r2")), cups=1)
+    model.plan(bring(1, "hallway"))
+    (order,) = model.orders()
+    model.start(order)
+    other = {"r1": "r2", "r2": "r1"}[order.robot]
+    # The cup turns out to be in the other robot's hand: that one has to bring it.
+    model.learn(other, "holding", "cup_1")
+    model.learn("cup_1", "at", other)
+    dropped = [o for o in model.orders() if o.cancelled]
+    assert [o.task for o in dropped] == [order.task]
+    assert model.state.plans["plan-1"].change is not None
+    model.report(dropped[0], ReportState.CANCELLED)
+    assert {o.robot for o in model.orders()} == {other}
+    model.finish()
+    assert goal_state(model, "g1") is GoalState.REACHED
+
+
+def test_a_goal_that_comes_up_joins_the_running_plan_when_asked() -> None:
+    model = fleet()
+    model.plan(BOTH[0])
+    model.tell(events.GoalTold, goal=BOTH[1])
+    model.tell(
+        events.ReplanAsked,
+        request=ReplanRequest(request="x", plan="plan-1", reason="more", goals=("g2",)),
+    )
+    assert model.state.plans["plan-1"].plan.goals == ("g1", "g2")
+    model.finish()
+    assert goal_state(model, "g2") is GoalState.REACHED
+
+
+def test_goals_are_planned_unasked_where_the_policy_says_so() -> None:
+    model = fleet()
+    model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(auto_plan=True))
+    for goal in BOTH:
+        model.tell(events.GoalTold, goal=goal)
+    assert list(model.state.plans) == ["plan-1"]
+    model.finish()
+    assert [goal_state(model, g) for g in ("g1", "g2")] == [GoalState.REACHED] * 2
+
+
+def test_a_new_robot_is_given_a_share() -> None:
+    model = FleetModel((manipulator("r1"),), cups=2)
+    model.plan(*BOTH)
+    model.tell(events.RobotTold, spec=manipulator("r2"))
+    model.tell(events.RobotSeen, robot="r2", incarnation="i1")
+    model.learn("r2", "holding", "nothing")
+    book = model.state.plans["plan-1"]
+    assert book.plan.revision == 2
+    assert {record.robot for record in book.current()} == {"r1", "r2"}
+    model.finish()
+    assert book.plan.goals == ("g1", "g2")
+    assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
+
+
+def test_a_plan_waits_for_approval_where_the_policy_says_so() -> None:
+    model = fleet()
+    model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(approval=True))
+    model.plan(bring(1, "hallway"))
+    assert model.state.plans["plan-1"].state is PlanState.PROPOSED
+    assert model.orders() == []
+    approve = ControlRequest(request="a", control=Control.APPROVE, plan="plan-1")
+    model.tell(events.ControlAsked, request=approve)
+    model.finish()
+    assert goal_state(model, "g1") is GoalState.REACHED
+
+
+def test_a_dry_run_shows_the_plan_and_leaves_nothing_behind() -> None:
+    model = fleet()
+    model.plan(*BOTH, dry_run=True)
+    answer = model.state.answers["r0"]
+    assert answer.preview is not None
+    assert len(answer.preview.tasks) == 9
+    assert answer.preview_status is not None
+    assert set(answer.preview_status.allocation.values()) == {"hsr", "locobot"}
+    assert model.state.plans == {}
+    assert model.state.previews == {}
+    assert goal_state(model, "g1") is GoalState.WAITING
+
+
+def test_a_goal_in_steps_takes_one_after_the_other() -> None:
+    model = fleet()
+    model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(interpreter=True))
+    model.tell(events.GoalTold, goal=Goal(goal="g", text="kindly do the usual with cup one"))
+    assert goal_state(model, "g") is GoalState.WAITING
+    assert any(isinstance(effect, Interpret) for effect in model.effects)
+    stages = ((at("cup_1", "hallway"),), (at("cup_1", "living_room"),))
+    model.tell(events.GoalInterpreted, goal="g", stages=stages)
+    model.plan()
+    model.finish()
+    assert goal_state(model, "g") is GoalState.REACHED
+    assert model.state.facts["cup_1/at"].value == "living_room"
+    places = [
+        record.args["place"]
+        for record in model.state.plans["plan-1"].records.values()
+        if record.skill == "place"
+    ]
+    assert places == ["hallway", "living_room"]
+
+
+def test_a_sentence_that_no_model_understands_is_refused() -> None:
+    model = fleet()
+    model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(interpreter=True))
+    model.tell(events.GoalTold, goal=Goal(goal="g", text="hum a tune"))
+    model.tell(events.GoalInterpreted, goal="g", reason="it is no task for robots")
+    assert goal_state(model, "g") is GoalState.REJECTED
+    assert "no task for robots" in (model.state.goal_states["g"].reason or "")
 
 
 def test_a_deleted_goal_leaves_the_plan() -> None:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import pytest
+
 from fleet.allocators.base import Allocated, NotAllocated
 from fleet.allocators.milp import MilpAllocator
 from fleet.core.checker import check_plan
 from fleet.core.world_model import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic import SymbolicPlanner
-from keyexpr_schema.goals import Goal
+from keyexpr_schema.goals import Condition, Goal
 from keyexpr_schema.plans import Plan
-from tests.household import at, bring, carrier, fact, home, manipulator
+from tests.household import PLACES, at, bring, carrier, fact, home, manipulator
 
 
 def solve(world: WorldModel, *goals: Goal, **more: object) -> Plan:
@@ -98,7 +100,18 @@ def test_why_there_is_no_plan_is_said() -> None:
         return made.reason
 
     goal = bring(1, "hallway")
-    assert "where cup_1 is" in reason(home(facts=(fact("cup_1", "at", None),)), goal)
+    lost = home(facts=(fact("cup_1", "at", None),))
+    everywhere = frozenset(place.place for place in PLACES)
+    assert "looked for in hallway, kitchen, living_room" in reason(lost, goal, searched=everywhere)
+    blind = home(
+        (
+            carrier().__class__(
+                robot="r", model="m", skills=("navigate",), capabilities={"drive": 1.0}
+            ),
+        ),
+        facts=(fact("cup_1", "at", None),),
+    )
+    assert "can look for it" in reason(blind, goal)
     assert "locobot" in reason(home((carrier(),)), goal)
     assert "no robot is connected" in reason(home(()), goal)
     assert "choose one of" in reason(home(), goal, strategy="magic")
@@ -109,3 +122,72 @@ def test_the_allocator_refuses_what_no_robot_can_do() -> None:
     refused = MilpAllocator().allocate(plan, home((carrier(),)))
     assert isinstance(refused, NotAllocated)
     assert "does not have the skill" in refused.violations[0].sentence
+
+
+def test_what_nobody_knows_is_looked_for_everywhere_in_parallel() -> None:
+    world = home(facts=(fact("cup_1", "at", None),))
+    plan = solve(world, bring(1, "hallway"))
+    assert plan.seeks == ("cup_1",)
+    assert skills(plan).count("search") == len(PLACES)
+    assert set(allocate(plan, world).allocation.values()) == {"hsr", "locobot"}
+    rest = solve(world, bring(1, "hallway"), searched=frozenset({"kitchen"}))
+    assert {t.args["place"] for t in rest.tasks if t.skill == "search"} == {
+        "hallway",
+        "living_room",
+    }
+
+
+def test_known_work_goes_on_while_something_else_is_looked_for() -> None:
+    world = home(facts=(fact("cup_1", "at", None),))
+    plan = solve(world, bring(1, "hallway"), bring(2, "living_room"))
+    assert plan.seeks == ("cup_1",)
+    assert "pick" in skills(plan)
+    assert at("cup_2", "living_room") in plan.conditions
+    assert at("cup_1", "hallway") not in plan.conditions
+
+
+def test_some_cup_is_the_nearest_one() -> None:
+    some = Condition(relation="at", subject="cup_1", any_of=("cup_1", "cup_2"), value="hallway")
+    world = home(facts=(fact("cup_1", "at", None), fact("cup_2", "at", "living_room")))
+    plan = solve(world, Goal(goal="g", text="", conditions=(some,)))
+    assert {t.args["object"] for t in plan.tasks if "object" in t.args} == {"cup_2"}
+
+
+@pytest.mark.parametrize(
+    ("relation", "subject", "last"),
+    [("held", "cup_1", "pick"), ("searched", "hallway", "search")],
+)
+def test_other_conditions_have_plans_too(relation: str, subject: str, last: str) -> None:
+    goal = Goal(
+        goal="g", text="", conditions=(Condition(relation=relation, subject=subject, value=True),)
+    )
+    assert skills(solve(home(), goal))[-1] == last
+
+
+def test_an_object_whose_place_is_known_is_located() -> None:
+    goal = Goal(
+        goal="g", text="", conditions=(Condition(relation="located", subject="cup_1", value=True),)
+    )
+    assert solve(home(), goal).tasks == ()
+
+
+@pytest.mark.parametrize("strategy", SymbolicPlanner.strategies)
+def test_every_strategy_passes_the_checker(strategy: str) -> None:
+    robots = (manipulator("r1"), manipulator("r2"), carrier())
+    world = home(robots, cups=4)
+    goals = [bring(n, "hallway" if n % 2 else "living_room") for n in range(1, 5)]
+    plan = solve(world, *goals, strategy=strategy)
+    made = allocate(plan, world)
+    assert check_plan(plan, world, made.allocation, made.schedule.extra_after).valid
+    assert plan.strategy == strategy
+
+
+def test_choosing_for_all_goals_together_is_at_least_as_fast() -> None:
+    world = home(facts=(fact("hsr", "at", "living_room"), fact("locobot", "at", "hallway")))
+    goals = (bring(1, "hallway"), bring(2, "living_room"))
+    makespan = {
+        strategy: allocate(solve(world, *goals, strategy=strategy), world).schedule.makespan_s
+        for strategy in SymbolicPlanner.strategies
+    }
+    assert makespan["big-dag"] < makespan["per-goal"]
+    assert makespan["big-dag"] < makespan["monolithic"]

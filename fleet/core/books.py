@@ -1,0 +1,67 @@
+"""Small changes to what is kept of plans and requests, used by every part of the core."""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from fleet.core.state import PlanBook, State, put
+from fleet.core.telling import mark_goals
+from keyexpr_schema.goals import GoalState
+from keyexpr_schema.plans import PlanState, Violation
+from keyexpr_schema.requests import Answer
+from keyexpr_schema.tasks import TaskRecord, TaskState
+
+
+def answer(
+    state: State,
+    request: str | None,
+    accepted: bool,
+    sentence: str,
+    plan: str | None = None,
+    violations: tuple[Violation, ...] = (),
+) -> State:
+    """Answer a request; no request, no answer."""
+    if request is None:
+        return state
+    reply = Answer(
+        request=request, accepted=accepted, sentence=sentence, plan=plan, violations=violations
+    )
+    return replace(state, answers=put(state.answers, request, reply))
+
+
+def set_book(state: State, book: PlanBook) -> State:
+    """Change what is kept of a plan."""
+    return replace(
+        state, plans=put(state.plans, book.plan.plan, replace(book, changed_s=state.time_s))
+    )
+
+
+def set_record(state: State, book: PlanBook, record: TaskRecord) -> State:
+    """Change what is kept of a task."""
+    return set_book(state, replace(book, records=put(book.records, record.task, record)))
+
+
+def next_task(book: PlanBook) -> int:
+    """The first number that no task of the plan has had."""
+    return 1 + max((int(name[1:]) for name in book.records if name[1:].isdigit()), default=0)
+
+
+def give_up(state: State, book: PlanBook, reason: str) -> State:
+    """End a plan as failed, and with it those of its goals that are not reached."""
+    records = {
+        name: record
+        if record.state is not TaskState.WAITING
+        else replace(record, state=TaskState.CANCELLED, reason="the plan failed")
+        for name, record in book.records.items()
+    }
+    book = replace(
+        book,
+        state=PlanState.FAILED,
+        reason=reason,
+        replan_reason=None,
+        records=records,
+        dropping=tuple(record.task for record in book.outstanding()),
+        job=None,
+    )
+    state = set_book(state, book)
+    return mark_goals(state, book.plan.goals, GoalState.FAILED, book.plan.plan, reason)

@@ -1,0 +1,117 @@
+"""What reports of workers mean for a plan's tasks."""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from fleet.core import events
+from fleet.core.books import set_record
+from fleet.core.calls import Skills, action_of, unmet_before
+from fleet.core.effects import PLANNER_SOURCE
+from fleet.core.state import OUTSTANDING, PlanBook, State
+from fleet.core.telling import believe, believe_if_newer
+from keyexpr_schema.tasks import Report, ReportState, TaskRecord, TaskState
+from keyexpr_schema.world import Fact
+
+MAX_ATTEMPTS = 3
+"""Orders given for one task to one robot; each order has the worker's own tries inside."""
+
+
+def report_told(state: State, event: events.ReportTold, skills: Skills) -> State:
+    """Take in what a worker says; a report of an attempt that is not current only brings facts."""
+    report = event.report
+    for fact in report.facts:
+        state = believe_if_newer(state, fact)
+    book = state.plans.get(report.plan)
+    record = book.records.get(report.task) if book else None
+    if (
+        book is None
+        or record is None
+        or record.state not in OUTSTANDING
+        or (report.robot, report.attempt) != (record.robot, record.attempt)
+    ):
+        return state
+    match report.state:
+        case ReportState.STARTED:
+            if record.state is TaskState.RUNNING:
+                return state
+            record = replace(record, state=TaskState.RUNNING, started_s=report.started_s)
+            return set_record(state, book, record)
+        case ReportState.SUCCEEDED:
+            return _succeeded(state, book, record, report, skills)
+        case ReportState.CANCELLED:
+            return set_record(state, book, _ended(record, report, TaskState.CANCELLED))
+        case ReportState.FAILED:
+            return _failed(state, book, record, report)
+        case ReportState.INTERRUPTED:
+            return _interrupted(state, book, record, report, skills)
+        case ReportState.REFUSED:
+            if report.retryable and record.attempt < MAX_ATTEMPTS:
+                return set_record(state, book, _again(record, report))
+            return _failed(state, book, record, report)
+
+
+def _ended(record: TaskRecord, report: Report, to: TaskState) -> TaskRecord:
+    return replace(
+        record,
+        state=to,
+        tries=(*record.tries, *report.tries),
+        reason=report.reason,
+        started_s=record.started_s if report.started_s is None else report.started_s,
+        ended_s=report.ended_s,
+    )
+
+
+def _again(record: TaskRecord, report: Report) -> TaskRecord:
+    return replace(
+        record,
+        state=TaskState.WAITING,
+        tries=(*record.tries, *report.tries),
+        reason=report.reason,
+    )
+
+
+def _succeeded(
+    state: State, book: PlanBook, record: TaskRecord, report: Report, skills: Skills
+) -> State:
+    told = {(fact.relation, fact.subject) for fact in report.facts}
+    action = action_of(record, skills)
+    for literal in action.after if action is not None else ():
+        if tuple(literal.variable) not in told:
+            state = believe(
+                state,
+                Fact(
+                    subject=literal.variable.subject,
+                    relation=literal.variable.relation,
+                    value=literal.value,
+                    source=PLANNER_SOURCE,
+                    time_s=report.ended_s or state.time_s,
+                ),
+            )
+    return set_record(state, book, _ended(record, report, TaskState.SUCCEEDED))
+
+
+def _failed(state: State, book: PlanBook, record: TaskRecord, report: Report) -> State:
+    record = _ended(record, report, TaskState.FAILED)
+    if not book.ended and record.task not in book.dropping:
+        reason = f"{record.task} ({record.skill}) failed: {report.reason}"
+        book = replace(book, replan_reason=reason)
+    return set_record(state, book, record)
+
+
+def _interrupted(
+    state: State, book: PlanBook, record: TaskRecord, report: Report, skills: Skills
+) -> State:
+    """A worker came back in the middle of an attempt: the world decides what it is worth."""
+    if book.ended or record.task in book.dropping:
+        return set_record(state, book, _ended(record, report, TaskState.CANCELLED))
+    action = action_of(record, skills)
+    if action is None:
+        return _failed(state, book, record, report)
+    world = state.world(skills)
+    if all(world.value(*literal.variable) == literal.value for literal in action.after):
+        record = _ended(record, report, TaskState.SUCCEEDED)
+        return set_record(state, book, replace(record, reason="found done after an interruption"))
+    if unmet_before(action, world) is None and record.attempt < MAX_ATTEMPTS:
+        return set_record(state, book, _again(record, report))
+    return _failed(state, book, record, report)

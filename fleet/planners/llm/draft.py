@@ -1,0 +1,138 @@
+"""From a model's answer to a plan: named as plans are, with the order that safety needs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from msgspec.structs import replace
+
+from fleet.core.graph import TaskGraph
+from fleet.core.lifting import Strand, tasks_from
+from fleet.core.skills import Variable
+from fleet.core.world_model import WorldModel
+from fleet.planners.base import PlanningProblem
+from fleet.planners.llm.answers import GraphAnswer, ListAnswer, StepAnswer, TaskAnswer, actor_of
+from keyexpr_schema.goals import Condition, Goal
+from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.plans import Plan, Task
+from keyexpr_schema.world import Value
+
+
+@dataclass(frozen=True)
+class Draft:
+    """Tasks as the model named them, and actors that must be certain robots.
+
+    Names are the model's own until the draft has been checked, so that it can be told which of its
+    tasks is wrong.
+    """
+
+    tasks: tuple[Task, ...]
+    pins: Mapping[str, str]
+
+
+def draft_of(answer: GraphAnswer | ListAnswer, world: WorldModel, goals: Sequence[Goal]) -> Draft:
+    """The tasks of an answer; those of a flat list wait for one another in its order."""
+    only = goals[0].goal if len(goals) == 1 else None
+    rows: Sequence[StepAnswer] = answer.tasks
+    tasks: list[Task] = []
+    for row in rows:
+        name = row.task if isinstance(row, TaskAnswer) else f"t{len(tasks) + 1}"
+        before = (tasks[-1].task,) if tasks else ()
+        skill = world.skills.get(row.skill)
+        tasks.append(
+            Task(
+                task=name,
+                skill=row.skill,
+                args=row.args,
+                actor=actor_of(skill, row.args),
+                after=tuple(dict.fromkeys(row.after)) if isinstance(row, TaskAnswer) else before,
+                goal=row.goal if only is None else only,
+                duration_s=skill.duration_s if skill is not None else 0.0,
+            )
+        )
+    pins = {pin.actor.removeprefix(ACTOR_PREFIX): pin.robot for pin in answer.pins}
+    actors = {task.actor for task in tasks}
+    return Draft(tuple(tasks), {actor: pins[actor] for actor in pins if actor in actors})
+
+
+def plan_of(draft: Draft, problem: PlanningProblem, goals: Sequence[Goal]) -> Plan:
+    """The draft as a plan for these goals, under the model's own names."""
+    return Plan(
+        plan=problem.plan,
+        revision=problem.revision,
+        goals=tuple(goal.goal for goal in goals),
+        conditions=conditions_of(goals),
+        tasks=draft.tasks,
+        pins=dict(draft.pins),
+        strategy=problem.strategy,
+        made_by="llm",
+        allocator=problem.allocator,
+    )
+
+
+def conditions_of(goals: Sequence[Goal]) -> tuple[Condition, ...]:
+    """What must hold at the end, goal by goal."""
+    return tuple(condition for goal in goals for condition in goal.conditions)
+
+
+def merged(drafts: Sequence[Draft], problem: PlanningProblem, keep_order: bool) -> Plan:
+    """One plan of checked drafts, with names that are unique over the revisions of the plan.
+
+    Between drafts there is only the order that one's effects on the other call for. Within a draft
+    the model's own order is kept, or, without `keep_order`, replaced by what causes call for.
+    """
+    world = problem.world
+    strands: list[Strand] = []
+    rows: list[Task] = []
+    for draft in drafts:
+        graph = TaskGraph({task.task: task.after for task in draft.tasks})
+        by_name = {task.task: task for task in draft.tasks}
+        ordered = [by_name[name] for name in graph.order]
+        rows.extend(ordered)
+        robots = {ACTOR_PREFIX + actor: robot for actor, robot in draft.pins.items()}
+        actions = tuple(
+            world.skills[task.skill].ground(
+                {name: robots.get(value, value) for name, value in task.args.items()}
+            )
+            for task in ordered
+        )
+        strands.append(Strand("", actions, frozenset(robots.values())))
+    tasks, pins = tasks_from(strands, problem.first_task)
+    if keep_order:
+        tasks = _with_order(tasks, rows, drafts)
+    tasks = tuple(replace(task, goal=row.goal) for task, row in zip(tasks, rows, strict=True))
+    draft = Draft(tasks, pins)
+    return plan_of(draft, problem, problem.goals)
+
+
+def _with_order(
+    tasks: Sequence[Task], rows: Sequence[Task], drafts: Sequence[Draft]
+) -> tuple[Task, ...]:
+    """The tasks with the model's order added, in the fewest edges."""
+    start = 0
+    after: dict[str, set[str]] = {task.task: set(task.after) for task in tasks}
+    for draft in drafts:
+        here = slice(start, start + len(draft.tasks))
+        start = here.stop
+        names = {row.task: task.task for row, task in zip(rows[here], tasks[here], strict=True)}
+        for task in draft.tasks:
+            after[names[task.task]] |= {names[before] for before in task.after}
+    reduced = TaskGraph(after).reduced()
+    return tuple(replace(task, after=reduced[task.task]) for task in tasks)
+
+
+def world_after(draft: Draft, world: WorldModel) -> WorldModel:
+    """The world when a checked draft is done, as far as it is settled before robots are chosen."""
+    graph = TaskGraph({task.task: task.after for task in draft.tasks})
+    by_name = {task.task: task for task in draft.tasks}
+    facts: dict[Variable, Value] = {}
+    for name in graph.order:
+        task = by_name[name]
+        for literal in world.skills[task.skill].ground(task.args).after:
+            if literal.variable.subject.startswith(ACTOR_PREFIX):
+                continue
+            value = literal.value
+            in_hand = isinstance(value, str) and value.startswith(ACTOR_PREFIX)
+            facts[literal.variable] = None if in_hand else value
+    return world.with_facts(facts)

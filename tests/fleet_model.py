@@ -69,7 +69,8 @@ class FleetModel:
 
     def _take(self, effects: tuple[Effect, ...]) -> None:
         self.effects.extend(effects)
-        for effect in effects:
+        # All of a step's effects are meant to hold together: what ends makes room for what begins.
+        for effect in sorted(effects, key=lambda e: not isinstance(e, Retract)):
             if isinstance(effect, Publish):
                 keyexpr = effect.key.build(effect.address)
                 if effect.key is ORDER:

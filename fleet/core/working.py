@@ -114,7 +114,7 @@ def _dispatch(state: State, plan: str, record: TaskRecord, skills: Skills) -> St
     if action is None:
         reason = f"{record.task} cannot start: there is no skill {record.skill} any more"
         return give_up(state, book, reason)
-    if not all(_free(state, robot, plan, record) for robot in action.participants):
+    if not all(_free(state, robot, plan) for robot in action.participants):
         return state
     if _touches_what_is_dropped(book, action, skills):
         return state
@@ -142,10 +142,11 @@ def _touches_what_is_dropped(book: PlanBook, action: Action, skills: Skills) -> 
     return False
 
 
-def _free(state: State, robot: str, plan: str, record: TaskRecord) -> bool:
+def _free(state: State, robot: str, plan: str) -> bool:
     """Whether a robot is connected and neither works now nor is in the middle of other work.
 
-    An actor that has begun keeps its robot until it has ended: between a pick and its place no
+    A robot that has begun an actor's work, or carries what another plan wants brought somewhere,
+    keeps to that plan until it has nothing left to do there: between a pick and its place no
     other plan may have the hand.
     """
     if not state.alive.get(robot):
@@ -153,19 +154,31 @@ def _free(state: State, robot: str, plan: str, record: TaskRecord) -> bool:
     for book in state.plans.values():
         begun: set[str] = set()
         unfinished: set[str] = set()
-        for other in book.records.values():
-            if robot not in (other.robot, *other.args.values()):
+        for record in book.records.values():
+            if robot not in (record.robot, *record.args.values()):
                 continue
-            if other.state in OUTSTANDING:
+            if record.state in OUTSTANDING:
                 return False
-            if other.robot == robot and not book.ended:
-                if other.state is TaskState.SUCCEEDED:
-                    begun.add(other.actor)
-                elif other.state is TaskState.WAITING:
-                    unfinished.add(other.actor)
-        if book.plan.plan != plan and begun & unfinished:
+            if record.robot == robot and record.state is TaskState.SUCCEEDED:
+                begun.add(record.actor)
+            elif record.robot == robot and record.state is TaskState.WAITING:
+                unfinished.add(record.actor)
+        if book.plan.plan == plan or book.ended or not unfinished:
+            continue
+        if begun & unfinished or _carries_for(state, robot, book):
             return False
     return True
+
+
+def _carries_for(state: State, robot: str, book: PlanBook) -> bool:
+    """Whether a robot has something with it that an open goal of the plan is about."""
+    return any(
+        (fact := state.fact("at", subject)) is not None and fact.value == robot
+        for goal in book.plan.goals
+        if goal in state.goal_states and state.goal_states[goal].state not in ENDED_GOALS
+        for condition in state.goal_states[goal].conditions
+        for subject in condition.subjects
+    )
 
 
 def _fail_tasks_of_lost_robots(state: State) -> State:

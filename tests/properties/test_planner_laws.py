@@ -24,15 +24,18 @@ PICK = st.integers(0, 10)
 class Planner(RuleBasedStateMachine):
     @initialize(
         second=st.booleans(),
+        together=st.booleans(),
         cups=st.integers(1, 3),
         rooms=st.lists(st.sampled_from(["hallway", "living_room"]), min_size=3, max_size=3),
     )
-    def begin(self, second: bool, cups: int, rooms: list[str]) -> None:
+    def begin(self, second: bool, together: bool, cups: int, rooms: list[str]) -> None:
         robots = (manipulator(), carrier(), *((manipulator("r2"),) if second else ()))
         self.model = FleetModel(robots, cups)
         self.away: set[str] = set()
         self.finished: set[tuple[str, str]] = set()
-        self.model.plan(*(bring(n, rooms[n - 1]) for n in range(1, cups + 1)))
+        goals = [bring(n, rooms[n - 1]) for n in range(1, cups + 1)]
+        for share in [goals] if together else [[goal] for goal in goals]:
+            self.model.plan(*share)
 
     def order(self, pick: int):  # type: ignore[no-untyped-def]
         orders = self.model.orders()
@@ -125,4 +128,4 @@ class Planner(RuleBasedStateMachine):
 
 
 TestPlanner = Planner.TestCase
-TestPlanner.settings = settings(max_examples=60, stateful_step_count=25, deadline=None)
+TestPlanner.settings = settings(max_examples=80, stateful_step_count=25, deadline=None)

@@ -7,17 +7,20 @@ from collections.abc import Iterator
 from dataclasses import replace as changed
 from typing import Any
 
+import msgspec
 import pytest
 
 from fleet.core.checker import check_plan
 from fleet.core.world_model import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.llm import LlmConfig, LlmPlanner, ModelCaller
+from fleet.planners.llm.answers import GraphAnswer
+from fleet.planners.llm.draft import draft_of, merged
 from fleet.planners.symbolic import SymbolicPlanner
 from keyexpr_schema.goals import Goal
 from keyexpr_schema.plans import Plan
 from keyexpr_schema.world import Object
-from tests.household import at, bring, carrier, fact, home, manipulator
+from tests.household import at, bring, carrier, fact, home
 from tests.llm_server import LlmServer, Reply
 
 GOALS = (bring(1, "hallway"), bring(2, "living_room"))
@@ -164,22 +167,50 @@ def test_each_goal_gets_a_graph_of_its_own(caller: ModelCaller) -> None:
     assert "cup 2 to the" not in server.said(0)
 
 
-def test_goals_of_the_same_object_are_put_in_order(caller: ModelCaller) -> None:
-    """The second goal starts from where the first one leaves the cup."""
-    world = home((manipulator("r1"),))
-    first = bring(1, "hallway")
-    # "Look into the hallway" and "bring the cup": both need a robot, only one moves the cup.
-    second = Goal(goal="g2", text="r1 to the kitchen", conditions=(at("r1", "kitchen"),), ordinal=2)
+def test_a_robot_that_a_goal_names_is_pinned(caller: ModelCaller) -> None:
+    second = Goal(goal="g2", text="send it", conditions=(at("locobot", "kitchen"),), ordinal=2)
     go = task("go", "navigate", [], "g2", robot="?r", to="kitchen")
     replies = [
         Reply(graph(*carry(1, "hallway", "?a"))),
-        Reply(graph(go, pins=[{"actor": "?r", "robot": "r1"}])),
+        Reply(graph(go, pins=[{"actor": "?r", "robot": "locobot"}])),
     ]
     with LlmServer(*replies) as server:
-        plan = solve(server, caller, (first, second), world, strategy="per-goal")
+        plan = solve(server, caller, (bring(1, "hallway"), second), strategy="per-goal")
     assert plan.made_by == "llm"
-    assert list(plan.pins.values()) == ["r1"]
-    assert "at(cup_1) = hallway" in server.said(1)
+    assert list(plan.pins.values()) == ["locobot"]
+    assert '"at(cup_1) = hallway"' in server.said(1), "what the first goal reached is to be kept"
+
+
+def test_a_goal_does_not_undo_another(caller: ModelCaller) -> None:
+    """The second goal's graph takes the first one's cup away again, and is sent back."""
+    thief = [{**row, "goal": "g2"} for row in carry(1, "living_room", "?b")]
+    for row in thief[:2]:
+        row["args"] = {k: v.replace("kitchen", "hallway") for k, v in row["args"].items()}
+    right = carry(2, "living_room", "?b")
+    replies = [
+        Reply(graph(*carry(1, "hallway", "?a"))),
+        Reply(graph(*right, *thief)),
+        Reply(graph(*right)),
+    ]
+    with LlmServer(*replies) as server:
+        plan = solve(server, caller, strategy="per-goal")
+    assert plan.making.rounds == 3
+    assert len(plan.tasks) == 8
+
+
+def test_drafts_wait_for_what_they_need_of_each_other() -> None:
+    world = home()
+    first, second = bring(1, "hallway"), bring(2, "living_room")
+    on = [{**row, "goal": "g2"} for row in carry(1, "living_room", "?a")]
+    for row in on[:2]:
+        row["args"] = {k: v.replace("kitchen", "hallway") for k, v in row["args"].items()}
+    drafts = [
+        draft_of(msgspec.convert(graph(*rows), GraphAnswer), world, [goal])
+        for rows, goal in ((carry(1, "hallway", "?a"), first), (on, second))
+    ]
+    plan = merged(drafts, PlanningProblem("p", (first, second), world), keep_order=True)
+    assert [t.task for t in plan.tasks if not t.after] == ["t1", "t5"]
+    assert set(plan.tasks[5].after) == {"t4", "t5"}, "picked up again once it was put down"
 
 
 def test_goals_that_hold_cost_nothing(caller: ModelCaller) -> None:
@@ -415,6 +446,16 @@ def test_actors_and_pins_cannot_name_what_does_not_exist(caller: ModelCaller) ->
     assert plan.making.rounds == 3
     assert {t.actor for t in plan.tasks} == {"a1"}
     assert "there is no robot nobody" in server.said(2)
+
+
+# --- what is not known ---------------------------------------------------------------------------
+def test_what_nobody_has_seen_is_looked_for_without_asking(caller: ModelCaller) -> None:
+    world = home(facts=(fact("cup_1", "at", None),))
+    with LlmServer(Reply(GOOD)) as server:
+        plan = solve(server, caller, world=world)
+        assert server.requests == []
+    fell_back(plan, "nobody knows where cup_1 is")
+    assert plan.seeks == ("cup_1",)
 
 
 # --- without a model -----------------------------------------------------------------------------

@@ -56,13 +56,18 @@ def draft_of(answer: GraphAnswer | ListAnswer, world: WorldModel, goals: Sequenc
     return Draft(tuple(tasks), {actor: pins[actor] for actor in pins if actor in actors})
 
 
-def plan_of(draft: Draft, problem: PlanningProblem, goals: Sequence[Goal]) -> Plan:
-    """The draft as a plan for these goals, under the model's own names."""
+def plan_of(
+    draft: Draft,
+    problem: PlanningProblem,
+    goals: Sequence[Goal],
+    keep: Sequence[Condition] = (),
+) -> Plan:
+    """The draft as a plan for these goals that leaves alone what `keep` says."""
     return Plan(
         plan=problem.plan,
         revision=problem.revision,
         goals=tuple(goal.goal for goal in goals),
-        conditions=conditions_of(goals),
+        conditions=tuple(dict.fromkeys([*conditions_of(goals), *keep])),
         tasks=draft.tasks,
         pins=dict(draft.pins),
         strategy=problem.strategy,

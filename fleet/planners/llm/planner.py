@@ -14,7 +14,7 @@ from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema, rea
 from fleet.planners.llm.caller import ModelCaller
 from fleet.planners.llm.config import LlmConfig
 from fleet.planners.llm.conversation import Conversation, GivenUp, Ledger, Rejected
-from fleet.planners.llm.draft import Draft, draft_of, merged, plan_of, world_after
+from fleet.planners.llm.draft import Draft, conditions_of, draft_of, merged, plan_of, world_after
 from fleet.planners.llm.prompts import load_prompts
 from fleet.planners.llm.verify import why_not, without_useless
 from fleet.planners.llm.wording import problem_text, skills_text, useful_skills
@@ -82,20 +82,21 @@ class LlmPlanner(Planner):
     def _ask(
         self, problem: PlanningProblem, goals: Sequence[Goal], ledger: Ledger
     ) -> Plan | GivenUp:
+        if not goals:
+            return merged((), problem, keep_order=True)
+        if sought := _not_located(goals, problem.world):
+            return GivenUp(f"nobody knows where {sought} is, and only {self._fallback.name} looks")
         drafts: list[Draft] = []
         world = problem.world
-        if problem.strategy == PER_GOAL:
-            for goal in goals:
-                draft = self._draft(problem, (goal,), world, ledger)
-                if isinstance(draft, GivenUp):
-                    return GivenUp(f"goal {goal.goal}: {draft.reason}", draft.violations)
-                drafts.append(draft)
-                world = world_after(draft, world)
-        elif goals:
-            draft = self._draft(problem, goals, world, ledger)
+        # Together, goals that hold already are told, too: they must still hold at the end.
+        parts = [(goal,) for goal in goals] if problem.strategy == PER_GOAL else [problem.goals]
+        for part in parts:
+            draft = self._draft(problem, part, world, ledger)
             if isinstance(draft, GivenUp):
-                return draft
+                where = f"goal {part[0].goal}: " if len(parts) > 1 else ""
+                return GivenUp(where + draft.reason, draft.violations)
             drafts.append(draft)
+            world = world_after(draft, world)
         plan = merged(drafts, problem, keep_order=problem.strategy != MONOLITHIC)
         if violations := why_not(plan, problem.world):
             return GivenUp(
@@ -110,6 +111,7 @@ class LlmPlanner(Planner):
         flat = problem.strategy == MONOLITHIC
         kind: type[GraphAnswer] | type[ListAnswer] = ListAnswer if flat else GraphAnswer
         max_tasks = self._config.max_tasks
+        keep = [c for c in conditions_of(problem.goals) if world.holds(c)]
 
         def read(text: str) -> Draft | Rejected:
             answer = read_answer(text, kind)
@@ -119,7 +121,7 @@ class LlmPlanner(Planner):
                 sentence = f"the plan has {len(answer.tasks)} tasks; {max_tasks} are allowed"
                 return Rejected.because("too-many-tasks", sentence)
             draft = draft_of(answer, world, goals)
-            plan = plan_of(draft, problem, goals)
+            plan = plan_of(draft, problem, goals, keep)
             if violations := why_not(plan, world):
                 return Rejected(violations)
             plan = without_useless(plan, world)
@@ -130,7 +132,7 @@ class LlmPlanner(Planner):
             question=self._prompts.fill(
                 problem.strategy,
                 skills=skills_text(useful_skills(world)),
-                problem=problem_text(world, goals),
+                problem=problem_text(world, goals, keep),
                 form=_FLAT_FORM if flat else _GRAPH_FORM,
             ),
             repair="repair",
@@ -164,6 +166,16 @@ def _open_goals(problem: PlanningProblem) -> list[Goal]:
         if not all(problem.world.holds(condition) for condition in goal.conditions)
     ]
     return sorted(unmet, key=lambda goal: (-goal.priority, goal.ordinal, goal.goal))
+
+
+def _not_located(goals: Sequence[Goal], world: WorldModel) -> str | None:
+    """Objects that a goal speaks of when it is not known where any of them is."""
+    for goal in goals:
+        for condition in goal.conditions:
+            things = [subject for subject in condition.subjects if subject in world.objects]
+            if things and all(world.value("at", thing) is None for thing in things):
+                return " or ".join(things)
+    return None
 
 
 _GRAPH_FORM = """{"tasks": [{"task": "t1", "skill": "SKILL", "args": {"PARAMETER": "VALUE"}, \

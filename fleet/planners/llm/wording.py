@@ -12,7 +12,7 @@ import msgspec
 from fleet.core.language import Vocabulary
 from fleet.core.skills import SPACE, SkillModel
 from fleet.core.world_model import WorldModel
-from keyexpr_schema.goals import Goal
+from keyexpr_schema.goals import Condition, Goal
 from keyexpr_schema.plans import Violation
 from keyexpr_schema.world import Value
 
@@ -83,8 +83,11 @@ def useful_skills(world: WorldModel) -> list[SkillModel]:
     return [skill for skill in world.skills.values() if skill.name in names]
 
 
-def problem_text(world: WorldModel, goals: Iterable[Goal]) -> str:
-    """Robots, places, objects, facts and goals, fenced. Where robots stand is left out."""
+def problem_text(world: WorldModel, goals: Iterable[Goal], keep: Iterable[Condition] = ()) -> str:
+    """Robots, places, objects, facts and goals, fenced. Where robots stand is left out.
+
+    `keep` holds already and must hold at the end.
+    """
     robots = [
         {
             "robot": name,
@@ -116,7 +119,14 @@ def problem_text(world: WorldModel, goals: Iterable[Goal]) -> str:
         for name, place in world.places.items()
     ]
     return fenced(
-        {"robots": robots, "places": places, "objects": objects, "facts": facts, "goals": wanted}
+        {
+            "robots": robots,
+            "places": places,
+            "objects": objects,
+            "facts": facts,
+            "keep": [str(condition) for condition in keep],
+            "goals": wanted,
+        }
     )
 
 

@@ -55,10 +55,18 @@ class _RobotEntry(Entry, frozen=True):
     """A name of its own, so that a mission can have several of one specification."""
 
 
+class _Placement(Entry, frozen=True):
+    on: str
+    at_m: tuple[float, float]
+    yaw_deg: float = 0.0
+
+
 class _MissionEntry(Entry, frozen=True):
     mission: Id
     world: str
     robots: Annotated[tuple[_RobotEntry, ...], msgspec.Meta(min_length=1)]
+    objects: dict[Id, _Placement | None] = {}
+    """Where things lie in this mission and not where the world file says; `null`: not there."""
     statements: tuple[str, ...] = ()
     goals: tuple[str, ...] = ()
     plan: PlanOptions = PlanOptions()
@@ -111,7 +119,7 @@ def load_mission(name: str | Path) -> Mission:
     """The mission given by path or name (see `find_mission`), with its world and robots."""
     path = find_mission(name)
     entry = read_yaml(path, _MissionEntry, "mission file")
-    world = load_world(path.parent / entry.world)
+    world = _rearranged(path, load_world(path.parent / entry.world), entry.objects)
     robots: list[MissionRobot] = []
     for number, item in enumerate(entry.robots):
         spec = load_robot(path.parent / item.spec)
@@ -129,6 +137,28 @@ def load_mission(name: str | Path) -> Mission:
         goals=entry.goals,
         plan=entry.plan,
     )
+
+
+def _rearranged(
+    path: Path, world: WorldFile, placements: dict[str, _Placement | None]
+) -> WorldFile:
+    """The world with a mission's objects put elsewhere or taken away."""
+    entries = dict(world.object_entries)
+    for name, placement in placements.items():
+        if name not in entries:
+            raise BadFile(
+                f"{path}: objects.{name}: the world has no such object; "
+                f"it has {', '.join(world.object_entries) or 'none'}"
+            )
+        if placement is None:
+            del entries[name]
+        else:
+            entries[name] = msgspec.structs.replace(
+                entries[name], on=placement.on, at_m=placement.at_m, yaw_deg=placement.yaw_deg
+            )
+    rearranged = msgspec.structs.replace(world, object_entries=entries)
+    _check_objects(path, rearranged)
+    return rearranged
 
 
 def _check_world(path: Path, world: WorldFile) -> None:
@@ -185,6 +215,11 @@ def _check_objects(path: Path, world: WorldFile) -> None:
             raise BadFile(
                 f"{where}.kind: there is no kind {entry.kind!r}; "
                 f"there are {', '.join(world.object_kinds) or 'none in object_kinds'}"
+            )
+        if entry.home is not None and entry.home not in world.place_entries:
+            raise BadFile(
+                f"{where}.home: there is no place {entry.home!r}; "
+                f"there are {', '.join(world.place_entries)}"
             )
         if entry.on == FLOOR:
             if world.place_at(*entry.at_m) is None:

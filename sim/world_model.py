@@ -94,6 +94,8 @@ class ObjectEntry(Entry, frozen=True):
     aliases: tuple[str, ...] = ()
     rgba: Rgba | None = None
     yaw_deg: float = 0.0
+    home: Id | None = None
+    """The place where it belongs, for those who tidy up."""
 
 
 @dataclass(frozen=True)
@@ -198,6 +200,7 @@ class WorldFile(Entry, frozen=True):
                     ordinal=counts[entry.kind],
                     aliases=entry.aliases,
                     mass_kg=self.object_kinds[entry.kind].mass_kg,
+                    home=entry.home,
                 )
             )
         return tuple(found)

@@ -10,6 +10,7 @@ from fleet.core.schedule import actors_of
 from fleet.core.world_model import WorldModel
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.plans import Plan
+from keyexpr_schema.world import Value
 
 Pair = tuple[str, str]
 
@@ -21,23 +22,26 @@ def actors_apart(plan: Plan, checked: CheckedPlan) -> frozenset[Pair]:
     robot on its way to a second delivery would carry the first one off.
     """
     apart: set[Pair] = set()
-    last_holder: dict[str, str] = {}
-    for task in checked.graph.order if checked.graph else ():
-        action = checked.actions[task]
+    for action in checked.actions.values():
         actors = sorted(name.removeprefix(ACTOR_PREFIX) for name in action.participants)
         apart.update((a, b) for i, a in enumerate(actors) for b in actors[i + 1 :])
-        for literal in action.after:
-            if literal.variable.relation == "at" and isinstance(literal.value, str):
-                last_holder[literal.variable.subject] = literal.value
-    loaded = sorted(
-        {
-            holder.removeprefix(ACTOR_PREFIX)
-            for holder in last_holder.values()
-            if holder.startswith(ACTOR_PREFIX)
-        }
-    )
+    loaded = sorted(set(carried_at_end(checked).values()))
     apart.update((a, b) for i, a in enumerate(loaded) for b in loaded[i + 1 :])
     return frozenset(apart)
+
+
+def carried_at_end(checked: CheckedPlan) -> dict[str, str]:
+    """Objects that the plan leaves with an actor, in its basket or hand, and which actor."""
+    holder: dict[str, Value] = {}
+    for task in checked.graph.order if checked.graph else ():
+        for literal in checked.actions[task].after:
+            if literal.variable.relation == "at":
+                holder[literal.variable.subject] = literal.value
+    return {
+        thing: value.removeprefix(ACTOR_PREFIX)
+        for thing, value in holder.items()
+        if isinstance(value, str) and value.startswith(ACTOR_PREFIX)
+    }
 
 
 def able_robots(plan: Plan, checked: CheckedPlan, world: WorldModel) -> dict[str, tuple[str, ...]]:

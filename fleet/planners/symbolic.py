@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import product
 
-from fleet.core.binding import least_loaded
+from fleet.core.binding import carried_at_end, least_loaded
 from fleet.core.checker import check_plan
 from fleet.core.lifting import Strand, tasks_from
 from fleet.core.schedule import best_schedule
@@ -29,6 +29,9 @@ from fleet.planners.strands import Aim, Exploration, aims_in_order, exploration_
 from keyexpr_schema.plans import Plan
 
 BIG_DAG, PER_GOAL, MONOLITHIC = "big-dag", "per-goal", "monolithic"
+UNLOADING_S = 30.0
+"""What it counts for, in seconds of makespan, that an object ends in a basket and not on a table:
+somebody still has to take it out, which is about one more task for a hand."""
 MAX_COMBINATIONS = 64
 """Up to this many combinations are all tried; beyond, one strand is changed at a time."""
 
@@ -163,7 +166,9 @@ def _change_one_at_a_time(
 
 
 def _evaluate(plan: Plan, world: WorldModel) -> tuple[float, float] | NoPlan:
-    """Makespan and work of the plan if each actor takes the able robot with the least to do."""
+    """How good the plan is, less is better: its makespan [s], with a charge for what is left in
+    baskets, and its work [s], if each actor takes the able robot with the least to do.
+    """
     checked = check_plan(plan, world)
     if not checked.valid:
         return NoPlan(checked.violations[0].sentence, checked.violations)
@@ -176,7 +181,8 @@ def _evaluate(plan: Plan, world: WorldModel) -> tuple[float, float] | NoPlan:
     final = check_plan(plan, world, allocation, found.extra_after)
     if not final.valid:
         return NoPlan(final.violations[0].sentence, final.violations)
-    return round(found.makespan_s, 3), found.work_s
+    unloading_s = UNLOADING_S * len(carried_at_end(checked))
+    return round(found.makespan_s + unloading_s, 3), found.work_s
 
 
 def _plan(problem: PlanningProblem, choice: Sequence[Strand], explored: Exploration | None) -> Plan:

@@ -19,6 +19,9 @@ from keyexpr_schema.world import NOTHING, Value
 
 ALTERNATIVES = 4
 """Different strands sought for each condition."""
+UNLOADING_S = 30.0
+"""What it counts for, in seconds, that an object ends in a basket and not on a table: somebody
+still has to take it out, which is about one more task for a hand."""
 REUSE_CHARGE_S = 200.0
 """What an action costs more for each strand that already uses it; more than any task takes."""
 
@@ -91,13 +94,20 @@ def options_for(
     ]
     if not found:
         return None
-    found.sort(key=lambda pair: pair[0].cost_s)
+    found.sort(key=lambda pair: pair[0].cost_s + _unloading_s(*pair, world))
     strands: dict[object, Strand] = {}
     for result, condition in found:
         named = frozenset({condition.subject} & world.robots.keys())
         content = tuple(_signature(action) for action in result.actions)
         strands.setdefault(content, Strand(aim.goal, result.actions, named))
     return Options(tuple(strands.values())[:ALTERNATIVES], found[0][0].facts)
+
+
+def _unloading_s(found: Found, condition: Condition, world: WorldModel) -> float:
+    """The charge for an object that ends in a basket."""
+    where = found.facts.get(Variable("at", condition.subject))
+    wanted = where == condition.value or condition.relation == HELD
+    return 0.0 if wanted or where not in world.robots else UNLOADING_S
 
 
 def _different(

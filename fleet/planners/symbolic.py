@@ -25,13 +25,17 @@ from fleet.core.skills import Variable
 from fleet.core.world_model import WorldModel
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.search import Facts
-from fleet.planners.strands import Aim, Exploration, aims_in_order, exploration_for, options_for
+from fleet.planners.strands import (
+    UNLOADING_S,
+    Aim,
+    Exploration,
+    aims_in_order,
+    exploration_for,
+    options_for,
+)
 from keyexpr_schema.plans import Plan
 
 BIG_DAG, PER_GOAL, MONOLITHIC = "big-dag", "per-goal", "monolithic"
-UNLOADING_S = 30.0
-"""What it counts for, in seconds of makespan, that an object ends in a basket and not on a table:
-somebody still has to take it out, which is about one more task for a hand."""
 MAX_COMBINATIONS = 64
 """Up to this many combinations are all tried; beyond, one strand is changed at a time."""
 

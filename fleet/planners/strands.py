@@ -94,7 +94,7 @@ def options_for(
     ]
     if not found:
         return None
-    found.sort(key=lambda pair: pair[0].cost_s + _unloading_s(*pair, world))
+    found.sort(key=lambda pair: pair[0].cost_s + _unloading_s(pair[0], pair[1], world))
     strands: dict[object, Strand] = {}
     for result, condition in found:
         named = frozenset({condition.subject} & world.robots.keys())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -59,12 +59,17 @@ class Reply:
 
 
 class LlmServer:
-    """Gives its replies in order, the last one again and again, and keeps the requests."""
+    """Gives its replies in order, the last one again and again, and keeps the requests.
 
-    def __init__(self, *replies: Reply) -> None:
-        self.replies: Sequence[Reply] = replies
+    A reply may be made from the request when that comes.
+    """
+
+    def __init__(self, *replies: Reply | Callable[[dict[str, Any]], Reply]) -> None:
+        self.replies = replies
         self.requests: list[dict[str, Any]] = []
         self.keys: list[str | None] = []
+        self.asked = threading.Event()
+        """Set once there was a request."""
         self._lock = threading.Lock()
         self._stopped = threading.Event()
         outer = self
@@ -97,7 +102,9 @@ class LlmServer:
         with self._lock:
             self.requests.append(request)
             self.keys.append(handler.headers.get("Authorization"))
-            reply = self.replies[min(len(self.requests), len(self.replies)) - 1]
+            scripted = self.replies[min(len(self.requests), len(self.replies)) - 1]
+        self.asked.set()
+        reply = scripted if isinstance(scripted, Reply) else scripted(request)
         if reply.silent:
             self._stopped.wait()
             return

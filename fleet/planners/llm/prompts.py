@@ -28,7 +28,7 @@ class Prompts:
 
         A value is never looked through for placeholders, so nothing in it is expanded.
         """
-        house = {"house_rules": self.texts["house-rules"].strip()}
+        house = {"house_rules": Template(self.texts["house-rules"]).safe_substitute().strip()}
         return Template(self.texts[name]).safe_substitute({**house, **values}).strip()
 
 

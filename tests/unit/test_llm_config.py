@@ -1,0 +1,224 @@
+"""Configuration and prompts of the language-model planner; the processes that ask."""
+
+from __future__ import annotations
+
+import queue
+import shutil
+import subprocess
+import sys
+import threading
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import msgspec
+import pytest
+
+from fleet.planners.llm import BadLlmConfig, LlmConfig, ModelCaller, load_llm_config
+from fleet.planners.llm.answers import StepAnswer, TaskAnswer
+from fleet.planners.llm.prompts import FOLDER, load_prompts
+from keyexpr_schema.plans import Task
+from tests.llm_server import LlmServer, Reply
+
+ROOT = Path(__file__).parents[2]
+KEY = "sk-very-secret"
+
+
+@pytest.fixture(scope="module")
+def caller() -> Iterator[ModelCaller]:
+    """Its processes have a key in their environment, and are started once."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROBOTFLEET_TEST_KEY", KEY)
+        caller = ModelCaller()
+        caller.warm()
+        yield caller
+        caller.close()
+
+
+def request(server: LlmServer, key_env: str | None = None) -> dict[str, Any]:
+    return {
+        "model": "openai/scripted",
+        "messages": [{"role": "user", "content": "hello"}],
+        "api_base": server.api_base,
+        "api_key_env": key_env,
+    }
+
+
+def write(path: Path, text: str) -> Path:
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_the_shipped_file_has_no_model_and_every_field() -> None:
+    path = ROOT / "configs" / "planner.yaml"
+    assert load_llm_config(path) == LlmConfig()
+    for field in msgspec.structs.fields(LlmConfig):
+        assert f"  {field.name}:" in path.read_text(encoding="utf-8")
+
+
+def test_the_shipped_file_is_found_from_anywhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert load_llm_config().model is None
+    (tmp_path / "configs").mkdir()
+    write(tmp_path / "configs" / "planner.yaml", "llm: {model: openai/mine}")
+    assert load_llm_config().model == "openai/mine"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("llm: {modell: x}", "no field modell; its fields are api_base"),
+        ("llm: {timeout_s: soon}", "Expected `float`, got `str` - at `llm.timeout_s`"),
+        ("llm: {timeout_s: 0}", "at `llm.timeout_s`"),
+        ("llm: {max_repairs: -1}", "at `llm.max_repairs`"),
+        ("llm: {structured: maybe}", "at `llm.structured`"),
+        ("llm: {model: ''}", "`model` is empty"),
+        ("llm: {api_base: localhost}", "must start with http"),
+        ("llm: {usd_per_million_tokens_in: 1}", "prices come in pairs"),
+        ("llm: {options: {messages: []}}", "must not name messages"),
+        ("llm: [", "is not YAML"),
+        ("other: {}", "one section, `llm`"),
+        ("- llm", "one section, `llm`"),
+        ("llm: {1: 2}", "no field 1"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_sentence(tmp_path: Path, text: str, words: str) -> None:
+    path = write(tmp_path / "planner.yaml", text)
+    with pytest.raises(BadLlmConfig) as raised:
+        load_llm_config(path)
+    assert str(path) in str(raised.value)
+    assert words in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(BadLlmConfig, match="cannot be read"):
+        load_llm_config(tmp_path / "none.yaml")
+
+
+def test_rules_replace_prompts_of_the_same_name(tmp_path: Path) -> None:
+    (tmp_path / "rules").mkdir()
+    write(tmp_path / "rules" / "house-rules.txt", "Cups cost $$5 each.")
+    path = write(tmp_path / "planner.yaml", "llm: {rules_dir: rules}")
+    config = load_llm_config(path)
+    prompts = load_prompts(config)
+    assert prompts.version.startswith("v1+rules-")
+    assert prompts.fill("system").endswith("Cups cost $5 each.")
+    plain = load_prompts(LlmConfig())
+    assert plain.version == "v1"
+    assert "Cups" not in plain.fill("system")
+    write(tmp_path / "rules" / "house-rules.txt", "Other rules.")
+    assert load_prompts(config).version != prompts.version
+
+
+def test_the_example_rules_fit() -> None:
+    config = LlmConfig(rules_dir=str(ROOT / "configs" / "rules"))
+    assert "Rules of this house" in load_prompts(config).fill("system")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("sistem.txt", "", "replaces no prompt; those are big-dag.txt"),
+        ("repair.txt", "$problem", "placeholders are $details, $house_rules, $violations"),
+        ("system.txt", "costs $ 5", "write $$ for a dollar sign"),
+        ("system.txt", "x" * 20_001, "20000 are allowed"),
+    ],
+)
+def test_rules_that_do_not_fit_are_refused(
+    tmp_path: Path, name: str, text: str, words: str
+) -> None:
+    write(tmp_path / name, text)
+    with pytest.raises(BadLlmConfig) as raised:
+        load_prompts(LlmConfig(rules_dir=str(tmp_path)))
+    assert words in str(raised.value)
+
+
+def test_no_rules_folder_and_no_such_version(tmp_path: Path) -> None:
+    with pytest.raises(BadLlmConfig, match="does not exist"):
+        load_prompts(LlmConfig(rules_dir=str(tmp_path / "none")))
+    with pytest.raises(BadLlmConfig, match="there are v1"):
+        load_prompts(LlmConfig(prompts="../v1"))
+
+
+def test_values_in_a_prompt_are_not_expanded() -> None:
+    filled = load_prompts(LlmConfig()).fill("repair", violations="$details", details="secret")
+    assert filled.count("secret") == 1
+
+
+def test_every_prompt_has_only_placeholders_that_are_filled() -> None:
+    filled = {"skills", "problem", "form", "relations", "violations", "details", "house_rules"}
+    for path in FOLDER.glob("*/*.txt"):
+        assert set(Template(path.read_text(encoding="utf-8")).get_identifiers()) <= filled, path
+
+
+def test_answers_have_the_types_of_tasks() -> None:
+    """What a model may say of a task is what a task is."""
+    types = {field.name: field.type for field in msgspec.structs.fields(Task)}
+    for answer in (StepAnswer, TaskAnswer):
+        for field in msgspec.structs.fields(answer):
+            assert field.type == types[field.name]
+
+
+def test_prompts_are_installed_with_the_package(tmp_path: Path) -> None:
+    """A wheel holds them; built from a copy, so that nothing is left in the source tree."""
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, tmp_path / name)
+    shutil.copytree(ROOT / "fleet", tmp_path / "fleet")
+    code = (
+        "from setuptools import build_meta; import sys; "
+        f"print(build_meta.build_wheel({str(tmp_path / 'out')!r}))"
+    )
+    built = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert built.returncode == 0, built.stderr
+    (wheel,) = (tmp_path / "out").glob("*.whl")
+    names = set(zipfile.ZipFile(wheel).namelist())
+    for path in FOLDER.glob("*/*.txt"):
+        assert str(path.relative_to(ROOT)) in names
+
+
+def test_calls_go_on_side_by_side_and_litellm_stays_outside(caller: ModelCaller) -> None:
+    kinds: queue.Queue[str] = queue.Queue()
+    with LlmServer(Reply(silent=True), Reply("hello")) as server:
+        threads = [
+            threading.Thread(target=lambda: kinds.put(caller.call(request(server), 600).kind))
+            for _ in range(2)
+        ]
+        for thread in threads:
+            thread.start()
+        assert kinds.get(timeout=60) == "answer", "though the other one waits"
+        assert kinds.empty()
+    for thread in threads:
+        thread.join()
+    assert "litellm" not in sys.modules
+
+
+def test_keys_go_to_the_server_and_not_into_messages(caller: ModelCaller) -> None:
+    echo = f'{{"error": {{"message": "bad key {KEY}"}}}}'.encode()
+    with LlmServer(Reply(status=401, raw=echo)) as server:
+        answer = caller.call(request(server, "ROBOTFLEET_TEST_KEY"), 30.0)
+        assert server.keys == [f"Bearer {KEY}"]
+    assert answer.kind == "key"
+    assert "bad key ***" in answer.error
+
+
+def test_close_ends_a_call_that_is_under_way(caller: ModelCaller) -> None:
+    """The last one here, since no call follows a close."""
+    kinds: list[str] = []
+    with LlmServer(Reply(silent=True)) as server:
+        thread = threading.Thread(
+            target=lambda: kinds.append(caller.call(request(server), 600).kind)
+        )
+        thread.start()
+        assert server.asked.wait(60)
+        caller.close()
+        thread.join(10)
+        assert kinds == ["failed"]
+        assert caller.call(request(server), 600).kind == "closed"
+        assert len(server.requests) == 1

@@ -18,7 +18,7 @@ DEFAULT_SPAN_S = (0.0, 60.0)
 LANE_SHARE = 0.018
 """A third of a lane of the Gantt chart, as a part of the height of a 900 pixel window."""
 
-ELEVATION_DEG = 52.0
+ELEVATION_DEG = 60.0
 AWAY = 1.08
 """Distance of the eye from the middle of the floor, in diagonals of the floor and for a view as
 high as the window; a lower view shows as much of the width from nearer by."""

@@ -59,6 +59,7 @@ class World:
         self._labels: dict[str, tuple[str, float]] = {}
         self._doing: dict[str, str | None] = {}
         self._stand_ins: set[str] = set()
+        self._tints: dict[str, int] = {}
         self._frame_s: float | None = None
         self._scene: Scene | None = None
         self._heights: dict[str, float] = {}
@@ -104,7 +105,7 @@ class World:
         path = entity("world", "places", place.place)
         if not boxes:
             return
-        tint = _tint(place.place)
+        tint = _TINTS[self._tints.setdefault(place.place, len(self._tints)) % len(_TINTS)]
         self._sink.fix(
             path,
             rr.Boxes3D(
@@ -202,6 +203,8 @@ class World:
     ) -> None:
         """Write over the robot what it is called, and what it does (`None`: nothing)."""
         root = self._roots.get(robot)
+        if root is None and robot not in self._stand_ins:
+            return  # nobody has said where it is
         path = entity("world", "bodies", robot, root) if root else entity("world", "robots", robot)
         spec = self._specs.get(robot)
         name = (spec.label if spec else "") or robot
@@ -296,12 +299,11 @@ def _still(last: Pose, now: Pose) -> bool:
     return moved < _STILL_M and turned < _STILL_QUATERNION
 
 
-def _tint(name: str) -> Rgba:
-    tints: tuple[Rgba, ...] = (
-        (92, 84, 66, 255),
-        (66, 80, 96, 255),
-        (70, 90, 72, 255),
-        (90, 70, 88, 255),
-        (78, 78, 82, 255),
-    )
-    return tints[sum(name.encode()) % len(tints)]
+_TINTS: tuple[Rgba, ...] = (
+    (92, 84, 66, 255),
+    (66, 80, 96, 255),
+    (70, 90, 72, 255),
+    (90, 70, 88, 255),
+    (78, 78, 82, 255),
+)
+"""Floors of places, in the order in which those are told of."""

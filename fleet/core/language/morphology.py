@@ -1,0 +1,74 @@
+"""Forms of English words: plurals of nouns, and the forms of verbs that sentences use."""
+
+from __future__ import annotations
+
+_IRREGULAR_PLURALS = {
+    "person": "people",
+    "man": "men",
+    "woman": "women",
+    "child": "children",
+    "mouse": "mice",
+    "foot": "feet",
+    "tooth": "teeth",
+}
+_IRREGULAR_PARTICIPLES = {
+    "bring": ("brought",),
+    "take": ("taken",),
+    "get": ("gotten", "got"),
+    "put": ("put",),
+    "set": ("set",),
+    "lay": ("laid",),
+    "leave": ("left",),
+    "send": ("sent",),
+    "drive": ("driven",),
+    "give": ("given",),
+    "find": ("found",),
+    "seek": ("sought",),
+    "hold": ("held",),
+    "go": ("gone",),
+    "come": ("come",),
+    "see": ("seen",),
+}
+_DOUBLED = frozenset({"get", "put", "set", "drop", "grab", "scan", "spot", "transfer"})
+_VOWELS = frozenset("aeiou")
+
+
+def plurals(noun: str) -> frozenset[str]:
+    """The plural forms of a noun: usually one, two where spelling varies."""
+    if noun in _IRREGULAR_PLURALS:
+        return frozenset({_IRREGULAR_PLURALS[noun]})
+    forms = {f"{noun}s"}
+    if noun.endswith(("s", "x", "z", "ch", "sh", "o")):
+        forms = {f"{noun}es"} | ({f"{noun}s"} if noun.endswith("o") else set())
+    elif noun.endswith("y") and noun[-2:-1] not in _VOWELS:
+        forms = {f"{noun[:-1]}ies"}
+    elif noun.endswith("fe"):
+        forms |= {f"{noun[:-2]}ves"}
+    elif noun.endswith("f"):
+        forms |= {f"{noun[:-1]}ves"}
+    return frozenset(forms)
+
+
+def gerund(verb: str) -> str:
+    """`bring` → `bringing`, `move` → `moving`, `put` → `putting`."""
+    if verb in _DOUBLED:
+        return f"{verb}{verb[-1]}ing"
+    return f"{verb[:-1]}ing" if verb.endswith("e") and not verb.endswith("ee") else f"{verb}ing"
+
+
+def third_person(verb: str) -> str:
+    """`go` → `goes`, `carry` → `carries`."""
+    if verb.endswith("y") and verb[-2:-1] not in _VOWELS:
+        return f"{verb[:-1]}ies"
+    return f"{verb}es" if verb.endswith(("o", "s", "x", "ch", "sh")) else f"{verb}s"
+
+
+def participles(verb: str) -> tuple[str, ...]:
+    """`bring` → `brought`, `carry` → `carried`, `grab` → `grabbed`."""
+    if verb in _IRREGULAR_PARTICIPLES:
+        return _IRREGULAR_PARTICIPLES[verb]
+    if verb in _DOUBLED:
+        return (f"{verb}{verb[-1]}ed",)
+    if verb.endswith("y") and verb[-2:-1] not in _VOWELS:
+        return (f"{verb[:-1]}ied",)
+    return (f"{verb}d" if verb.endswith("e") else f"{verb}ed",)

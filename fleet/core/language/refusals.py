@@ -1,0 +1,83 @@
+"""Why a sentence is refused, in one sentence that says what would be right."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+_WHY: dict[str, str] = {
+    word: reason
+    for words, reason in (
+        (
+            "not never no none nobody nothing without neither nor except excluding avoid stop "
+            "prevent forbid refrain but",
+            "says what must not be, or leaves something out; say what must hold, name by name",
+        ),
+        (
+            "if when whenever unless while until till once before after because since whether "
+            "depending otherwise else provided",
+            "makes it depend on something else, which a goal cannot; give it when it is time, "
+            'or put one thing after the other with "then"',
+        ),
+        (
+            "am pm oclock o'clock clock minute minutes hour hours sec secs seconds day days week "
+            "weeks month today tomorrow tonight yesterday morning afternoon evening night noon "
+            "midnight later soon daily weekly hourly monday tuesday wednesday thursday friday "
+            "saturday sunday always constantly",
+            "names a time, which a goal cannot: work begins as soon as there is a plan",
+        ),
+        (
+            "again twice thrice times repeatedly forever continuously",
+            "asks for repetition, which a goal cannot: give it again when it was reached",
+        ),
+        (
+            "or rather instead",
+            "leaves a choice that cannot be left open; say one of them",
+        ),
+        (
+            "maybe perhaps probably possibly might may likely presumably think believe guess",
+            "is uncertain; say what holds, or that nobody knows",
+        ),
+        (
+            "near nearby beside next under underneath behind between above below left right front "
+            "close around",
+            "names a relation that is not known; known are in, on and at",
+        ),
+        (
+            "me us here myself you yourself",
+            "names somebody whose place is not known; name a place or a robot",
+        ),
+        (
+            "with using via",
+            "says how or by whom it is to be done; who does what is found by the allocator, "
+            "so leave it out",
+        ),
+        ("was were had", "tells of the past; say what holds now"),
+    )
+    for word in words.split()
+}
+
+
+def reason_for(words: Iterable[tuple[str, str]]) -> str | None:
+    """What is special about words (word, as spoken) that could not be read, if anything is."""
+    for word, shown in words:
+        if word in _WHY:
+            return f"{shown!r} {_WHY[word]}"
+    return None
+
+
+def suggestion(phrase: str, names: Iterable[str]) -> str:
+    """` (did you mean 'hallway'?)` for a near miss, else nothing."""
+    close = difflib.get_close_matches(phrase.casefold(), sorted(set(names)), n=1, cutoff=0.75)
+    return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def listed(names: Iterable[str]) -> str:
+    """The names with commas, or `none yet`."""
+    return ", ".join(names) or "none yet"
+
+
+def one_of(names: Iterable[str]) -> str:
+    """`a or b`, `a, b or c`."""
+    several = list(names)
+    return " or ".join([", ".join(several[:-1]), several[-1]] if several[1:] else several)

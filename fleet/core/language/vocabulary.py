@@ -1,0 +1,23 @@
+"""The names that sentences can use."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from keyexpr_schema.robots import RobotSpec
+from keyexpr_schema.world import Object, Place
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """Places, objects and robots that exist, by id.
+
+    `whereabouts` may say at which place (or robot) an object is believed to be; phrases such as
+    "the cup in the kitchen" or "all cups from the kitchen" are told apart by it, nothing else is.
+    """
+
+    places: Mapping[str, Place]
+    objects: Mapping[str, Object]
+    robots: Mapping[str, RobotSpec]
+    whereabouts: Mapping[str, str] = field(default_factory=dict)

@@ -36,7 +36,7 @@ docs: $(VENV)/development ## write the generated pages under docs/
 screenshots: $(VENV)/runtime ## run the demo and make the pictures of the README from its recording
 	rm -rf runs/screenshots
 	$(BIN)/robotctl demo two-cups --out runs/screenshots
-	$(BIN)/python -m fleet.timeline.screenshot runs/screenshots/two-cups.rrd docs/screenshots/two-cups.png
+	$(BIN)/python -m fleet.timeline.screenshot runs/screenshots/recording.rrd docs/screenshots/two-cups.png --at 50
 
 lock: $(VENV)/development ## renew the pinned versions of everything
 	$(BIN)/python -m pip install --quiet uv

@@ -10,6 +10,8 @@ from typing import Any
 import msgspec
 import pytest
 
+from fleet.allocators.base import Allocated
+from fleet.allocators.milp import MilpAllocator
 from fleet.core.checker import check_plan
 from fleet.core.world_model import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
@@ -90,6 +92,7 @@ def solve(
     made = planner.plan(problem)
     assert isinstance(made, Plan), made
     assert check_plan(made, world).valid
+    assert isinstance(MilpAllocator().allocate(made, world), Allocated)
     return made
 
 

@@ -1,0 +1,148 @@
+"""Whatever a model answers: it is refused with reasons, or becomes a plan that passes the checker."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import msgspec
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fleet.core.checker import check_plan
+from fleet.planners.base import PlanningProblem
+from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema, read_answer
+from fleet.planners.llm.draft import Draft, draft_of, merged, plan_of
+from fleet.planners.llm.verify import why_not, without_useless
+from fleet.planners.llm.wording import fenced
+from keyexpr_schema.plans import Plan
+from tests.household import bring, home, manipulator
+
+WORLD = home((manipulator("r1"), manipulator("r2")))
+GOALS = (bring(1, "hallway"), bring(2, "living_room"))
+NAMES = st.sampled_from(
+    ["?a", "?b", "?", "r1", "cup_1", "cup_2", "kitchen", "hallway", "living_room", "", "../*"]
+)
+TASKS = st.fixed_dictionaries(
+    {
+        "task": st.sampled_from(["t1", "t2", "t3", "t4"]),
+        "skill": st.sampled_from([*WORLD.skills, "shell"]),
+        "args": st.dictionaries(
+            st.sampled_from(["robot", "object", "place", "to", "carrier"]), NAMES, max_size=4
+        ),
+        "after": st.lists(st.sampled_from(["t1", "t2", "t3", "t9"]), max_size=2),
+        "goal": st.sampled_from(["g1", "g2", "g9"]),
+    }
+)
+PINS = st.lists(
+    st.fixed_dictionaries(
+        {"actor": st.just("?a"), "robot": st.sampled_from(["r1", "r2", "nobody"])}
+    ),
+    max_size=1,
+)
+
+
+def carry(number: int, place: str, actor: str) -> list[dict[str, Any]]:
+    where = {"robot": actor, "object": f"cup_{number}"}
+    rows = [
+        ("navigate", {"robot": actor, "to": "kitchen"}),
+        ("pick", {**where, "place": "kitchen"}),
+        ("navigate", {"robot": actor, "to": place}),
+        ("place", {**where, "place": place}),
+    ]
+    return [
+        {
+            "task": f"{number}{n}",
+            "skill": skill,
+            "args": args,
+            "after": [f"{number}{n - 1}"] if n else [],
+            "goal": f"g{number}",
+        }
+        for n, (skill, args) in enumerate(rows)
+    ]
+
+
+def consider(answer: dict[str, Any], flat: bool) -> Plan | None:
+    """The plan of an answer, as the planner makes it, or `None` for one that is refused."""
+    read = read_answer(json.dumps(answer), ListAnswer if flat else GraphAnswer)
+    if isinstance(read, str):
+        return None
+    problem = PlanningProblem("p", GOALS, WORLD)
+    plan = plan_of(draft_of(read, WORLD, GOALS), problem, GOALS)
+    if violations := why_not(plan, WORLD):
+        assert all(row.sentence for row in violations)
+        return None
+    plan = without_useless(plan, WORLD)
+    made = merged([Draft(plan.tasks, plan.pins)], problem, keep_order=not flat)
+    assert check_plan(made, WORLD).valid
+    # What is stored must be readable again, whatever names the model made up.
+    assert msgspec.json.decode(msgspec.json.encode(made), type=Plan) == made
+    return made
+
+
+@given(st.lists(TASKS, max_size=6), PINS)
+def test_anything_at_all(tasks: list[dict[str, Any]], pins: list[dict[str, str]]) -> None:
+    consider({"tasks": tasks, "pins": pins}, flat=False)
+    rows = [{name: row[name] for name in ("skill", "args", "goal")} for row in tasks]
+    consider({"tasks": rows, "pins": pins}, flat=True)
+
+
+@given(
+    st.lists(TASKS, max_size=3),
+    st.sampled_from(["?a", "?b"]),
+    st.booleans(),
+    st.randoms(use_true_random=False),
+)
+def test_a_good_plan_with_anything_mixed_in(
+    extra: list[dict[str, Any]], second: str, joined: bool, random: Any
+) -> None:
+    good = [*carry(1, "hallway", "?a"), *carry(2, "living_room", second)]
+    if second == "?a" or joined:
+        good[4]["after"] = ["13"]
+    assert consider({"tasks": good}, flat=False) is not None
+    mixed = [*good, *extra]
+    random.shuffle(mixed)
+    made = consider({"tasks": mixed}, flat=False)
+    if made is not None:
+        assert sorted(task.skill for task in made.tasks) == sorted(
+            ["navigate", "pick", "navigate", "place"] * 2
+        ), "nothing that no goal needs"
+
+
+@given(st.recursive(st.text(), lambda inner: st.dictionaries(st.text(), inner)))
+def test_no_text_leaves_its_fence(data: Any) -> None:
+    text = fenced(data)
+    assert "<" not in text
+    assert ">" not in text
+    json.loads(text)
+
+
+@given(st.text())
+def test_any_text_is_read(text: str) -> None:
+    assert isinstance(read_answer(text, GraphAnswer), str | GraphAnswer)
+
+
+def test_the_schema_is_narrower_than_the_types() -> None:
+    """Every task that the schema allows has just the fields that are read."""
+    for flat, kind in ((False, GraphAnswer), (True, ListAnswer)):
+        schema = plan_schema(WORLD, GOALS, flat, max_tasks=10)
+        assert "$ref" not in json.dumps(schema)
+        tasks = schema["properties"]["tasks"]
+        assert tasks["maxItems"] == 10
+        variants = tasks["items"]["anyOf"]
+        assert [v["properties"]["skill"]["enum"] for v in variants] == [[n] for n in WORLD.skills]
+        for variant in variants:
+            assert variant["additionalProperties"] is False
+            example = {name: _example(form) for name, form in variant["properties"].items()}
+            read = read_answer(json.dumps({"tasks": [example], "pins": []}), kind)
+            assert isinstance(read, kind), read
+
+
+def _example(form: dict[str, Any]) -> Any:
+    if "enum" in form:
+        return form["enum"][0]
+    if form["type"] == "object":
+        return {name: _example(inner) for name, inner in form["properties"].items()}
+    if form["type"] == "array":
+        return []
+    return "?a1" if form["pattern"].startswith(r"^\?") else "a1"

@@ -1,0 +1,59 @@
+"""Journals as files: events in, effects out, one a line.
+
+`python -m tests.replay.journal_files PLANNER_DATA_DIR NAME` makes `NAME.events.jsonl` from what a
+planner kept, and `NAME.effects.txt` from what the core does with it now. Look at both, then commit.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from fleet.core.effects import Interpret, MakePlan, Publish, Retract
+from fleet.core.events import Event, decode_event, encode_event
+from fleet.core.state import State
+from fleet.core.step import step
+from fleet.service.event_journal import EventJournal
+from tests.household import SKILLS
+
+HERE = Path(__file__).parent
+TOLD = ("state", "revision", "robot", "attempt", "epoch", "cancelled", "accepted", "value")
+"""Fields of documents that an effect's line tells."""
+
+
+def events_in(name: str) -> list[Event]:
+    """The events of a committed journal."""
+    lines = (HERE / f"{name}.events.jsonl").read_bytes().splitlines()
+    return [decode_event(line) for line in lines if line]
+
+
+def effects_of(journal: list[Event]) -> Iterator[str]:
+    """What the core does with a journal: a line an effect, an empty line an event."""
+    state = State()
+    for event in journal:
+        state, effects = step(state, event, SKILLS)
+        for effect in effects:
+            match effect:
+                case Publish(key, address, payload):
+                    told = [
+                        f"{field}={getattr(payload, field)}"
+                        for field in TOLD
+                        if hasattr(payload, field)
+                    ]
+                    yield f"put {key.build(address)} {' '.join(told)}"
+                case Retract(key, address):
+                    yield f"delete {key.build(address)}"
+                case MakePlan(job):
+                    yield f"plan {job.plan} revision {job.revision}"
+                case Interpret(goal, _):
+                    yield f"interpret {goal}"
+        yield ""
+
+
+if __name__ == "__main__":
+    data, made = Path(sys.argv[1]), sys.argv[2]
+    with EventJournal(data) as kept:
+        journal = list(kept.events())
+    (HERE / f"{made}.events.jsonl").write_bytes(b"\n".join(map(encode_event, journal)) + b"\n")
+    (HERE / f"{made}.effects.txt").write_text("\n".join(effects_of(journal)) + "\n")

@@ -1,4 +1,4 @@
-"""Whatever a model answers: it is refused with reasons, or becomes a plan that passes the checker."""
+"""Whatever a model answers: it is refused with reasons, or becomes a plan that holds."""
 
 from __future__ import annotations
 

@@ -19,6 +19,7 @@ from fleet.allocators.milp import MilpAllocator
 from fleet.core.skills import SkillModel, skills_from_data
 from fleet.errors import BadSkillFile, FleetError
 from fleet.planners.base import Planner
+from fleet.planners.llm import LlmPlanner, load_llm_config
 from fleet.planners.symbolic import SymbolicPlanner
 
 DEFAULT_SKILLS = Path("skills") / "household.yaml"
@@ -31,6 +32,7 @@ class Composition:
     skills: Mapping[str, SkillModel]
     planners: Mapping[str, Planner]
     allocators: Mapping[str, Allocator]
+    llm: LlmPlanner
 
     @property
     def strategies(self) -> tuple[str, ...]:
@@ -38,14 +40,19 @@ class Composition:
         return tuple(dict.fromkeys(s for p in self.planners.values() for s in p.strategies))
 
 
-def compose(skill_files: tuple[Path, ...] = ()) -> Composition:
+def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) -> Composition:
     """All planners and allocators there are, and the skills of these files (none: the household's).
+
+    `llm_file` configures the language model; without it configs/planner.yaml does.
 
     Raises:
         BadSkillFile: a file cannot be read, or two files model the same skill.
+        BadLlmConfig: the language model's configuration or prompts cannot be used.
         FleetError: an installed package offers something that is not a planner or an allocator.
     """
-    planners: dict[str, Planner] = {SymbolicPlanner.name: SymbolicPlanner()}
+    symbolic = SymbolicPlanner()
+    llm = LlmPlanner(load_llm_config(llm_file), symbolic)
+    planners: dict[str, Planner] = {symbolic.name: symbolic, llm.name: llm}
     allocators: dict[str, Allocator] = {MilpAllocator.name: MilpAllocator()}
     for found in _from_packages("robotfleet.planners"):
         if not isinstance(found, Planner):
@@ -55,13 +62,22 @@ def compose(skill_files: tuple[Path, ...] = ()) -> Composition:
         if not isinstance(found, Allocator):
             raise FleetError(f"{type(found).__name__}, installed as an allocator, is not one")
         allocators[found.name] = found
+    return Composition(load_all_skills(skill_files), planners, allocators, llm)
+
+
+def load_all_skills(skill_files: tuple[Path, ...] = ()) -> dict[str, SkillModel]:
+    """The skill models in these files together; those of the household if none is named.
+
+    Raises:
+        BadSkillFile: a file cannot be read, or two files model the same skill.
+    """
     skills: dict[str, SkillModel] = {}
     for path in skill_files or (default_skill_file(),):
         for name, skill in load_skills(path).items():
             if name in skills:
                 raise BadSkillFile(f"{path}: skill {name} is already modelled in another file")
             skills[name] = skill
-    return Composition(skills, planners, allocators)
+    return skills
 
 
 def load_skills(path: Path) -> dict[str, SkillModel]:

@@ -13,7 +13,7 @@ from typing import Any
 from fleet.core import events
 from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event
-from fleet.core.state import Job, State
+from fleet.core.state import Job, Policy, State
 from fleet.core.step import replay, step
 from fleet.core.working import next_timer
 from fleet.errors import Superseded
@@ -43,10 +43,17 @@ log = logging.getLogger(__name__)
 class PlannerService:
     """One run of the central planner over a session, with its journal."""
 
-    def __init__(self, session: Session, journal: EventJournal, parts: Composition) -> None:
+    def __init__(
+        self,
+        session: Session,
+        journal: EventJournal,
+        parts: Composition,
+        policy: Policy | None = None,
+    ) -> None:
         self._session = session
         self._journal = journal
         self._parts = parts
+        self._policy = policy or Policy()
         self._incarnation = uuid.uuid4().hex[:12]
         self._state = State()
         self._time_s = 0.0
@@ -119,7 +126,11 @@ class PlannerService:
     async def _take_charge(self) -> None:
         status = await self._session.get(PLANNER_STATUS, PlannerAddress())
         epoch = 1 + max(self._state.epoch, status.epoch if status else 0)
-        self._apply(events.PlannerStarted(epoch=epoch, incarnation=self._incarnation, **self._at()))
+        self._apply(
+            events.PlannerStarted(
+                epoch=epoch, incarnation=self._incarnation, policy=self._policy, **self._at()
+            )
+        )
         await self._session.confirm(
             PLANNER_STATUS,
             PlannerAddress(),

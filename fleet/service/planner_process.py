@@ -8,8 +8,9 @@ import signal
 import sys
 from pathlib import Path
 
+from fleet.core.state import Policy
 from fleet.errors import FleetError
-from fleet.service.composition import compose
+from fleet.service.composition import Composition, compose
 from fleet.service.event_journal import EventJournal
 from fleet.service.planner import PlannerService
 from keyexpr_schema.errors import SchemaError
@@ -21,10 +22,13 @@ def run(
     realm: str,
     data_dir: Path,
     skill_files: tuple[Path, ...] = (),
+    llm_file: Path | None = None,
+    policy: Policy | None = None,
 ) -> None:
     """Be the central planner of a realm until SIGTERM or SIGINT; prints a line once it is ready.
 
     The event journal lies in `data_dir`. It waits for a router as long as there is none.
+    `skill_files` and `llm_file` are those of `compose`.
 
     Raises:
         SystemExit: with 1 and one sentence on stderr, when it cannot start or is superseded.
@@ -33,16 +37,20 @@ def run(
         level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s"
     )
     try:
-        asyncio.run(_run(endpoints, realm, data_dir, skill_files))
+        parts = compose(skill_files, llm_file)
+        asyncio.run(_run(endpoints, realm, data_dir, parts, policy))
     except (FleetError, SchemaError) as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201
         raise SystemExit(1) from None
 
 
 async def _run(
-    endpoints: tuple[str, ...], realm: str, data_dir: Path, skill_files: tuple[Path, ...]
+    endpoints: tuple[str, ...],
+    realm: str,
+    data_dir: Path,
+    parts: Composition,
+    policy: Policy | None,
 ) -> None:
-    parts = compose(skill_files)
     config = SessionConfig(
         endpoints=endpoints, realm=realm, component="planner", connect_timeout_s=None
     )
@@ -50,15 +58,22 @@ async def _run(
     with EventJournal(data_dir) as journal:
         async with open_session(config) as session:
             ready = asyncio.Event()
-            service = asyncio.create_task(PlannerService(session, journal, parts).run(ready))
+            service = asyncio.create_task(
+                PlannerService(session, journal, parts, policy).run(ready)
+            )
             for number in (signal.SIGTERM, signal.SIGINT):
                 loop.add_signal_handler(number, service.cancel)
             waiting = asyncio.create_task(ready.wait())
             await asyncio.wait((service, waiting), return_when=asyncio.FIRST_COMPLETED)
             waiting.cancel()
+            warming = asyncio.create_task(asyncio.to_thread(parts.llm.warm))
             if ready.is_set():
                 print(f"planner ready in realm {realm}", flush=True)  # noqa: T201
             try:
                 await service
             except asyncio.CancelledError:
                 return
+            finally:
+                # Ends calls to a model that are under way, so that no thread keeps the process.
+                parts.llm.close()
+                warming.cancel()

@@ -6,10 +6,10 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
-from fleet.core.language import goal_conditions, statement_facts
+from fleet.core.language import read_goal, statement_facts
 from fleet.core.state import State, put, without
 from fleet.errors import NotUnderstood
-from keyexpr_schema.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
+from keyexpr_schema.goals import ENDED_GOALS, Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.plans import PlanState
 from keyexpr_schema.world import NOTHING, Fact, Value
 
@@ -105,7 +105,7 @@ def goal_forgotten(state: State, event: events.GoalForgotten) -> State:
 
 def _understand(state: State, goal: Goal) -> GoalStatus:
     try:
-        stages = (goal.conditions or goal_conditions(goal.text, state.vocabulary()),)
+        stages = _stages(state, goal)
         for condition in (condition for stage in stages for condition in stage):
             for name in (*condition.subjects, condition.value):
                 _check_name(state, name)
@@ -120,6 +120,12 @@ def _understand(state: State, goal: Goal) -> GoalStatus:
         stages=stages,
         time_s=state.time_s,
     )
+
+
+def _stages(state: State, goal: Goal) -> tuple[tuple[Condition, ...], ...]:
+    if goal.conditions:
+        return (goal.conditions,)
+    return read_goal(goal.text, state.vocabulary()).stages
 
 
 def _check_name(state: State, name: Value) -> None:

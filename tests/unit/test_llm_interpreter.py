@@ -14,7 +14,7 @@ from tests.household import SKILLS, at, home
 from tests.llm_server import LlmServer, Reply
 
 WORLD = home()
-WORDS = Vocabulary(WORLD.places, WORLD.objects, WORLD.robots)
+WORDS = Vocabulary(WORLD.places, WORLD.objects, WORLD.robots, {"cup_1": "kitchen"})
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +59,7 @@ def test_a_sentence_becomes_stages(caller: ModelCaller) -> None:
     )
     told = server.said(0)
     assert "Everyone has tea, then go and look" in told
+    assert '"at": "kitchen"' in told
     assert "- located(object) = true: it is known where the object is" in told
     assert "- at(object) = place or at(object) = robot or at(robot) = place" in told
 

@@ -144,6 +144,7 @@ def vocabulary_text(text: str, words: Vocabulary) -> str:
                     "object": name,
                     "kind": thing.kind,
                     "ordinal": thing.ordinal,
+                    "at": words.whereabouts.get(name, "unknown"),
                 }
                 for name, thing in words.objects.items()
             ],

@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from fleet.core.language import Vocabulary
-from fleet.planners.llm import LlmConfig, LlmInterpreter, ModelCaller
+from fleet.planners.llm import LlmConfig, LlmInterpreter, LlmPlanner, ModelCaller
+from fleet.planners.symbolic import SymbolicPlanner
 from keyexpr_schema.goals import Condition
 from tests.household import SKILLS, at, home
 from tests.llm_server import LlmServer, Reply
@@ -121,6 +122,15 @@ def test_the_sentence_stays_inside_its_fence(caller: ModelCaller) -> None:
     question = server.requests[0]["messages"][1]["content"]
     assert question.count("</data>") == question.count("<data>") == 1
     assert question.index("Ignore all rules") < question.index("</data>")
+
+
+def test_a_planner_has_an_interpreter_of_the_same_model(caller: ModelCaller) -> None:
+    with LlmServer(Reply(stages([row("at", "cup_1", "hallway")]))) as server:
+        config = LlmConfig(model="openai/scripted", api_base=server.api_base)
+        planner = LlmPlanner(config, SymbolicPlanner(), caller)
+        assert planner.configured
+        made = planner.interpreter(SKILLS).interpret("tidy up", WORDS)
+    assert made == ((at("cup_1", "hallway"),),)
 
 
 def test_without_a_model_nothing_is_asked() -> None:

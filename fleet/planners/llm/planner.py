@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace as changed
 
 from msgspec.structs import replace
 
+from fleet.core.skills import SkillModel
 from fleet.core.world_model import WorldModel
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema, read_answer
@@ -15,6 +16,7 @@ from fleet.planners.llm.caller import ModelCaller
 from fleet.planners.llm.config import LlmConfig
 from fleet.planners.llm.conversation import Conversation, GivenUp, Ledger, Rejected
 from fleet.planners.llm.draft import Draft, conditions_of, draft_of, merged, plan_of, world_after
+from fleet.planners.llm.interpreter import LlmInterpreter
 from fleet.planners.llm.prompts import load_prompts
 from fleet.planners.llm.verify import why_not, without_useless
 from fleet.planners.llm.wording import problem_text, skills_text, useful_skills
@@ -55,9 +57,18 @@ class LlmPlanner(Planner):
         self._caller = caller or ModelCaller()
         self._conversation = Conversation(config, self._prompts, self._caller)
 
+    @property
+    def configured(self) -> bool:
+        """Whether there is a model to ask."""
+        return self._config.not_configured is None
+
+    def interpreter(self, skills: Mapping[str, SkillModel]) -> LlmInterpreter:
+        """An interpreter of goal sentences with the same model and the same processes."""
+        return LlmInterpreter(self._config, skills, self._caller)
+
     def warm(self) -> None:
         """Start what takes seconds to start, if a model is configured. Blocks until it runs."""
-        if self._config.not_configured is None:
+        if self.configured:
             self._caller.warm()
 
     def close(self) -> None:

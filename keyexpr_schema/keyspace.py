@@ -50,6 +50,12 @@ STATEMENT = Key(
     "people", "planner, robotctl", Kept.STORED,
     "A sentence about the world; the planner reads facts out of it where it can.",
 )
+STATEMENT_STATUS = Key(
+    "statement_status", "world/statements/{statement}/status",
+    world.StatementAddress, world.StatementStatus,
+    "planner", "robotctl", Kept.STORED,
+    "The facts that the planner read out of a statement, or why it read none.",
+)
 PLACE = Key(
     "place", "world/places/{place}",
     world.PlaceAddress, world.Place,

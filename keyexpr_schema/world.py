@@ -63,6 +63,14 @@ class Statement(Payload, frozen=True, kw_only=True):
     source: str = "person"
 
 
+class StatementStatus(Payload, frozen=True, kw_only=True):
+    """What the planner read out of a statement: facts, or why none."""
+
+    statement: Id
+    facts: tuple[Fact, ...] = ()
+    reason: str | None = None
+
+
 class Surface(Payload, frozen=True, kw_only=True):
     """A flat, level area on which things can be put down; axis-aligned in its own yaw."""
 

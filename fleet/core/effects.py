@@ -21,12 +21,13 @@ from keyexpr_schema.keyspace import (
     ORDER,
     PLAN_SPEC,
     PLAN_STATUS,
+    STATEMENT_STATUS,
     TASK_RECORD,
 )
 from keyexpr_schema.plans import PlanAddress, PlanStatus
 from keyexpr_schema.requests import RequestAddress
 from keyexpr_schema.tasks import Order, OrderAddress, TaskAddress, TaskRecord
-from keyexpr_schema.world import FactAddress
+from keyexpr_schema.world import FactAddress, StatementAddress
 
 PLANNER_SOURCE = "planner"
 """`source` of facts that the planner concludes itself; statements add a colon and their id."""
@@ -92,6 +93,12 @@ def _documents(old: State, new: State) -> Iterator[Effect]:
             GOAL_STATUS,
             {GoalAddress(goal): status for goal, status in old.goal_states.items()},
             {GoalAddress(goal): status for goal, status in new.goal_states.items()},
+        )
+    if old.understood is not new.understood:
+        yield from _difference(
+            STATEMENT_STATUS,
+            {StatementAddress(name): status for name, status in old.understood.items()},
+            {StatementAddress(name): status for name, status in new.understood.items()},
         )
     if old.answers is not new.answers:
         yield from _difference(

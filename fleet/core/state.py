@@ -15,7 +15,7 @@ from keyexpr_schema.plans import ENDED_PLANS, Plan, PlanChange, PlanState, Task,
 from keyexpr_schema.requests import Answer
 from keyexpr_schema.robots import RobotSpec
 from keyexpr_schema.tasks import TaskRecord, TaskState
-from keyexpr_schema.world import Fact, Object, Place, Statement
+from keyexpr_schema.world import Fact, Object, Place, Statement, StatementStatus
 
 T = TypeVar("T")
 
@@ -113,7 +113,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     goals: dict[str, Goal] = {}
     goal_states: dict[str, GoalStatus] = {}
     statements: dict[str, Statement] = {}
-    understood: dict[str, bool] = {}
+    understood: dict[str, StatementStatus] = {}
     places: dict[str, Place] = {}
     objects: dict[str, Object] = {}
     robots: dict[str, RobotSpec] = {}

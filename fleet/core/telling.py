@@ -11,7 +11,7 @@ from fleet.core.state import State, put, without
 from fleet.errors import NotUnderstood
 from keyexpr_schema.goals import ENDED_GOALS, Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.plans import PlanState
-from keyexpr_schema.world import NOTHING, Fact, Value
+from keyexpr_schema.world import NOTHING, Fact, StatementStatus, Value
 
 SEARCHED = "searched"
 """Relation that says of a place that somebody looked around in it."""
@@ -188,11 +188,7 @@ def statement_told(state: State, event: events.StatementTold) -> State:
     statement = event.statement
     if state.statements.get(statement.statement) == statement:
         return state
-    state = replace(
-        state,
-        statements=put(state.statements, statement.statement, statement),
-        understood=put(state.understood, statement.statement, False),
-    )
+    state = replace(state, statements=put(state.statements, statement.statement, statement))
     return _read_statement(state, statement.statement)
 
 
@@ -209,21 +205,28 @@ def statement_forgotten(state: State, event: events.StatementForgotten) -> State
 
 def _read_statement(state: State, name: str) -> State:
     try:
-        facts = statement_facts(state.statements[name].text, state.vocabulary())
-    except NotUnderstood:
-        return state
-    for relation, subject, value in facts:
-        state = believe(
-            state,
-            Fact(
-                subject=subject,
-                relation=relation,
-                value=value,
-                source=f"{PLANNER_SOURCE}:{name}",
-                time_s=state.time_s,
-            ),
+        read = statement_facts(state.statements[name].text, state.vocabulary())
+    except NotUnderstood as error:
+        return _set_understood(state, StatementStatus(statement=name, reason=str(error)))
+    facts = tuple(
+        Fact(
+            subject=subject,
+            relation=relation,
+            value=value,
+            source=f"{PLANNER_SOURCE}:{name}",
+            time_s=state.time_s,
         )
-    return replace(state, understood=put(state.understood, name, True))
+        for relation, subject, value in read
+    )
+    for fact in facts:
+        state = believe(state, fact)
+    return _set_understood(state, StatementStatus(statement=name, facts=facts))
+
+
+def _set_understood(state: State, status: StatementStatus) -> State:
+    if state.understood.get(status.statement) == status:
+        return state
+    return replace(state, understood=put(state.understood, status.statement, status))
 
 
 def place_told(state: State, event: events.PlaceTold) -> State:
@@ -313,8 +316,8 @@ def _words_changed(state: State) -> State:
         status = state.goal_states[goal.goal]
         if status.state is GoalState.REJECTED and _understand(state, goal).reason != status.reason:
             state = _take_goal(state, goal)
-    for name, understood in state.understood.items():
-        if not understood:
+    for name, reading in state.understood.items():
+        if reading.reason is not None:
             state = _read_statement(state, name)
     return state
 

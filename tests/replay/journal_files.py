@@ -1,7 +1,8 @@
 """Journals as files: events in, effects out, one a line.
 
 `python -m tests.replay.journal_files PLANNER_DATA_DIR NAME` makes `NAME.events.jsonl` from what a
-planner kept, and `NAME.effects.txt` from what the core does with it now. Look at both, then commit.
+planner kept, and `NAME.effects.txt` from what the core does with it now; with `NAME` alone only the effects are made again, which is right
+when the core is meant to do something else. Look at both, then commit.
 """
 
 from __future__ import annotations
@@ -51,9 +52,14 @@ def effects_of(journal: list[Event]) -> Iterator[str]:
         yield ""
 
 
+def _write_effects(name: str) -> None:
+    (HERE / f"{name}.effects.txt").write_text("\n".join(effects_of(events_in(name))) + "\n")
+
+
 if __name__ == "__main__":
-    data, made = Path(sys.argv[1]), sys.argv[2]
-    with EventJournal(data) as kept:
-        journal = list(kept.events())
-    (HERE / f"{made}.events.jsonl").write_bytes(b"\n".join(map(encode_event, journal)) + b"\n")
-    (HERE / f"{made}.effects.txt").write_text("\n".join(effects_of(journal)) + "\n")
+    if len(sys.argv) == 3:
+        data, made = Path(sys.argv[1]), sys.argv[2]
+        with EventJournal(data) as kept:
+            lines = [encode_event(event) for event in kept.events()]
+        (HERE / f"{made}.events.jsonl").write_bytes(b"\n".join(lines) + b"\n")
+    _write_effects(sys.argv[-1])

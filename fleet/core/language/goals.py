@@ -88,6 +88,7 @@ class _Goals(Sentences):
             if cursor.take_word(SENTENCE_ENDS):
                 must = False
                 self.elliptic = ""
+                self.told = []
             elif cursor.take_of(NEXT):
                 self.draft.next_stage()
                 must = True

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from fleet.core.language.cursor import Cursor
 from fleet.core.language.lexicon import Sort
-from fleet.core.language.mentions import Mention, Noun, Quantity
+from fleet.core.language.mentions import Noun, Quantity
 from fleet.core.language.nouns import Nouns
-from fleet.core.language.refusals import listed, one_of
+from fleet.core.language.refusals import one_of
 from fleet.core.language.vocabulary import Vocabulary
 from fleet.core.language.wordlists import BASKETS, DEFINITE, INDEFINITE
 from fleet.errors import NotUnderstood
@@ -120,14 +120,12 @@ class Locations:
             raise NotUnderstood(
                 f'{names} are two places; if one is to come after the other, say "then"'
             )
-        settled: list[Mention] = [part.noun.among(shared).settle() for part in parts[:1]]
-        mention = settled[0]
-        if mention.open or len(mention.subjects) != 1:
-            text = parts[0].noun.text
-            raise NotUnderstood(
-                f"{text!r} could be {one_of(mention.subjects)}: say which {mention.sort}; "
-                f"known are {listed(mention.subjects)}"
-            )
+        for part in parts:
+            mention = part.noun.among(shared).settle()
+            if mention.open or len(mention.subjects) != 1:
+                raise NotUnderstood(
+                    f"{part.noun.text!r} could be {one_of(mention.subjects)}: say which"
+                )
         return mention.subjects[0], mention.sort
 
 

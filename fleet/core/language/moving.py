@@ -8,6 +8,7 @@ from fleet.core.language.cursor import Cursor
 from fleet.core.language.lexicon import Lexicon, Sort
 from fleet.core.language.locations import SPOTS, Locations, Part, Where
 from fleet.core.language.mentions import Mention, Noun
+from fleet.core.language.morphology import gerund
 from fleet.core.language.nouns import Nouns
 from fleet.core.language.refusals import listed
 from fleet.core.language.stages import Draft
@@ -18,6 +19,14 @@ from fleet.core.language.wordlists import HOME, RELATIVE
 from fleet.errors import NotUnderstood
 
 HOME_HINT = 'give it one with the field "home" of the object'
+
+
+_OFFERING = frozenset(
+    form
+    for verb in ("bring", "give", "hand", "fetch", "get", "take", "pass")
+    for form in (verb, gerund(verb))
+)
+"""Verbs that may name the receiver first: "give the robot the cup"."""
 
 
 class Moving:
@@ -32,6 +41,7 @@ class Moving:
         self.draft = Draft()
         self.moved: list[Subject] = []  # what "and then to the kitchen" is about
         self.last_place: str | None = None
+        self.verb = ""
         self.began = 0  # the token at which the clause began
 
     # --- moving ----------------------------------------------------------------------------------
@@ -44,7 +54,12 @@ class Moving:
         cursor.take_word(("me", "us"))
         moved = self.subjects.read("an object", THINGS)
         first = moved[0]
-        to_robot = len(moved) == 1 and isinstance(first, Noun) and first.sort == "robot"
+        to_robot = (
+            self.verb in _OFFERING
+            and len(moved) == 1
+            and isinstance(first, Noun)
+            and first.sort == "robot"
+        )
         if to_robot and not cursor.at_border() and self.nouns.starts(("object",)):
             assert isinstance(first, Noun)
             moved = self.subjects.read("an object", ("object",))
@@ -79,11 +94,12 @@ class Moving:
 
     def parts(self) -> tuple[list[Part], bool]:
         """The prepositional phrases and particles that come next; whether they say "home"."""
-        cursor, parts, home = self.cursor, [], False
+        cursor, home, belongs = self.cursor, False, False
+        parts: list[Part] = []
         while True:
             before = cursor.at
             if self._home():
-                home = True
+                home = belongs = True
             elif cursor.take("there") or cursor.take("back", "there") or cursor.take("to", "there"):
                 parts.append(self._there(before))
             elif cursor.take_of(RELATIVE) and cursor.preposition() is None:
@@ -98,7 +114,12 @@ class Moving:
                 cursor.at += 1
             else:
                 break
-        return parts, home and not any(part.preposition != "from" for part in parts)
+        placed = any(part.preposition != "from" for part in parts)
+        if placed and belongs:
+            raise NotUnderstood(
+                f'{cursor.said(self.began)!r} names a place and says "home": say one of them'
+            )
+        return parts, home and not placed
 
     def _home(self) -> bool:
         """Whether "home" comes next, and nothing known is called so."""

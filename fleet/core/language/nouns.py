@@ -67,6 +67,8 @@ class Nouns:
         if other and said.count is None:
             said = replace(said, count=self._count(sorts))
         ordinal = None if other else self._ordinal(sorts)
+        if ordinal is not None and said.count is not None:
+            raise self._unknown(start, what, sorts)  # "the two first cup"
         count = self._count(sorts) if ordinal is not None else said.count
         bare = (other or ordinal is not None) and self._nothing_follows()
         kin = tuple(e for e in self._kind if e.sort in sorts) if bare else ()

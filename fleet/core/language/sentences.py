@@ -32,6 +32,7 @@ class Sentences(Clauses):
 
     def __init__(self, text: str, words: Vocabulary) -> None:
         super().__init__(text, words)
+        self.told: list[Subject] = []  # whom the sentence speaks to: "HSR, go … and …"
         self.elliptic = ""  # "move": "and the book to the kitchen" may follow; "be": "… is in …"
 
     def polite(self) -> bool:
@@ -53,10 +54,10 @@ class Sentences(Clauses):
         verb = longest(cursor, IMPERATIVES)
         assert verb is not None
         cursor.at += len(verb)
-        doing = IMPERATIVES[verb]
+        self.verb, doing = verb[0], IMPERATIVES[verb]
         if Doing.GO in doing and verb_next(cursor) and not cursor.next_of(HOME):
             return self.imperative()  # "go get", "come find"
-        return self.do(doing, None)
+        return self.do(doing, self.told or None)
 
     def do(self, doing: frozenset[Doing], who: Sequence[Subject] | None) -> None:
         """What follows a verb; `who` is named before it, if anybody is."""
@@ -86,14 +87,13 @@ class Sentences(Clauses):
     def _check_who(self, who: Sequence[Subject]) -> None:
         for subject in who:
             names = subject.names if isinstance(subject, Noun) else subject.subjects
-            generic = isinstance(subject, Noun) and subject.generic
+            generic = isinstance(subject, Noun) and subject.generic and subject.count is None
             if subject.sort != "robot":
                 raise NotUnderstood(f"{self.cursor.said(self.began)!r}: only robots do something")
             if not generic and len(self.words.robots) > 1:
                 raise NotUnderstood(
-                    f"{self.cursor.said(self.began)!r} says which robot is to do it, but a goal "
-                    f"says what must hold, and the allocator finds who does it: leave "
-                    f"{' and '.join(names)} out"
+                    f"{' and '.join(names)} cannot be told to do it: a goal says what must hold, "
+                    "and the allocator finds who does it; leave the name out"
                 )
 
     # --- sentences with a subject -----------------------------------------------------------------
@@ -115,6 +115,7 @@ class Sentences(Clauses):
         `states`: "make sure that" came before; `wanted`: "I need"; `told`: "let", "tell".
         """
         cursor, start = self.cursor, self.cursor.at
+        self.told = []
         sorts = THINGS if self.nouns.starts(THINGS) or cursor.word() in ("it", "them") else PLACES
         who = self.subjects.read("an object or a robot" if sorts == THINGS else "a place", sorts)
         robots = all(s.sort == "robot" for s in who)
@@ -136,6 +137,7 @@ class Sentences(Clauses):
             modal = True
         elif robots and (verb := longest(cursor, FINITE)):
             cursor.at += len(verb)
+            self.told = [s for s in who if not (isinstance(s, Noun) and s.generic)]
             return self.do(FINITE[verb], who)
         elif not (wanted or self.elliptic) or comma or modal:
             raise self.no_clause(start)

@@ -269,6 +269,11 @@ class _Statements(Clauses):
         return self._searched(places, not negated)
 
     def _searched(self, places: Sequence[str], value: bool) -> None:
+        if not value and len(places) > 1:
+            raise NotUnderstood(
+                f"{self.cursor.said(self.began)!r} could mean all or some of them: "
+                "say it of one place at a time"
+            )
         self.cursor.take("yet")
         for place in places:
             self._fact("searched", place, value)

@@ -1,8 +1,9 @@
 """Journals as files: events in, effects out, one a line.
 
 `python -m tests.replay.journal_files PLANNER_DATA_DIR NAME` makes `NAME.events.jsonl` from what a
-planner kept, and `NAME.effects.txt` from what the core does with it now; with `NAME` alone only the effects are made again, which is right
-when the core is meant to do something else. Look at both, then commit.
+planner kept, and `NAME.effects.txt` from what the core does with it now. With `NAME` alone only the
+effects are made again, which is right when the core is meant to do something else. Look at what
+changed, then commit.
 """
 
 from __future__ import annotations

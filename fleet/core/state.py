@@ -133,7 +133,12 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
 
     def vocabulary(self) -> Vocabulary:
         """The names that sentences can use."""
-        return Vocabulary(self.places, self.objects, self.robots)
+        whereabouts = {
+            fact.subject: fact.value
+            for fact in self.facts.values()
+            if fact.relation == "at" and isinstance(fact.value, str)
+        }
+        return Vocabulary(self.places, self.objects, self.robots, whereabouts)
 
     def world(self, skills: Mapping[str, SkillModel]) -> WorldModel:
         """The world as believed now."""

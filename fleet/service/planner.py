@@ -6,12 +6,14 @@ import asyncio
 import logging
 import time
 import uuid
-from collections.abc import Sequence
+from collections.abc import Coroutine, Sequence
 from contextlib import AsyncExitStack
 from typing import Any
 
+from msgspec.structs import replace
+
 from fleet.core import events
-from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
+from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event
 from fleet.core.state import Job, Policy, State
 from fleet.core.step import replay, step
@@ -53,7 +55,8 @@ class PlannerService:
         self._session = session
         self._journal = journal
         self._parts = parts
-        self._policy = policy or Policy()
+        self._interpreter = parts.llm.interpreter(parts.skills)
+        self._policy = replace(policy or Policy(), interpreter=self._interpreter.configured)
         self._incarnation = uuid.uuid4().hex[:12]
         self._state = State()
         self._time_s = 0.0
@@ -172,7 +175,7 @@ class PlannerService:
 
         Until here nothing was ordered, since a report that is not read yet could forbid it.
         """
-        held = [effect for effect in self._held or () if not isinstance(effect, MakePlan)]
+        held = [e for e in self._held or () if isinstance(e, Publish | Retract)]
         self._held = None
         self._carry_out((*held, *effects_of(self._state)))
 
@@ -252,9 +255,14 @@ class PlannerService:
         self._outbox.send(e for e in effects if isinstance(e, Publish | Retract))
         for effect in effects:
             if isinstance(effect, MakePlan):
-                task = asyncio.create_task(self._make_plan(effect.job))
-                self._planning.add(task)
-                task.add_done_callback(self._planning.discard)
+                self._at_the_desk(self._make_plan(effect.job))
+            elif isinstance(effect, Interpret):
+                self._at_the_desk(self._interpret(effect))
+
+    def _at_the_desk(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.create_task(work)
+        self._planning.add(task)
+        task.add_done_callback(self._planning.discard)
 
     async def _make_plan(self, job: Job) -> None:
         at = self._at()
@@ -266,6 +274,12 @@ class PlannerService:
                 job=job.job, reason=f"the planner failed: {error or type(error).__name__}", **at
             )
         self._inbox.put_nowait(event)
+
+    async def _interpret(self, effect: Interpret) -> None:
+        words = self._state.vocabulary()
+        read = await asyncio.to_thread(self._interpreter.interpret, effect.text, words)
+        said: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
+        self._inbox.put_nowait(events.GoalInterpreted(goal=effect.goal, **said, **self._at()))
 
 
 def _report_time_s(event: Event) -> float:

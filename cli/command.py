@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+import typer.core
 
 from cli.errors import CliError
 from cli.settings import Settings, load_settings, one_line
@@ -102,7 +103,27 @@ class Call:
 Body = Callable[..., Coroutine[Any, Any, None] | None]
 
 
-def command(app: typer.Typer, name: str | None = None) -> Callable[[Body], Body]:
+class FactWords(typer.core.TyperCommand):
+    """A command whose `--fact` takes three words, or the same in one."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Make one word of the three: typer has no option that is both repeatable and a triple."""
+        joined: list[str] = []
+        rest = list(args)
+        while rest:
+            word = rest.pop(0)
+            joined.append(word)
+            if word == "--fact" and rest and " " not in rest[0] and "(" not in rest[0]:
+                fact, rest = rest[:3], rest[3:]
+                joined.append(" ".join(fact))
+        return super().parse_args(ctx, joined)
+
+
+def command(
+    app: typer.Typer,
+    name: str | None = None,
+    cls: type[typer.core.TyperCommand] | None = None,
+) -> Callable[[Body], Body]:
     """Register `body(call, …)`, plain or async, as a command of `app` with the global options."""
 
     def register(body: Body) -> Body:
@@ -139,7 +160,7 @@ def command(app: typer.Typer, name: str | None = None) -> Callable[[Body], Body]
         ]
         run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
         run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-        app.command(name)(run)
+        app.command(name, cls=cls)(run)
         return body
 
     return register

@@ -19,7 +19,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "status": ("cli.commands.overview:status_app", "The whole fleet on one page."),
     "watch": ("cli.commands.overview:watch_app", "Follow goals, plans and tasks as they change."),
     "goal": ("cli.commands.goals:app", "Say what you want, in a sentence; see what became of it."),
-    "plan": ("cli.commands.plans:app", "Make, look at, start and cancel plans."),
+    "plan": ("cli.commands.plans:app", "Make, look at, check, compare, start and cancel plans."),
     "task": ("cli.commands.tasks:app", "Look at tasks, or add one to a plan."),
     "replan": ("cli.commands.plans:replan_app", "Plan again from what is known now."),
     "world": ("cli.commands.world:app", "Places, objects, facts and statements."),

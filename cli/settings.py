@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,24 @@ DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 DEFAULT_REALM = "robotfleet"
 _ENDPOINT = re.compile(r"^[a-z][a-z0-9_]*/\S+$")
 _REALM = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,62}", re.ASCII)
-_FIELDS = ("router", "realm")
+_FIELDS = ("router", "realm", "planner")
+
+
+@dataclass(frozen=True)
+class PlannerSettings:
+    """How `robotctl planner` behaves where no flag says so; `None` and empty: not told.
+
+    Files are relative to the folder of the configuration file. `lost_after_s` is wall time [s].
+    """
+
+    approval: bool | None = None
+    auto_plan: bool | None = None
+    lost_after_s: float | None = None
+    llm_config: Path | None = None
+    skills: tuple[Path, ...] = ()
+
+
+_PLANNER_FIELDS = tuple(field.name for field in fields(PlannerSettings))
 
 
 @dataclass(frozen=True)
@@ -25,6 +43,7 @@ class Settings:
     routers: tuple[str, ...] = (DEFAULT_ROUTER,)
     realm: str = DEFAULT_REALM
     json: bool = False
+    planner: PlannerSettings = PlannerSettings()
 
 
 def load_settings(
@@ -52,6 +71,7 @@ def load_settings(
         routers=_endpoints(chosen_routers, where) or (DEFAULT_ROUTER,),
         realm=_realm(chosen_realm, realm_where),
         json=json,
+        planner=_planner(told.get("planner"), path) if path else PlannerSettings(),
     )
 
 
@@ -126,6 +146,42 @@ def _realm(value: object, where: str) -> str:
             "or '-', starting with a letter or a digit"
         )
     return value
+
+
+def _planner(told: object, path: Path) -> PlannerSettings:
+    if told is None:
+        return PlannerSettings()
+    if not isinstance(told, dict):
+        raise BadSettings(f"{path}: planner must hold fields such as 'approval: true'")
+    for name in told:
+        if name not in _PLANNER_FIELDS:
+            raise BadSettings(
+                f"{path}: planner has no field {name!r}; valid are: {', '.join(_PLANNER_FIELDS)}"
+            )
+
+    def check(name: str, right: bool, what: str) -> None:
+        if told.get(name) is not None and not right:
+            raise BadSettings(f"{path}: planner.{name}: {told[name]!r} is not {what}")
+
+    for name in ("approval", "auto_plan"):
+        check(name, isinstance(told.get(name), bool), "true or false")
+    lost = told.get("lost_after_s")
+    is_number = isinstance(lost, int | float) and not isinstance(lost, bool)
+    lost_s = float(lost or 0.0) if is_number else -1.0
+    check("lost_after_s", 0.0 <= lost_s < math.inf, "a number of seconds from 0 up")
+    check("llm_config", isinstance(told.get("llm_config"), str), "the name of a file")
+    skills = told.get("skills") or []
+    skills = [skills] if isinstance(skills, str) else skills
+    is_list = isinstance(skills, list) and all(isinstance(each, str) for each in skills)
+    check("skills", is_list, "the name of a file or a list of such")
+    llm = told.get("llm_config")
+    return PlannerSettings(
+        approval=told.get("approval"),
+        auto_plan=told.get("auto_plan"),
+        lost_after_s=None if lost is None else lost_s,
+        llm_config=None if llm is None else path.parent / Path(llm).expanduser(),
+        skills=tuple(path.parent / Path(each).expanduser() for each in skills),
+    )
 
 
 def one_line(error: object) -> str:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, command
+from cli.command import Call, FactWords, command
+from cli.commands.plan_files import check, diff, propose
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from keyexpr_schema.goals import Goal, GoalStatus
+    from keyexpr_schema.plans import PlanStatus
     from keyexpr_schema.requests import Control
     from keyexpr_schema.session import Session
 
@@ -22,7 +26,7 @@ HOW_TO_PLAN = "make one with `robotctl plan create`"
 
 @app.callback()
 def plan() -> None:
-    """Make, look at, start and cancel plans."""
+    """Make, look at, check, compare, start and cancel plans."""
 
 
 @command(app, "create")
@@ -39,15 +43,31 @@ async def create(
     no_start: Annotated[
         bool, typer.Option("--no-start", help="Do not carry it out; see `plan start`.")
     ] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only show the plan; leave nothing behind.")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help="With --dry-run: write the plan as YAML or JSON, to edit, check and propose.",
+        ),
+    ] = None,
 ) -> None:
     """Have goals turned into a plan and, unless told otherwise, carried out."""
     from cli.asking import ask_planner
-    from cli.errors import check_known
+    from cli.errors import BadArgument, check_known
     from cli.naming import request_name
+    from cli.plans.files import check_suffix, write_plan
     from keyexpr_schema.keyspace import GOAL_SPEC, PLANNER_STATUS
     from keyexpr_schema.requests import PlanRequest
     from keyexpr_schema.service import PlannerAddress
 
+    if out is not None and not dry_run:
+        raise BadArgument("--out goes with --dry-run; see a plan that was made with `plan show`")
+    if out is not None:
+        check_suffix(out)
     async with call.session() as session:
         known = [address.goal for address in await session.list(GOAL_SPEC)]
         for goal in goals or ():
@@ -72,9 +92,26 @@ async def create(
                 planner=planner,
                 allocator=allocator,
                 start=not no_start,
+                dry_run=dry_run,
             ),
         )
-    call.show(answer, lambda: answer.sentence)
+        if dry_run:
+            specs, status = await _goals(session)
+    if answer.preview is not None and out is not None:
+        write_plan(out, answer.preview)
+        call.warn(f"wrote the plan to {out}")
+
+    def draw() -> RenderableType:
+        if answer.preview is None:
+            return answer.sentence
+        from rich.console import Group
+
+        from cli.show.plan_page import plan_page
+
+        page = plan_page(answer.preview, answer.preview_status, {}, specs, status)
+        return Group(answer.sentence, "", page)
+
+    call.show(answer, draw)
 
 
 @command(app, "list")
@@ -99,10 +136,16 @@ async def show(
     plan: Annotated[
         str | None, typer.Argument(metavar="[PLAN]", help="Its name; else the latest plan.")
     ] = None,
+    dot: Annotated[
+        bool, typer.Option("--dot", help="Only the graph, in Graphviz' language (`| dot -Tsvg`).")
+    ] = False,
 ) -> None:
-    """One plan as a tree: goals, tasks with what they wait for, who does them, how they stand."""
+    """One plan: its tasks and who does them, what waits for what, how it was made and changed."""
     from cli.board import FLEET, following
-    from cli.errors import Unknown, check_known
+    from cli.errors import BadArgument, Unknown, check_known
+
+    if dot and call.json:
+        raise BadArgument("--dot and --json are two forms of the same: choose one")
 
     async with call.session() as session, following(session, *FLEET) as board:
         pass
@@ -117,14 +160,29 @@ async def show(
     spec, status = board.plans.get(name), board.plan_status.get(name)
 
     def draw() -> RenderableType:
-        from cli.show.fleet_tables import plans_table
-        from cli.show.plan_tree import plan_tree
+        from rich.console import Group
 
+        from cli.show.fleet_tables import plans_table
+        from cli.show.plan_graph import plan_dot
+        from cli.show.plan_page import plan_page, violations_table
+
+        if spec is None and dot:
+            raise Unknown(f"plan {name} has no tasks to draw: it is {_state(status)}")
         if spec is None:
-            return plans_table({}, {name: status} if status else {})
-        return plan_tree(spec, status, records, board.goals, board.goal_status, board.now_s)
+            table = plans_table({}, {name: status} if status else {})
+            if status is None or not status.violations:
+                return table
+            return Group(table, "", violations_table(status.violations))
+        if dot:
+            return plan_dot(spec, status, records)
+        return plan_page(spec, status, records, board.goals, board.goal_status, board.now_s)
 
     call.show({"plan": spec, "status": status, "tasks": list(records.values())}, draw)
+
+
+command(app, "check", FactWords)(check)
+command(app, "propose")(propose)
+command(app, "diff")(diff)
 
 
 @command(app, "start")
@@ -133,6 +191,14 @@ async def start(call: Call, plan: PlanArgument) -> None:
     from keyexpr_schema.requests import Control
 
     await _control(call, Control.START, plan)
+
+
+@command(app, "approve")
+async def approve(call: Call, plan: PlanArgument) -> None:
+    """Let a plan be carried out that waits for a person (`robotctl planner --approval`)."""
+    from keyexpr_schema.requests import Control
+
+    await _control(call, Control.APPROVE, plan)
 
 
 @command(app, "cancel")
@@ -182,6 +248,17 @@ async def replan(
             ),
         )
     call.show(answer, lambda: answer.sentence)
+
+
+async def _goals(session: Session) -> tuple[dict[str, Goal], dict[str, GoalStatus]]:
+    from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS
+
+    specs = {a.goal: spec for a, spec in (await session.list(GOAL_SPEC)).items()}
+    return specs, {a.goal: each for a, each in (await session.list(GOAL_STATUS)).items()}
+
+
+def _state(status: PlanStatus | None) -> str:
+    return status.state.value if status else "not there"
 
 
 async def check_plan(session: Session, plan: str) -> None:

@@ -7,7 +7,7 @@ SIGINT or SIGTERM.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import typer
 
@@ -19,6 +19,7 @@ worker_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 sim_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 record_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 
+T = TypeVar("T")
 BACKENDS = ("mujoco", "kinematic")
 
 DataOption = Annotated[
@@ -62,19 +63,57 @@ def planner(
     data: DataOption = None,
     skills: Annotated[
         list[Path] | None,
-        typer.Option("--skills", metavar="FILE", help="Models of skills of your own."),
+        typer.Option(
+            "--skills", metavar="FILE", help="Models of skills; repeatable. Else the household's."
+        ),
+    ] = None,
+    llm_config: Annotated[
+        Path | None,
+        typer.Option(
+            "--llm-config",
+            metavar="FILE",
+            help="Configures planning by language model; else configs/planner.yaml, if there.",
+        ),
+    ] = None,
+    approval: Annotated[
+        bool | None,
+        typer.Option("--approval/--no-approval", help="A person approves each new plan."),
+    ] = None,
+    auto_plan: Annotated[
+        bool | None,
+        typer.Option("--auto-plan/--no-auto-plan", help="Goals that wait are planned unasked."),
+    ] = None,
+    lost_after_s: Annotated[
+        float | None,
+        typer.Option(
+            "--lost-after",
+            metavar="SECONDS",
+            min=0.0,
+            help="A robot whose worker is gone for longer is lost; else 30.",
+        ),
     ] = None,
 ) -> None:
-    """Run the planner: it turns goals into plans and has them carried out."""
+    """Run the planner: it turns goals into plans and has them carried out.
+
+    What no flag says comes from `planner:` in robotctl.yaml.
+    """
     from cli.running import end_with_parent
+    from fleet.core.state import Policy
     from fleet.service.planner_process import run
 
+    told, default = call.settings.planner, Policy()
     end_with_parent()
     run(
         endpoints=call.settings.routers,
         realm=call.settings.realm,
         data_dir=_data(data, "planner"),
-        skill_files=tuple(skills or ()),
+        skill_files=tuple(skills or told.skills),
+        llm_file=llm_config or told.llm_config,
+        policy=Policy(
+            approval=_first(approval, told.approval, default.approval),
+            auto_plan=_first(auto_plan, told.auto_plan, default.auto_plan),
+            lost_after_s=_first(lost_after_s, told.lost_after_s, default.lost_after_s),
+        ),
     )
 
 
@@ -166,6 +205,11 @@ def parse_speed(written: str) -> float | None:
     if not (math.isfinite(speed) and speed > 0.0):
         raise BadArgument(f"speed {written!r} is neither 'max' nor a number above 0")
     return speed
+
+
+def _first(flag: T | None, told: T | None, default: T) -> T:
+    """The first that says something."""
+    return next((each for each in (flag, told) if each is not None), default)
 
 
 def _data(given: Path | None, name: str) -> Path:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cli.errors import BadSettings
-from cli.settings import DEFAULT_REALM, DEFAULT_ROUTER, load_settings
+from cli.settings import DEFAULT_REALM, DEFAULT_ROUTER, PlannerSettings, load_settings
 
 A, B, C = "tcp/127.0.0.1:1", "tcp/127.0.0.1:2", "tls/[::1]:3"
 
@@ -49,7 +49,13 @@ def test_which_file(tmp_path: Path) -> None:
     [
         ("router: [", "is not YAML"),
         ("- a\n- b\n", "must hold fields"),
-        ("rooter: x\n", "field 'rooter'; valid are: router, realm"),
+        ("rooter: x\n", "field 'rooter'; valid are: router, realm, planner"),
+        ("planner: [approval]\n", "planner must hold fields such as"),
+        ("planner: {aproval: true}\n", "planner has no field 'aproval'; valid are: approval,"),
+        ("planner: {approval: 1}\n", "planner.approval: 1 is not true or false"),
+        ("planner: {lost_after_s: .inf}\n", "planner.lost_after_s: inf is not a number"),
+        ("planner: {lost_after_s: -1}\n", "planner.lost_after_s: -1 is not a number"),
+        ("planner: {skills: [1]}\n", "planner.skills: [1] is not the name of a file"),
         ("router: localhost\n", "'localhost' is not a Zenoh endpoint"),
         ("router: {a: 1}\n", "must be an endpoint or a list"),
         ("realm: 'a b'\n", "'a b' is not a realm"),
@@ -74,3 +80,28 @@ def test_a_bad_flag_or_variable_is_named() -> None:
         load_settings(["x"], None, False, {}, Path("/nowhere"))
     with pytest.raises(BadSettings, match="ROBOTFLEET_REALM: '/' is not"):
         load_settings(None, None, False, {"ROBOTFLEET_REALM": "/"}, Path("/nowhere"))
+
+
+def test_the_planner_is_told_its_ways_in_the_file(tmp_path: Path) -> None:
+    assert load_settings(None, None, False, {}, tmp_path).planner == PlannerSettings()
+    (tmp_path / "robotctl.yaml").write_text(
+        "planner: {approval: true, lost_after_s: 5, llm_config: llm.yaml, "
+        "skills: [a.yaml, /b.yaml]}"
+    )
+    assert load_settings(None, None, False, {}, tmp_path).planner == PlannerSettings(
+        approval=True,
+        auto_plan=None,
+        lost_after_s=5.0,
+        llm_config=tmp_path / "llm.yaml",
+        skills=(tmp_path / "a.yaml", Path("/b.yaml")),
+    )
+
+
+def test_the_file_to_copy_is_right_with_every_comment_taken_away(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "configs" / "robotctl.yaml").read_text()
+    (tmp_path / "robotctl.yaml").write_text(
+        text.replace("# planner:", "planner:").replace("#  ", "")
+    )
+    told = load_settings(None, None, False, {}, tmp_path).planner
+    assert (told.approval, told.auto_plan, told.lost_after_s) == (True, True, 30.0)
+    assert told.llm_config == tmp_path / "planner.yaml"

@@ -1,0 +1,1 @@
+"""Plans outside the planner: as files, checked, compared."""

@@ -1,0 +1,104 @@
+"""A plan as a file that a person can read, edit and give back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import yaml
+
+from cli.errors import BadFile
+from cli.settings import one_line
+from keyexpr_schema.plans import Plan
+
+SUFFIXES = (".yaml", ".yml", ".json")
+
+
+def is_plan_file(name: str) -> bool:
+    """Whether `name` is meant as a file and not as a plan's id, which has neither of these."""
+    return "/" in name or name.endswith(SUFFIXES)
+
+
+def read_plan(path: Path) -> Plan:
+    """The plan in a YAML or JSON file, in the form of its payload; unknown fields are errors.
+
+    Raises:
+        BadFile: it cannot be read or is no plan; the message names the file and the place in it.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+        raise BadFile(f"{path} cannot be read: {reason}") from None
+    try:
+        # JSON is read as YAML, too: every JSON document is one.
+        data = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        kind = "JSON" if path.suffix == ".json" else "YAML"
+        raise BadFile(f"{path} is not {kind}: {one_line(error)}") from None
+    if not isinstance(data, dict):
+        raise BadFile(
+            f"{path} is not a plan: it must hold fields such as plan, goals, conditions, tasks"
+        )
+    try:
+        plan = msgspec.convert(data, Plan)
+    except msgspec.ValidationError as error:
+        raise BadFile(f"{path}: {_in_the_file(error)}") from None
+    _no_unknown_fields(path, data, plan)
+    return plan
+
+
+def check_suffix(path: Path) -> None:
+    """Raise `BadFile` unless the name says in which form the plan is written."""
+    if path.suffix not in SUFFIXES:
+        raise BadFile(f"{path}: a plan is written as {', '.join(SUFFIXES)}; choose one of these")
+
+
+def write_plan(path: Path, plan: Plan) -> None:
+    """Write `plan` as JSON if the name ends in .json, else as YAML; defaults are left out.
+
+    Raises:
+        BadFile: the name ends in neither .json nor .yaml.
+        OSError: it cannot be written.
+    """
+    check_suffix(path)
+    if path.suffix == ".json":
+        text = msgspec.json.format(msgspec.json.encode(plan), indent=2).decode() + "\n"
+    else:
+        text = yaml.dump(
+            msgspec.to_builtins(plan),
+            Dumper=_Dumper,
+            sort_keys=False,
+            allow_unicode=True,
+            default_flow_style=None,
+            width=100,
+        )
+    path.write_text(text, encoding="utf-8")
+
+
+class _Dumper(yaml.SafeDumper):
+    """YAML without anchors: what is said twice is written twice."""
+
+    def ignore_aliases(self, data: object) -> bool:
+        return True
+
+
+def _in_the_file(error: msgspec.ValidationError) -> str:
+    """`tasks[2].skill: Expected …` from msgspec's `Expected … - at `$.tasks[2].skill``."""
+    what, _, where = str(error).partition(" - at `$")
+    return f"{where.rstrip('`').lstrip('.')}: {what}" if where.strip("`") else what
+
+
+def _no_unknown_fields(path: Path, data: object, read: object, where: str = "") -> None:
+    """A field that a payload does not have is a slip of the pen in a file that a person writes."""
+    if isinstance(read, msgspec.Struct) and isinstance(data, dict):
+        names = [field.encode_name for field in msgspec.structs.fields(read)]
+        for name, value in data.items():
+            if name not in names:
+                raise BadFile(
+                    f"{path}: {where}{name}: there is no such field; valid are: {', '.join(names)}"
+                )
+            _no_unknown_fields(path, value, getattr(read, name), f"{where}{name}.")
+    elif isinstance(read, tuple) and isinstance(data, list):
+        for number, (value, each) in enumerate(zip(data, read, strict=True)):
+            _no_unknown_fields(path, value, each, f"{where.rstrip('.')}[{number}].")

@@ -1,0 +1,90 @@
+"""The world that a plan is checked against: as the fleet tells it, or out of files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cli.errors import BadArgument, check_known
+from cli.presence import robots_alive
+from cli.telling import parse_value
+from fleet.core.skills import SkillModel
+from fleet.core.world_model import WorldModel
+from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, ROBOT_SPEC
+from keyexpr_schema.robots import RobotSpec
+from keyexpr_schema.world import NOTHING, Fact
+
+if TYPE_CHECKING:
+    from keyexpr_schema.session import Session
+
+_CALL = re.compile(r"^\s*([\w.-]+)\s*\(\s*([\w.-]+)\s*\)\s*=\s*(\S+)\s*$")
+
+
+async def told_world(
+    session: Session, skills: Mapping[str, SkillModel], only_connected: bool
+) -> WorldModel:
+    """Places, objects, robots and facts of the key-space; every robot counts as connected unless
+    `only_connected`."""
+    return WorldModel.of(
+        skills,
+        (await session.list(PLACE)).values(),
+        (await session.list(OBJECT)).values(),
+        (await session.list(ROBOT_SPEC)).values(),
+        (await session.list(FACT)).values(),
+        available=await robots_alive(session) if only_connected else None,
+    )
+
+
+def world_of_files(
+    world: Path, robots: Iterable[Path], facts: Iterable[str], skills: Mapping[str, SkillModel]
+) -> WorldModel:
+    """Places and objects of a world file, robots of robot files, and only those facts.
+
+    What a hand holds is known to be nothing, unless a fact says otherwise.
+
+    Raises:
+        BadFile: a file is not what it should be.
+        BadArgument: a fact is not RELATION SUBJECT VALUE.
+        Unknown: a fact's subject is nothing that there is.
+    """
+    from sim.world_file import load_robot, load_world
+
+    told = load_world(world)
+    specs = [load_robot(file) for file in robots]
+    places = [place.place for place in told.places()]
+    names = [spec.robot for spec in specs]
+    known = [parse_fact(fact) for fact in facts]
+    for fact in known:
+        subjects = [*places, *names, *(thing.object for thing in told.objects())]
+        check_known("place, object or robot", fact.subject, subjects, "name it in a file")
+        if fact.relation == "at" and fact.value is not None:
+            check_known("place or robot", str(fact.value), [*places, *names], "name it in a file")
+    return WorldModel.of(
+        skills, told.places(), told.objects(), specs, [*_empty_hands(specs), *known]
+    )
+
+
+def _empty_hands(specs: Iterable[RobotSpec]) -> list[Fact]:
+    return [
+        Fact(subject=spec.robot, relation="holding", value=NOTHING, source="assumed")
+        for spec in specs
+        if "grip" in spec.capabilities
+    ]
+
+
+def parse_fact(written: str) -> Fact:
+    """`at cup_1 kitchen` or `at(cup_1) = kitchen`.
+
+    Raises:
+        BadArgument: it is neither.
+    """
+    call = _CALL.match(written)
+    words = list(call.groups()) if call else written.split()
+    if len(words) != 3:
+        raise BadArgument(
+            f"a fact is RELATION SUBJECT VALUE, such as 'at cup_1 kitchen'; got {written!r}"
+        )
+    relation, subject, value = words
+    return Fact(subject=subject, relation=relation, value=parse_value(value), source="person")

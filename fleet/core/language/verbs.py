@@ -103,7 +103,7 @@ PARTICIPLES = _forms_of("participle")
 """What may follow "should be": "brought"."""
 PARTICLES = frozenset({"back", "away", "up", "over", "down", "off"})
 """What may stand behind the thing that a verb is about: "pick it up", "put it back"."""
-EXAMPLE = 'say it like "bring the first cup to the hallway" or "send the robot to the kitchen"'
+EXAMPLE = 'say it like "bring the first cup to the hallway" or "send a robot to the kitchen"'
 _ALL_SORTS: tuple[Sort, ...] = ("object", "robot", "place", "surface")
 
 

@@ -1,0 +1,155 @@
+"""Laws of reading sentences: total, blind to case and politeness, and nothing is dropped."""
+
+from __future__ import annotations
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fleet.core.language import Reading, Vocabulary, read_goal, statement_facts
+from fleet.core.language.tokens import words_in
+from fleet.errors import NotUnderstood
+from keyexpr_schema.world import Object, Place
+from tests.household import carrier, manipulator
+from tests.language_house import WORDS, shown
+
+KNOWN = {*WORDS.places, *WORDS.objects, *WORDS.robots}
+COMMON_WORDS = words_in(
+    "bring take put find search pick up go send give tidy the a all both one two first second "
+    "cup cups book kitchen hallway table hsr locobot robot basket it them there to in on from "
+    "and then or , . ? ' of should be is are not if everything other back home please 's make "
+    "sure"
+)
+SOUP = st.lists(st.sampled_from(COMMON_WORDS), max_size=14).map(" ".join)
+SENTENCES = (
+    "Bring the first cup to the hallway and the second cup to the living room",
+    "Find a cup and bring it to the hallway, then search the kitchen",
+    "Put cups 1 and 2 in the locobot's basket",
+    "Go to the kitchen, pick up the red book and put it on the table in the hallway",
+    "Send the hsr to the kitchen and a robot to the hallway",
+    "Make sure that the book is in the kitchen",
+    "Search every room for the book and tidy up the kitchen",
+    "The first cup should be in the hallway and the second one in the kitchen",
+    "Bring all cups to the hallway and then to the kitchen",
+)
+UNREADABLE = ("zorgle", "not", "never", "if", "unless", "except", "carefully", "tomorrow", "almost")
+NONSENSE = words_in("blick dax wug fep toma modi koba lorp zav nemi rul pim gazzer teeb")
+
+
+def known_names_only(reading: Reading) -> None:
+    assert reading.stages
+    for stage in reading.stages:
+        assert stage
+        for condition in stage:
+            assert condition.subject in KNOWN
+            assert set(condition.any_of) <= KNOWN
+            assert condition.value is True or condition.value in KNOWN
+
+
+@settings(max_examples=400, deadline=None)
+@given(st.one_of(st.text(max_size=60), SOUP))
+def test_any_text_is_read_or_refused(text: str) -> None:
+    try:
+        known_names_only(read_goal(text, WORDS))
+    except NotUnderstood as refused:
+        assert str(refused)
+        assert "\n" not in str(refused)
+
+
+@settings(max_examples=400, deadline=None)
+@given(st.one_of(st.text(max_size=60), SOUP))
+def test_any_statement_is_read_or_refused(text: str) -> None:
+    try:
+        facts = statement_facts(text, WORDS)
+    except NotUnderstood as refused:
+        assert str(refused)
+        assert "\n" not in str(refused)
+    else:
+        assert facts
+        assert {subject for _, subject, _ in facts} <= KNOWN
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.sampled_from(SENTENCES), st.sampled_from(UNREADABLE), st.data())
+def test_no_word_is_dropped(text: str, extra: str, data: st.DataObject) -> None:
+    """A word that the grammar does not know makes a sentence unreadable, wherever it stands."""
+    words = text.split()
+    at = data.draw(st.integers(0, len(words)))
+    changed = " ".join([*words[:at], extra, *words[at:]])
+    try:
+        reading = read_goal(changed, WORDS)
+    except NotUnderstood:
+        return
+    raise AssertionError(f"{changed!r} was read as {shown(reading)}")
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.sampled_from(SENTENCES),
+    st.sampled_from(
+        ["{}", "Please {}", "{}, please.", "Could you {}?", "  {}  !", "Hey, {}. Thanks"]
+    ),
+    st.sampled_from([str, str.lower, str.upper, str.swapcase, str.title]),
+    st.sampled_from([" ", "  ", "\t", "\n", "\u00a0"]),
+)
+def test_case_space_and_politeness_change_nothing(
+    text: str, polite: str, case: object, space: str
+) -> None:
+    declarative = text.startswith(("The", "Make"))
+    wrapped = text if declarative and "Could" in polite else polite.format(text)
+    said = case(wrapped).replace(" ", space) if callable(case) else wrapped
+    assert read_goal(said, WORDS).stages == read_goal(text, WORDS).stages
+
+
+@st.composite
+def vocabularies(draw: st.DrawFn) -> Vocabulary:
+    """Places, and objects of a few kinds, all with made-up names."""
+    names = draw(st.permutations(NONSENSE))
+    places = names[: draw(st.integers(2, 4))]
+    kinds = names[4 : 4 + draw(st.integers(1, 4))]
+    joint = draw(st.sampled_from(["_", "-", ""]))
+    objects = [
+        Object(object=f"{kind}{joint}{n}", kind=kind, label=f"the {kind} {n}", ordinal=n)
+        for kind in kinds
+        for n in range(1, draw(st.integers(1, 4)) + 1)
+    ]
+    return Vocabulary(
+        {name: Place(place=name, label=f"The {name.title()}") for name in places},
+        {thing.object: thing for thing in objects},
+        {"hsr": manipulator(), "locobot": carrier()},
+    )
+
+
+@settings(max_examples=200, deadline=None)
+@given(vocabularies(), st.data())
+def test_what_is_meant_is_read(words: Vocabulary, data: st.DataObject) -> None:
+    """Sentences made from conditions are read as those conditions."""
+    things = data.draw(
+        st.lists(st.sampled_from(sorted(words.objects)), min_size=1, max_size=4, unique=True)
+    )
+    clauses, expected = [], []
+    for name in things:
+        thing, place = words.objects[name], data.draw(st.sampled_from(sorted(words.places)))
+        ordinal = ["first", "2nd", "third", "fourth"][thing.ordinal - 1]
+        called = data.draw(
+            st.sampled_from(
+                [name, thing.label, f"the {ordinal} {thing.kind}", f"{thing.kind} #{thing.ordinal}"]
+            )
+        )
+        clause, condition = data.draw(
+            st.sampled_from(
+                [
+                    (f"bring {called} to the {place}", f"at({name}) = {place}"),
+                    (f"put {called} in {place}", f"at({name}) = {place}"),
+                    (f"{called} should be at the {place}", f"at({name}) = {place}"),
+                    (f"find {called}", f"located({name})"),
+                    (f"pick {called} up", f"held({name})"),
+                    (f"give {called} to the locobot", f"at({name}) = locobot"),
+                ]
+            )
+        )
+        clauses.append(clause)
+        expected.append(condition)
+    joint, between = data.draw(
+        st.sampled_from([(". ", "; "), (", then ", " > "), (" and then ", " > "), ("; ", "; ")])
+    )
+    assert shown(read_goal(joint.join(clauses), words)) == between.join(expected)

@@ -1,0 +1,1 @@
+"""Measurements: of missions, of the planner, of the key-space."""

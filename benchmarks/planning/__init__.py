@@ -1,0 +1,1 @@
+"""A suite of household missions that judges whole planners by what came to be in the world."""

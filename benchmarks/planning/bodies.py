@@ -1,0 +1,77 @@
+"""One kinematic world for several robots' skills, in one process: embodiments without a network."""
+
+from __future__ import annotations
+
+import asyncio
+
+from keyexpr_schema.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
+from sim.kinematic import KinematicBackend
+
+
+class SharedWorld:
+    """The backend, who waits for it, and every look that anybody took."""
+
+    def __init__(self, backend: KinematicBackend) -> None:
+        self.backend = backend
+        self.looks: list[tuple[str, float, float, str]] = []
+        """Place, x [m], y [m], and the robot that looked."""
+        self._waiting: dict[str, asyncio.Future[MotionOutcome]] = {}
+
+    def go_on(self) -> float | None:
+        """To the world's next event; the seconds that took, or `None` while nothing moves."""
+        if not self._waiting:
+            return None
+        before_s = self.backend.time_s
+        self.backend.advance()
+        for robot, waiting in list(self._waiting.items()):
+            outcome = self.backend.outcome(robot)
+            assert outcome is not None
+            if outcome.state is not MotionState.RUNNING:
+                del self._waiting[robot]
+                if not waiting.done():
+                    waiting.set_result(outcome)
+        return self.backend.time_s - before_s
+
+    async def perform(self, robot: str, motion: Motion) -> MotionOutcome:
+        """One motion, to its end."""
+        self.backend.begin(robot, motion)
+        outcome = self.backend.outcome(robot)
+        assert outcome is not None
+        if outcome.state is MotionState.RUNNING:
+            waiting = asyncio.get_running_loop().create_future()
+            self._waiting[robot] = waiting
+            try:
+                outcome = await waiting
+            except asyncio.CancelledError:
+                self._waiting.pop(robot, None)
+                self.backend.stop(robot)
+                raise
+        if motion.kind is MotionKind.LOOK and outcome.state is MotionState.SUCCEEDED:
+            senses = outcome.senses
+            if senses.place is not None:
+                self.looks.append((senses.place, *senses.pose_m_rad[:2], robot))
+        return outcome
+
+
+class KinematicBody:
+    """`workers.embodiment.Embodiment` for one robot of a shared world."""
+
+    def __init__(self, world: SharedWorld, robot: str) -> None:
+        self.robot = robot
+        self._world = world
+
+    async def perform(self, motion: Motion) -> MotionOutcome:
+        """Carry out `motion`; returns when it has ended."""
+        return await self._world.perform(self.robot, motion)
+
+    async def senses(self) -> Senses:
+        """What the robot knows of itself."""
+        return self._world.backend.senses(self.robot)
+
+    async def stop(self) -> None:
+        """Bring the robot to rest."""
+        self._world.backend.stop(self.robot)
+
+    def now_s(self) -> float:
+        """Simulated seconds."""
+        return self._world.backend.time_s

@@ -1,0 +1,294 @@
+"""One mission, run: the planner's core and desk, robots with real skills, a kinematic world."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import deque
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from benchmarks.planning.bodies import KinematicBody, SharedWorld
+from benchmarks.planning.missions import Mission
+from benchmarks.planning.robots import INCARNATION, Robot
+from benchmarks.planning.simulated_time import SimulatedLoop, Stuck
+from benchmarks.planning.truth import Witness
+from fleet.core import events
+from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract
+from fleet.core.events import Event
+from fleet.core.state import Policy, State
+from fleet.core.step import step
+from fleet.planners.llm import LlmInterpreter
+from fleet.service.composition import Composition
+from fleet.service.planning_desk import carry_out
+from keyexpr_schema.goals import ENDED_GOALS, Goal
+from keyexpr_schema.keyspace import FACT, OBJECT, ORDER, PLACE, ROBOT_SPEC, ROBOT_STATE
+from keyexpr_schema.plans import ENDED_PLANS
+from keyexpr_schema.requests import PlanRequest
+from keyexpr_schema.robots import RobotActivity, RobotAddress, RobotState
+from keyexpr_schema.tasks import FINAL_REPORTS, Report, ReportState
+from keyexpr_schema.watch import Change
+from keyexpr_schema.world import Fact, FactAddress, ObjectAddress, PlaceAddress, Statement
+from sim.kinematic import KinematicBackend
+from workers.skill import SkillRegistry
+from workers.skills.household import HOUSEHOLD
+from workers.worldview import WorldView
+
+SEED = 7
+MOST_SIMULATED_S = 7200.0
+MOST_REVISIONS = 60
+
+
+@dataclass
+class Counts:
+    """What a mission took. `planning_s` is wall time, over all revisions."""
+
+    tasks: int = 0
+    failed_tasks: int = 0
+    revisions: int = 0
+    rounds: int = 0
+    tokens: int = 0
+    fallbacks: int = 0
+    planning_s: float = 0.0
+    reasons: list[str] = field(default_factory=list)
+    """Why plans were not made, and why tasks failed."""
+
+
+class FleetRun:
+    """Planner and robots of one mission. Use: construct, then `await run()` on the loop."""
+
+    def __init__(
+        self,
+        mission: Mission,
+        parts: Composition,
+        planner: str,
+        strategy: str,
+        loop: SimulatedLoop,
+        interpreter: LlmInterpreter | None = None,
+    ) -> None:
+        self.mission = mission
+        self.state = State()
+        self.counts = Counts()
+        self.stage = 0
+        """How many of the mission's stages have held, in their order."""
+        self._parts, self._planner, self._strategy = parts, planner, strategy
+        self._interpreter = interpreter
+        self.backend = KinematicBackend(mission.real_world(), mission.robots, seed=SEED)
+        self.shared = SharedWorld(self.backend)
+        self._ended: asyncio.Future[None] = loop.create_future()
+        loop.drive(self._go_on, lambda: self._fail(Stuck("everybody waits for somebody else")))
+        self._places = {place.place: place for place in mission.world.places()}
+        self._view = WorldView()
+        registry = SkillRegistry(HOUSEHOLD)
+        self._robots = {
+            spec.robot: Robot(
+                spec, KinematicBody(self.shared, spec.robot), self._view, registry, self._hear
+            )
+            for spec, _ in mission.robots
+        }
+        self._news: deque[Event] = deque()
+        self._busy = False
+
+    async def run(self) -> str | None:
+        """Carry the mission out until nothing more happens; what went wrong with that, or `None`.
+
+        What goes wrong with goals is in the state's goal and plan statuses.
+        """
+        self._introduce()
+        for robot in self._robots.values():
+            await robot.introduce_itself()
+        self._tell_beliefs()
+        working = [asyncio.ensure_future(robot.work()) for robot in self._robots.values()]
+        for number, text in enumerate(self.mission.entry.goals, 1):
+            self._tell(events.GoalTold, goal=Goal(goal=f"goal_{number}", text=text, ordinal=number))
+        request = PlanRequest(request="r1", planner=self._planner, strategy=self._strategy)
+        self._tell(events.PlanAsked, request=request)
+        self._note_stage()
+        wrong: str | None = None
+        try:
+            if not self._done():
+                await self._ended
+        except (Stuck, TimeoutError) as error:
+            wrong = str(error)
+        for task in working:
+            task.cancel()
+        with suppress(asyncio.CancelledError):
+            await asyncio.gather(*working)
+        for book in self.state.plans.values():
+            if book.reason:
+                self.counts.reasons.append(book.reason)
+        return wrong
+
+    def witness(self) -> Witness:
+        """What is really so now."""
+        see_m = {spec.robot: spec.capabilities.get("see", 0.0) for spec, _ in self.mission.robots}
+        return Witness(
+            objects={truth.object: truth for truth in self.backend.truths()},
+            robots={robot: self.backend.senses(robot) for robot in self.backend.robots},
+            places=self._places,
+            believed={
+                fact.subject: fact.value
+                for fact in self.state.facts.values()
+                if fact.relation == "at"
+            },
+            looks=[(place, x, y, see_m[robot]) for place, x, y, robot in self.shared.looks],
+        )
+
+    def refusals(self) -> list[str]:
+        """What the fleet says of goals that it did not reach, and of requests it refused."""
+        said = [
+            f"{status.goal}: {status.reason}"
+            for status in self.state.goal_states.values()
+            if status.reason
+        ]
+        said += [a.sentence for a in self.state.answers.values() if not a.accepted]
+        said += [b.reason for b in self.state.plans.values() if b.reason]
+        return list(dict.fromkeys(said))
+
+    # --- the world goes on -----------------------------------------------------------------------
+
+    def _go_on(self) -> float | None:
+        went_s = self.shared.go_on()
+        if went_s is not None:
+            self._show_robots()
+            self._note_stage()
+            if self.backend.time_s > MOST_SIMULATED_S:
+                self._fail(TimeoutError(f"not done after {MOST_SIMULATED_S:g} simulated seconds"))
+        return went_s
+
+    def _note_stage(self) -> None:
+        stages, witness = self.mission.stages, self.witness()
+        while self.stage < len(stages) and all(witness.sees(t) for t in stages[self.stage]):
+            self.stage += 1
+
+    def _fail(self, error: Exception) -> None:
+        if not self._ended.done():
+            self._ended.set_exception(error)
+
+    def _show_robots(self) -> None:
+        for name in self._robots:
+            senses = self.backend.senses(name)
+            state = RobotState(
+                robot=name,
+                incarnation=INCARNATION,
+                activity=RobotActivity.IDLE,
+                pose_m_rad=senses.pose_m_rad,
+                place=senses.place,
+                holding=senses.holding,
+                basket=senses.basket,
+                time_s=senses.time_s,
+            )
+            if self._view.robots.get(name) != state:
+                self._view.apply(Change(ROBOT_STATE, RobotAddress(name), state, ""))
+
+    # --- what the planner hears ------------------------------------------------------------------
+
+    def _introduce(self) -> None:
+        policy = Policy(interpreter=self._interpreter is not None)
+        self._tell(events.PlannerStarted, epoch=1, incarnation=INCARNATION, policy=policy)
+        for place in self._places.values():
+            self._view.apply(Change(PLACE, PlaceAddress(place.place), place, ""))
+            self._tell(events.PlaceTold, place=place)
+        for thing in self.mission.world.objects():
+            self._view.apply(Change(OBJECT, ObjectAddress(thing.object), thing, ""))
+            self._tell(events.ObjectTold, object=thing)
+        for spec, _ in self.mission.robots:
+            self._view.apply(Change(ROBOT_SPEC, RobotAddress(spec.robot), spec, ""))
+            self._tell(events.RobotTold, spec=spec)
+            self._tell(events.RobotSeen, robot=spec.robot, incarnation=INCARNATION)
+        self._show_robots()
+
+    def _tell_beliefs(self) -> None:
+        for thing, place in self.mission.told().items():
+            self._learn(Fact(subject=thing, relation="at", value=place, source="person"))
+        for number, text in enumerate(self.mission.entry.statements, 1):
+            self._tell(
+                events.StatementTold, statement=Statement(statement=f"said_{number}", text=text)
+            )
+
+    def _hear(self, facts: tuple[Fact, ...], report: Report | None) -> None:
+        for fact in facts:
+            self._learn(fact)
+        if report is None:
+            return
+        if report.state is ReportState.STARTED:
+            self.counts.tasks += 1
+        elif report.state in FINAL_REPORTS and report.state is not ReportState.SUCCEEDED:
+            self.counts.failed_tasks += 1
+            self.counts.reasons.append(f"{report.task} {report.state.value}: {report.reason}")
+        self._tell(events.ReportTold, report=report)
+        if self._done() and not self._ended.done():
+            self._ended.set_result(None)
+
+    def _learn(self, fact: Fact) -> None:
+        self._view.apply(Change(FACT, FactAddress(fact.subject, fact.relation), fact, ""))
+        self._tell(events.FactTold, fact=fact)
+
+    def _done(self) -> bool:
+        """Whether nothing more will happen by itself."""
+        books = self.state.plans.values()
+        return all(book.ended or book.state in ENDED_PLANS for book in books) and not any(
+            book.outstanding() for book in books
+        )
+
+    def goals_ended(self) -> bool:
+        """Whether every goal has come to an end, good or bad."""
+        return all(s.state in ENDED_GOALS for s in self.state.goal_states.values())
+
+    def _tell(self, kind: type[Event], **fields: Any) -> None:
+        """One event into the core; what it causes follows, until there is nothing left to do."""
+        self._news.append(kind(**self._at(), **fields))
+        if self._busy:
+            return
+        self._busy = True
+        while self._news:
+            before = self.state
+            self.state, effects = step(before, self._news.popleft(), self._parts.skills)
+            # All of a step's effects hold together: what ends makes room for what begins.
+            for effect in sorted(effects, key=lambda e: not isinstance(e, Retract)):
+                self._carry_out(effect)
+        self._busy = False
+
+    def _at(self) -> dict[str, float]:
+        return {"time_s": self.backend.time_s, "wall_time_s": self.backend.time_s}
+
+    def _carry_out(self, effect: Effect) -> None:
+        if isinstance(effect, MakePlan):
+            self._plan(effect)
+        elif isinstance(effect, Interpret):
+            self._interpret(effect)
+        elif isinstance(effect, Retract) and effect.key is ORDER:
+            address: Any = effect.address
+            self._robots[address.robot].withdraw(address.plan, address.task)
+        elif isinstance(effect, Publish) and effect.key is ORDER:
+            payload: Any = effect.payload
+            self._robots[payload.robot].order(payload)
+        elif isinstance(effect, Publish) and effect.key is FACT:
+            self._view.apply(Change(FACT, effect.address, effect.payload, ""))
+
+    def _plan(self, effect: MakePlan) -> None:
+        """The simulated clock stands still meanwhile: what planning takes is counted by itself."""
+        if self.counts.revisions >= MOST_REVISIONS:
+            self._fail(TimeoutError(f"not done after {MOST_REVISIONS} revisions"))
+            return
+        began_s = time.perf_counter()
+        made = carry_out(effect.job, self.state, self._parts, self._at())
+        self.counts.planning_s += time.perf_counter() - began_s
+        self.counts.revisions += 1
+        if isinstance(made, events.PlanMade):
+            making = made.plan.making
+            self.counts.rounds += making.rounds
+            self.counts.tokens += making.tokens_in + making.tokens_out
+            self.counts.fallbacks += making.fallback is not None
+        else:
+            self.counts.reasons.append(made.reason)
+        self._news.append(made)
+
+    def _interpret(self, effect: Interpret) -> None:
+        assert self._interpreter is not None
+        began_s = time.perf_counter()
+        read = self._interpreter.interpret(effect.text, self.state.vocabulary())
+        self.counts.planning_s += time.perf_counter() - began_s
+        told: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
+        self._news.append(events.GoalInterpreted(**self._at(), goal=effect.goal, **told))

@@ -1,0 +1,164 @@
+"""Reads missions: a world, what the planner is told of it, sentences, and what must come true."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+from msgspec.structs import replace
+
+from benchmarks.planning.truth import Truth, parse_truth
+from keyexpr_schema.robots import PoseMRad, RobotSpec
+from sim.errors import BadFile
+from sim.world_file import load_robot, load_world
+from sim.world_model import WorldFile
+from sim.yaml_file import Entry, read_yaml
+
+HERE = Path(__file__).parent
+CLASSES = ("simple", "compound", "complex", "vague")
+Expected = Literal["done", "refused", "given-up"]
+"""`refused`: nothing may be done; `given-up`: tried in vain. Both want a sentence that says why."""
+
+
+class MissionEntry(Entry, frozen=True):
+    """One mission as it is written down.
+
+    The planner is told where every object is, but for those in `unknown`, and with what `wrong`
+    says of some. `lies` puts objects elsewhere: `[table or floor, x_m, y_m]`. Objects in `missing`
+    are spoken of and exist nowhere. `truth` must hold at the end, `stages` one after the other
+    on the way there. What `truth` and `stages` do not name must not have been moved.
+    """
+
+    mission: str
+    setting: str
+    robots: tuple[str, ...]
+    goals: tuple[str, ...]
+    lies: dict[str, tuple[str, float, float]] = {}
+    missing: tuple[str, ...] = ()
+    unknown: tuple[str, ...] = ()
+    wrong: dict[str, str] = {}
+    statements: tuple[str, ...] = ()
+    truth: tuple[str, ...] = ()
+    stages: tuple[tuple[str, ...], ...] = ()
+    expect: Expected = "done"
+
+
+class _File(Entry, frozen=True):
+    missions: tuple[MissionEntry, ...]
+
+
+class _RobotEntry(Entry, frozen=True):
+    spec: str
+    at_m: tuple[float, float]
+
+
+class _Setting(Entry, frozen=True):
+    world: str
+    robots: dict[str, _RobotEntry]
+
+
+class _Settings(Entry, frozen=True):
+    settings: dict[str, _Setting]
+
+
+class Mission(msgspec.Struct, frozen=True, kw_only=True):
+    """A mission, ready to be run; `world` holds every object that anybody speaks of."""
+
+    entry: MissionEntry
+    kind: str
+    world: WorldFile
+    robots: tuple[tuple[RobotSpec, PoseMRad], ...]
+    truth: tuple[Truth, ...]
+    stages: tuple[tuple[Truth, ...], ...]
+
+    @property
+    def name(self) -> str:
+        """The mission's id."""
+        return self.entry.mission
+
+    def real_world(self) -> WorldFile:
+        """The world without what only exists in sentences."""
+        there = {
+            name: entry
+            for name, entry in self.world.object_entries.items()
+            if name not in self.entry.missing
+        }
+        return replace(self.world, object_entries=there)
+
+    def start_of(self, thing: str) -> str | None:
+        """The place in which an object lies at the start."""
+        return self.world.place_at(*self.world.start_point_m(thing)[:2])
+
+    def told(self) -> dict[str, str]:
+        """Where the planner is told that objects are."""
+        known = {
+            thing: self.entry.wrong.get(thing) or self.start_of(thing)
+            for thing in self.world.object_entries
+            if thing not in self.entry.unknown and thing not in self.entry.missing
+        }
+        return {thing: place for thing, place in known.items() if place is not None}
+
+
+def load_missions(only: str | None = None) -> tuple[Mission, ...]:
+    """All missions (of one class), in the order of the files.
+
+    Raises:
+        BadFile: one sentence that names the file and what is wrong in it.
+    """
+    return tuple(
+        _mission(entry, kind, path)
+        for kind in CLASSES
+        if only in (None, kind)
+        for path in [HERE / "missions" / f"{kind}.yaml"]
+        for entry in read_yaml(path, _File, "file of missions").missions
+    )
+
+
+@cache
+def _setting(name: str) -> tuple[WorldFile, dict[str, tuple[RobotSpec, PoseMRad]]]:
+    path = HERE / "settings" / "settings.yaml"
+    settings = read_yaml(path, _Settings, "file of settings").settings
+    if name not in settings:
+        raise BadFile(f"{path}: there is no setting {name!r}; there are {', '.join(settings)}")
+    found = settings[name]
+    robots = {
+        robot: (
+            replace(load_robot(path.parent / entry.spec), robot=robot),
+            (*entry.at_m, math.pi / 2),
+        )
+        for robot, entry in found.robots.items()
+    }
+    return load_world(path.parent / found.world), robots
+
+
+def _mission(entry: MissionEntry, kind: str, path: Path) -> Mission:
+    world, robots = _setting(entry.setting)
+    where = f"{path}: {entry.mission}"
+    objects = dict(world.object_entries)
+    for name in (*entry.lies, *entry.missing, *entry.unknown, *entry.wrong):
+        if name not in objects:
+            raise BadFile(f"{where}: there is no object {name!r}; there are {', '.join(objects)}")
+    for thing, (table, x_m, y_m) in entry.lies.items():
+        if table != "floor" and table not in world.furniture:
+            raise BadFile(f"{where}: there is no table {table!r}")
+        objects[thing] = replace(objects[thing], on=table, at_m=(x_m, y_m))
+    for robot in entry.robots:
+        if robot not in robots:
+            raise BadFile(f"{where}: there is no robot {robot!r}; there are {', '.join(robots)}")
+    names = (*objects, *world.place_entries, *entry.robots)
+    made = Mission(
+        entry=entry,
+        kind=kind,
+        world=replace(world, object_entries=objects),
+        robots=tuple(robots[robot] for robot in entry.robots),
+        truth=tuple(parse_truth(text, names, where) for text in entry.truth),
+        stages=tuple(
+            tuple(parse_truth(text, names, where) for text in stage) for stage in entry.stages
+        ),
+    )
+    if entry.expect == "done" and not made.truth:
+        raise BadFile(f"{where}: it must say what is true at the end (`truth`)")
+    return made

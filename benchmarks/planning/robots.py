@@ -1,0 +1,121 @@
+"""Robots that take orders: the real skills and the real retry machine, without keys or journals."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from msgspec.structs import replace
+
+from keyexpr_schema.robots import RobotSpec
+from keyexpr_schema.tasks import Order, Report, ReportState
+from keyexpr_schema.world import Fact
+from workers.context import SkillContext
+from workers.embodiment import Embodiment
+from workers.errors import BadArguments, UnknownSkill
+from workers.recovery import make_safe, self_knowledge
+from workers.reports import report_on
+from workers.retry import run_attempt
+from workers.skill import SkillRegistry
+from workers.worldview import WorldView
+
+INCARNATION = "benchmark"
+Say = Callable[[tuple[Fact, ...], Report | None], None]
+"""Hears facts, and the report that they belong to."""
+
+
+class Robot:
+    """Carries out one order after the other; what `workers.runtime.Worker` does over Zenoh."""
+
+    def __init__(
+        self,
+        spec: RobotSpec,
+        body: Embodiment,
+        world: WorldView,
+        registry: SkillRegistry,
+        say: Say,
+    ) -> None:
+        self.spec = spec
+        self._body = body
+        self._world = world
+        self._registry = registry
+        self._say = say
+        self._orders: asyncio.Queue[tuple[str, str, int]] = asyncio.Queue()
+        self._standing: dict[tuple[str, str, int], Order] = {}
+        self._current: tuple[str, str, int] | None = None
+        self._cancelled = asyncio.Event()
+
+    async def introduce_itself(self) -> None:
+        """Say where the robot is and what it holds."""
+        ctx = SkillContext(self.spec, self._body, self._world)
+        await self_knowledge(ctx)
+        self._say(ctx.learned, None)
+
+    def order(self, order: Order) -> None:
+        """Take an order, or the cancellation of one."""
+        name = (order.plan, order.task, order.attempt)
+        if order.cancelled and name == self._current:
+            self._cancelled.set()
+            return
+        if name not in self._standing:
+            self._orders.put_nowait(name)
+        self._standing[name] = order
+
+    def withdraw(self, plan: str, task: str) -> None:
+        """An order is no longer there: do not begin it."""
+        for name in [name for name in self._standing if name[:2] == (plan, task)]:
+            if name != self._current:
+                self._standing[name] = _cancelled(self._standing[name])
+
+    async def work(self) -> None:
+        """Carry out orders for ever."""
+        while True:
+            name = await self._orders.get()
+            order = self._standing[name]
+            if order.cancelled:
+                self._say((), report_on(order, INCARNATION, ReportState.CANCELLED))
+                continue
+            self._current = name
+            self._cancelled.clear()
+            await self._carry_out(order)
+            self._current = None
+
+    async def _carry_out(self, order: Order) -> None:
+        try:
+            skill = self._registry.get(order.skill, self.spec.skills)
+            arguments = skill.bind(order.args, self.spec.robot, self._world)
+        except (UnknownSkill, BadArguments) as error:
+            refusal = report_on(
+                order, INCARNATION, ReportState.REFUSED, reason=str(error), retryable=False
+            )
+            self._say((), refusal)
+            return
+        ctx = SkillContext(self.spec, self._body, self._world)
+        started_s = self._body.now_s()
+        started = report_on(order, INCARNATION, ReportState.STARTED, started_s=started_s)
+        self._say((), started)
+        ended = await run_attempt(
+            order.skill,
+            lambda: skill(ctx, **arguments),
+            now_s=self._body.now_s,
+            make_safe=lambda: make_safe(self._body),
+            deadline_s=order.deadline_s,
+            cancelled=self._cancelled,
+            on_failure=ctx.taught,
+        )
+        report = report_on(
+            order,
+            INCARNATION,
+            ended.state,
+            tries=ended.tries,
+            facts=ctx.learned,
+            reason=ended.reason,
+            retryable=ended.retryable,
+            started_s=ended.started_s,
+            ended_s=ended.ended_s,
+        )
+        self._say(ctx.learned, report)
+
+
+def _cancelled(order: Order) -> Order:
+    return replace(order, cancelled=True)

@@ -1,0 +1,71 @@
+"""An asyncio loop that waits for nothing: simulated time passes when nobody has anything to do.
+
+Where a loop would sleep in the operating system, this one lets the world go on to its next event,
+or, while nothing moves, jumps to its next timer. So missions of minutes take milliseconds, always
+in the same order, with the very coroutines that drive real robots.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import selectors
+from collections.abc import Callable
+from typing import Any
+
+SPEED = 1000.0
+"""Simulated seconds that pass while the loop's own clock goes on by one second."""
+
+
+class Stuck(Exception):
+    """Everybody waits for somebody else: no motion runs and no timer is set."""
+
+
+class _Selector(selectors.DefaultSelector):
+    """Sleeps by letting the world go on."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.now_s = 0.0
+        self.go_on: Callable[[], float | None] = lambda: None
+        """Lets the world reach its next event; how long that took [s], or `None`: nothing moves."""
+        self.stuck: Callable[[], None] = lambda: None
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        ready = super().select(0)
+        if ready or (timeout is not None and timeout <= 0):
+            return ready
+        went_s = self.go_on()
+        if went_s is not None:
+            self.now_s += went_s / SPEED
+        elif timeout is not None:
+            self.now_s += timeout
+        else:
+            self.stuck()
+        return []
+
+
+class SimulatedLoop(asyncio.SelectorEventLoop):
+    """A loop whose clock stands still but for what the world and its own timers take."""
+
+    def __init__(self) -> None:
+        self._sleeper = _Selector()
+        super().__init__(self._sleeper)
+
+    def time(self) -> float:
+        """Seconds on the loop's own clock."""
+        return self._sleeper.now_s
+
+    def drive(self, go_on: Callable[[], float | None], stuck: Callable[[], None]) -> None:
+        """Use this world; `stuck` is called when nothing will ever happen again.
+
+        `go_on` takes the world to its next event and says how many simulated seconds that took,
+        or `None` where nothing moves.
+        """
+        self._sleeper.go_on, self._sleeper.stuck = go_on, stuck
+
+
+def run(main: Callable[[SimulatedLoop], Any]) -> Any:
+    """The result of a coroutine function that is given the loop it runs on."""
+    loop = SimulatedLoop()
+    with asyncio.Runner(loop_factory=lambda: loop) as runner:
+        return runner.run(main(loop))

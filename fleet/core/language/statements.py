@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fleet.core.language.clauses import Clauses
+from fleet.core.language.claims import Claims
 from fleet.core.language.locations import PLACES, SPOTS
-from fleet.core.language.refusals import one_of
 from fleet.core.language.statement_words import (
     CARRYING,
     HOLDING,
@@ -27,7 +26,7 @@ from fleet.core.language.verbs import verb_next
 from fleet.core.language.vocabulary import Vocabulary
 from fleet.core.language.wordlists import ANYWHERE, LOCATED, STANDING, phrases
 from fleet.errors import NotUnderstood
-from keyexpr_schema.world import NOTHING, Value
+from keyexpr_schema.world import Value
 
 FactRow = tuple[str, str, Value]
 _EXAMPLE = 'say it like "the first cup is in the kitchen" or "nobody knows where the book is"'
@@ -42,12 +41,8 @@ def statement_facts(text: str, words: Vocabulary) -> tuple[FactRow, ...]:
     return _Statements(text, words).read()
 
 
-class _Statements(Clauses):
-    """Joins statements, and collects their facts."""
-
-    def __init__(self, text: str, words: Vocabulary) -> None:
-        super().__init__(text, words)
-        self.facts: dict[tuple[str, str], Value] = {}
+class _Statements(Claims):
+    """Joins statements, and tells them apart."""
 
     def read(self) -> tuple[FactRow, ...]:
         cursor = self.cursor
@@ -83,28 +78,20 @@ class _Statements(Clauses):
                     return must
                 cursor.at += len(opener)
 
-    def _fact(self, relation: str, subject: str, value: Value) -> None:
-        before = self.facts.setdefault((relation, subject), value)
-        if before != value:
-            shown = ["nobody knows where" if v is None else str(v) for v in (before, value)]
-            raise NotUnderstood(
-                f"it says two things of {relation}({subject}): {' and '.join(shown)}"
-            )
-
     def _statement(self) -> None:
         cursor, start = self.cursor, self.cursor.at
         if cursor.take_of(NOBODY_KNOWS):
             things = self._things()
             cursor.take_word(("is", "are"))
-            return self._unknown(things)
+            return self.lost(things)
         if cursor.take_of(WHEREABOUTS):
             things = self._things()
             if cursor.take_word(("is", "are")) and cursor.take_of(UNKNOWN):
-                return self._unknown(things)
+                return self.lost(things)
             raise self._unread()
         if cursor.take_of(NOBODY):
             if (cursor.take("has") or cursor.take("have")) and cursor.take_of(SEARCHED):
-                return self._searched(self.places(), False)
+                return self.looked_around(self.places(), False)
             cursor.at = start
             raise self._unread()
         if cursor.take("there"):
@@ -113,9 +100,9 @@ class _Statements(Clauses):
             return self._at(self._things())
         if cursor.take_of(PEOPLE):
             if cursor.take("have") | bool(cursor.take("already")) and cursor.take_of(SEARCHED):
-                return self._searched(self.places(), True)
+                return self.looked_around(self.places(), True)
             if cursor.take_of(SEARCHED):
-                return self._searched(self.places(), True)
+                return self.looked_around(self.places(), True)
             if cursor.take_of(PUT):
                 return self._at(self._things())
             raise self._unread()
@@ -140,7 +127,7 @@ class _Statements(Clauses):
         if not cursor.take_word(("is", "are", "stands", "lies", "stand", "lie", "'s")):
             raise self._unread()
         things = self._things()
-        self._put(things, self.where(parts).target)
+        self.put(things, self.where(parts).target)
 
     def _of_things(self) -> None:
         cursor, start = self.cursor, self.cursor.at
@@ -150,9 +137,9 @@ class _Statements(Clauses):
             if not cursor.take_word(("is", "are")):
                 raise self._unread()
             if hand and cursor.take("empty"):
-                return self._holding(things, None)
+                return self.holding(things, None)
             if not hand and cursor.take_of(UNKNOWN):
-                return self._unknown(things)
+                return self.lost(things)
             raise self._unread()
         standing = cursor.tokens[cursor.at - 1].word == "'s"
         if all(s.sort == "robot" for s in things):
@@ -160,21 +147,21 @@ class _Statements(Clauses):
             if holding or cursor.take_of(CARRYING):
                 if cursor.take("nothing"):
                     if holding:
-                        return self._holding(things, None)
+                        return self.holding(things, None)
                     raise NotUnderstood(
                         'what lies in a basket is said thing by thing, not "nothing"'
                     )
                 held = self.subjects.read("an object", ("object",))
-                return self._holding(things, held, in_hand=holding is not None)
+                return self.holding(things, held, in_hand=holding is not None)
         could = cursor.take("could", "be") or cursor.take("may", "be") or cursor.take("might", "be")
         if could:
             if cursor.take_of(ANYWHERE):
-                return self._unknown(things)
+                return self.lost(things)
             cursor.at -= 2
             raise self._unread()
         if cursor.take("has", "been") or cursor.take("have", "been"):
             if cursor.take_of(phrases("lost|misplaced|missing")):
-                return self._unknown(things)
+                return self.lost(things)
         elif not (
             standing
             or cursor.take_word(STANDING)
@@ -183,7 +170,7 @@ class _Statements(Clauses):
         ):
             raise self._unread(start if cursor.ended else None)
         if cursor.take_of(UNKNOWN):
-            return self._unknown(things)
+            return self.lost(things)
         return self._at(things)
 
     def _at(self, things: Sequence[Subject]) -> None:
@@ -197,49 +184,7 @@ class _Statements(Clauses):
         where = self.where(parts)
         if where.source is not None or where.target is None:
             raise NotUnderstood(f"{cursor.said(self.began)!r} does not say one place: {_EXAMPLE}")
-        self._put(things, where.target)
-
-    def _put(self, things: Sequence[Subject], target: str | None) -> None:
-        if self.cursor.word() == "or":
-            raise self._unread()
-        mentions = [self.subjects.settle(thing) for thing in things]
-        for mention in mentions:
-            if mention.open:
-                raise NotUnderstood(
-                    f"{self.cursor.said(self.began)!r} does not say which of "
-                    f"{one_of(mention.subjects)}: name it"
-                )
-            if mention.sort == "robot" and target not in self.words.places:
-                raise NotUnderstood("a robot is at a place, not on a robot: name the place")
-            for name in mention.subjects:
-                self._fact("at", name, target)
-        self.subjects.remember(mentions)
-
-    def _unknown(self, things: Sequence[Subject]) -> None:
-        mentions = [self.subjects.settle(thing) for thing in things]
-        for mention in mentions:
-            if mention.open:
-                raise NotUnderstood(f"it does not say which of {one_of(mention.subjects)}: name it")
-            for name in mention.subjects:
-                self._fact("at", name, None)
-        self.subjects.remember(mentions)
-
-    def _holding(
-        self, robots: Sequence[Subject], held: Sequence[Subject] | None, in_hand: bool = True
-    ) -> None:
-        """What a robot has in its hand (`None`: nothing) or on it."""
-        names = [name for robot in robots for name in self.subjects.settle(robot).subjects]
-        objects = [n for thing in held or () for n in self.subjects.settle(thing).subjects]
-        opened = any(self.subjects.settle(s).open for s in (*robots, *(held or ())))
-        if opened or (held is not None and (len(names) != 1 or (in_hand and len(objects) != 1))):
-            raise NotUnderstood(
-                f"{self.cursor.said(self.began)!r}: one hand holds one thing; say who holds what"
-            )
-        for name in names:
-            if in_hand:
-                self._fact("holding", name, objects[0] if objects else NOTHING)
-            for thing in objects:
-                self._fact("at", thing, name)
+        self.put(things, where.target)
 
     def _ofplaces(self) -> None:
         """`The kitchen has been searched`, `the kitchen contains two cups`."""
@@ -247,7 +192,7 @@ class _Statements(Clauses):
         places = self.places()
         negated = False
         if len(places) == 1 and cursor.take_of(HOUSES) and not cursor.next_of(phrases("been|not")):
-            return self._put(self._things(), places[0])
+            return self.put(self._things(), places[0])
         if cursor.tokens[cursor.at - 1].word in ("has", "have"):
             cursor.at -= 1
         if cursor.take_word(("has", "have")):
@@ -261,22 +206,12 @@ class _Statements(Clauses):
             raise self._unread()
         cursor.take("already")
         if cursor.take("unsearched"):
-            return self._searched(places, negated)
+            return self.looked_around(places, negated)
         if not cursor.take_of(SEARCHED):
             raise self._unread()
         if cursor.take("yet") and not negated:
             raise self._unread()
-        return self._searched(places, not negated)
-
-    def _searched(self, places: Sequence[str], value: bool) -> None:
-        if not value and len(places) > 1:
-            raise NotUnderstood(
-                f"{self.cursor.said(self.began)!r} could mean all or some of them: "
-                "say it of one place at a time"
-            )
-        self.cursor.take("yet")
-        for place in places:
-            self._fact("searched", place, value)
+        return self.looked_around(places, not negated)
 
     def _unread(self, start: int | None = None) -> NotUnderstood:
         cursor = self.cursor

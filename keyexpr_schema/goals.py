@@ -57,6 +57,8 @@ class Goal(Payload, frozen=True, kw_only=True):
 class GoalState(str, Enum):
     """Where a goal stands."""
 
+    READING = "reading"
+    """A language model works out what the sentence means."""
     WAITING = "waiting"
     PLANNED = "planned"
     RUNNING = "running"

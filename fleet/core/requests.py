@@ -74,6 +74,8 @@ def _why_not_plan(state: State, plan: str | None, goals: tuple[str, ...]) -> str
             known = ", ".join(sorted(state.goals)) or "none"
             return f"there is no goal {goal}; known are {known}"
         status = state.goal_states[goal]
+        if status.state is GoalState.READING:
+            return f"what goal {goal} means is still being worked out; ask again"
         if status.state in ENDED_GOALS:
             return f"goal {goal} is {status.state.value}" + (
                 f": {status.reason}" if status.reason else ""
@@ -136,7 +138,6 @@ def take_waiting_goals(state: State) -> State:
         for goal in sorted(state.goals, key=lambda g: (state.goals[g].ordinal, g))
         if state.goal_states[goal].state is GoalState.WAITING
         and state.goal_states[goal].reason is None
-        and goal not in state.interpreting
         and active_plan_of(state, goal) is None
     )
     if not waiting:

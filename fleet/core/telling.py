@@ -34,7 +34,7 @@ def _take_goal(state: State, goal: Goal) -> State:
     status = _understand(state, goal)
     state = set_goal(state, status)
     if status.state is GoalState.REJECTED and state.policy.interpreter and not goal.conditions:
-        state = set_goal(state, replace(status, state=GoalState.WAITING))
+        state = set_goal(state, replace(status, state=GoalState.READING))
         return replace(state, interpreting=tuple({*state.interpreting, goal.goal}))
     return _begin_stage(state, goal.goal)
 
@@ -52,7 +52,14 @@ def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
         reason = f"{status.reason}; a language model did not understand it either: {event.reason}"
         return set_goal(state, replace(status, state=GoalState.REJECTED, reason=reason))
     state = set_goal(
-        state, replace(status, stages=event.stages, conditions=event.stages[0], reason=None)
+        state,
+        replace(
+            status,
+            state=GoalState.WAITING,
+            stages=event.stages,
+            conditions=event.stages[0],
+            reason=None,
+        ),
     )
     return _begin_stage(state, event.goal)
 

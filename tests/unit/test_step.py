@@ -399,7 +399,9 @@ def test_a_goal_in_steps_takes_one_after_the_other() -> None:
     model = fleet()
     model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(interpreter=True))
     model.tell(events.GoalTold, goal=Goal(goal="g", text="kindly do the usual with cup one"))
-    assert goal_state(model, "g") is GoalState.WAITING
+    assert goal_state(model, "g") is GoalState.READING
+    model.plan(goals=("g",))
+    assert "still being worked out" in model.state.answers["r0"].sentence
     assert any(isinstance(effect, Interpret) for effect in model.effects)
     stages = ((at("cup_1", "hallway"),), (at("cup_1", "living_room"),))
     model.tell(events.GoalInterpreted, goal="g", stages=stages)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
+import time
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from cli.errors import BadArgument, check_known
@@ -16,6 +19,9 @@ from keyexpr_schema.keyspace import (
     OBJECT,
     PLACE,
     ROBOT_SPEC,
+    ROBOT_STATE,
+    SIM_CLOCK,
+    SIM_SCENE,
     STATEMENT,
 )
 from keyexpr_schema.world import (
@@ -32,6 +38,10 @@ from keyexpr_schema.world import (
 
 if TYPE_CHECKING:
     from keyexpr_schema.session import Session
+
+
+CLOCK_S = 0.6
+"""How long to listen for a simulation's clock [s, wall]; it ticks several times as often."""
 
 
 async def put_world(session: Session, places: Iterable[Place], objects: Iterable[Object]) -> None:
@@ -69,9 +79,39 @@ async def add_fact(session: Session, relation: str, subject: str, written: str) 
         if value is not None:
             places = [a.place for a in await session.list(PLACE)]
             check_known("place or robot", written, [*places, *robots], how)
-    fact = Fact(subject=subject, relation=relation, value=value, source="person")
+    fact = Fact(
+        subject=subject,
+        relation=relation,
+        value=value,
+        source="person",
+        time_s=await fleet_time_s(session),
+    )
     await session.confirm(FACT, address, fact)
     return fact
+
+
+async def fleet_time_s(session: Session) -> float:
+    """The time that a fact said now carries [s]: a simulation's clock if there is one, else Unix.
+
+    A realm that has a simulated scene whose clock is not heard has stopped; then the time is the
+    latest that a robot has told, since Unix time would outdate whatever the simulation says later.
+    """
+    heard: float | None = None
+    simulated = False
+    async with session.watch(SIM_CLOCK, SIM_SCENE) as watch:
+        with suppress(TimeoutError):
+            async with asyncio.timeout(CLOCK_S):
+                async for change in watch:
+                    if change.key is SIM_CLOCK and change.value is not None:
+                        heard = change.value.time_s
+                        break
+                    simulated = simulated or change.value is not None
+    if heard is not None:
+        return heard
+    if not simulated:
+        return time.time()
+    states = (await session.list(ROBOT_STATE)).values()
+    return max((state.time_s for state in states), default=0.0)
 
 
 def parse_value(written: str) -> Value:

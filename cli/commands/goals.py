@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from keyexpr_schema.session import Session
 
 UNDERSTANDING_S = 10.0
-"""How long the planner may take to read a goal; an LLM is slower than the grammar."""
+"""How long the planner may take to say something of a goal."""
+READING_S = 180.0
+"""How long a language model may take to read a sentence that the grammar refuses."""
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False)
 GoalArgument = Annotated[str, typer.Argument(metavar="GOAL", help="Its name.")]
@@ -32,23 +34,34 @@ async def add(
         str | None, typer.Option("--id", help="Name of the goal; else made from its words.")
     ] = None,
     priority: Annotated[int, typer.Option("--priority", help="Higher goes first.")] = 0,
+    plan: Annotated[
+        bool, typer.Option("--plan", help="Have it planned and carried out at once.")
+    ] = False,
     wait: Annotated[bool, typer.Option("--wait", help="Return when the goal has ended.")] = False,
     timeout_s: Annotated[
         float, typer.Option("--timeout-s", min=0.0, help="Longest time to --wait.")
     ] = 600.0,
 ) -> None:
-    """Want something. The planner says at once if it cannot make sense of it (exit code 1)."""
+    """Want something. The planner says what it understood, or that it did not (exit code 1)."""
+    from cli.asking import ask_planner
     from cli.board import following
-    from cli.errors import Refused
+    from cli.errors import NotRunning, Refused
+    from cli.naming import request_name
     from cli.presence import planner_alive
     from cli.show.fleet_tables import GoalRow
     from cli.telling import put_goal
     from keyexpr_schema.goals import ENDED_GOALS, GoalState
     from keyexpr_schema.keyspace import GOAL_STATUS
+    from keyexpr_schema.requests import PlanRequest
 
     async with call.session() as session:
+        if plan and not await planner_alive(session):
+            raise NotRunning(
+                "no planner is running, so the goal was not stored; start one with "
+                "`robotctl planner`, or leave --plan out"
+            )
         spec = await put_goal(session, text, name, priority)
-        if not wait and not await planner_alive(session):
+        if not (wait or plan) and not await planner_alive(session):
             call.show(
                 GoalRow(goal=spec.goal, spec=spec, status=None),
                 lambda: (
@@ -63,6 +76,26 @@ async def add(
                 timeout_s if wait else UNDERSTANDING_S,
                 f"the planner to read goal {spec.goal} (it is stored)",
             )
+            # With a language model, what the grammar refuses waits, without a meaning yet.
+            await board.until(
+                lambda: (
+                    board.goal_status[spec.goal].state is not GoalState.WAITING
+                    or bool(board.goal_status[spec.goal].conditions)
+                ),
+                timeout_s if wait else READING_S,
+                f"a language model to read goal {spec.goal} (it is stored)",
+            )
+            if plan and board.goal_status[spec.goal].state is GoalState.WAITING:
+                call.say(sentence(spec, board.goal_status[spec.goal]))
+                answer = await ask_planner(
+                    session, PlanRequest(request=request_name(), goals=(spec.goal,))
+                )
+                call.say(answer.sentence)
+                await board.until(
+                    lambda: board.goal_status[spec.goal].state is not GoalState.WAITING,
+                    UNDERSTANDING_S,
+                    f"goal {spec.goal} to be planned",
+                )
             if wait:
                 await board.until(
                     lambda: board.goal_status[spec.goal].state in ENDED_GOALS,
@@ -74,16 +107,20 @@ async def add(
         raise Refused(
             f"goal {spec.goal} {status.state.value}: {status.reason or 'no reason given'}"
         )
-    call.show(GoalRow(goal=spec.goal, spec=spec, status=status), lambda: _sentence(spec, status))
+    call.show(
+        GoalRow(goal=spec.goal, spec=spec, status=status), lambda: sentence(spec, status, plan)
+    )
 
 
-def _sentence(spec: Goal, status: GoalStatus) -> str:
+def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
+    """How a goal stands and what it was understood as; how to have it planned, if it is not."""
+    from cli.show.words import meaning as meaning_of
     from keyexpr_schema.goals import GoalState
 
-    means = " and ".join(str(each) for each in status.conditions)
+    means = meaning_of(status)
     meaning = f", understood as {means}" if means else ""
     hint = ""
-    if status.state is GoalState.WAITING:
+    if status.state is GoalState.WAITING and not planned:
         hint = f"; plan it with `robotctl plan create big-dag milp {spec.goal}`"
     return f"goal {spec.goal} is {status.state.value}{meaning}{hint}"
 
@@ -102,13 +139,14 @@ async def list_(call: Call) -> None:
 async def show(call: Call, goal: GoalArgument) -> None:
     """One goal: its words, what they were understood to mean, how it stands."""
     from cli.errors import check_known
-    from cli.show.fleet_tables import GoalRow, goals_table
+    from cli.show.fleet_tables import GoalRow
+    from cli.show.goal_page import goal_page
 
     async with call.session() as session:
         goals, status = await _all(session)
     check_known("goal", goal, goals, "say one with `robotctl goal add`")
     row = GoalRow(goal=goal, spec=goals[goal], status=status.get(goal))
-    call.show(row, lambda: goals_table([row]))
+    call.show(row, lambda: goal_page(row))
 
 
 @command(app, "delete")

@@ -13,6 +13,7 @@ from cli.show.words import (
     capabilities,
     carried,
     doing,
+    meaning,
     natural,
     outcome,
     seconds,
@@ -87,7 +88,7 @@ def goals_table(rows: Iterable[GoalRow]) -> Table:
                 (row.status.state if row.status else GoalState.WAITING).value,
                 row.spec.priority if row.spec else "",
                 row.spec.text if row.spec else "",
-                " and ".join(str(each) for each in row.status.conditions) if row.status else "",
+                meaning(row.status) if row.status else "",
                 row.status.plan if row.status else "",
                 row.status.reason if row.status else "",
             )
@@ -162,8 +163,11 @@ def places_table(places: Sequence[Place]) -> Table:
 def objects_table(objects: Sequence[Object]) -> Table:
     """One line an object."""
     return table(
-        ["object", "kind", "label", "also called", "mass"],
-        ((o.object, o.kind, o.label, ", ".join(o.aliases), f"{o.mass_kg:g} kg") for o in objects),
+        ["object", "kind", "label", "also called", "mass", "home"],
+        (
+            (o.object, o.kind, o.label, ", ".join(o.aliases), f"{o.mass_kg:g} kg", o.home)
+            for o in objects
+        ),
         title="Objects",
     )
 

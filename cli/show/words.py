@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from keyexpr_schema.goals import GoalStatus
 from keyexpr_schema.plans import PlanStatus
 from keyexpr_schema.robots import RobotSpec, RobotState
 from keyexpr_schema.tasks import TaskRecord, TaskState
@@ -59,6 +60,12 @@ def doing(state: RobotState | None) -> str:
     if state is None or state.task is None:
         return ""
     return f"{state.plan}/{state.task}" if state.plan else state.task
+
+
+def meaning(status: GoalStatus) -> str:
+    """What a goal was understood as: its conditions, stage by stage."""
+    stages = status.stages or ((status.conditions,) if status.conditions else ())
+    return ", then ".join(" and ".join(str(each) for each in stage) for stage in stages)
 
 
 def carried(state: RobotState | None) -> str:

@@ -78,7 +78,7 @@ class FleetRun:
         self.shared = SharedWorld(self.backend)
         self._ended: asyncio.Future[None] = loop.create_future()
         loop.drive(self._go_on, lambda: self._fail(Stuck("everybody waits for somebody else")))
-        self._places = {place.place: place for place in mission.world.places()}
+        self._places = {place.place: place for place in mission.places}
         self._view = WorldView()
         registry = SkillRegistry(HOUSEHOLD)
         self._robots = {

@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from benchmarks.planning.truth import Truth, parse_truth
 from keyexpr_schema.robots import PoseMRad, RobotSpec
+from keyexpr_schema.world import Place
 from sim.errors import BadFile
 from sim.world_file import load_robot, load_world
 from sim.world_model import WorldFile
@@ -70,6 +71,7 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True):
     entry: MissionEntry
     kind: str
     world: WorldFile
+    places: tuple[Place, ...]
     robots: tuple[tuple[RobotSpec, PoseMRad], ...]
     truth: tuple[Truth, ...]
     stages: tuple[tuple[Truth, ...], ...]
@@ -118,7 +120,9 @@ def load_missions(only: str | None = None) -> tuple[Mission, ...]:
 
 
 @cache
-def _setting(name: str) -> tuple[WorldFile, dict[str, tuple[RobotSpec, PoseMRad]]]:
+def _setting(
+    name: str,
+) -> tuple[WorldFile, tuple[Place, ...], dict[str, tuple[RobotSpec, PoseMRad]]]:
     path = HERE / "settings" / "settings.yaml"
     settings = read_yaml(path, _Settings, "file of settings").settings
     if name not in settings:
@@ -131,11 +135,12 @@ def _setting(name: str) -> tuple[WorldFile, dict[str, tuple[RobotSpec, PoseMRad]
         )
         for robot, entry in found.robots.items()
     }
-    return load_world(path.parent / found.world), robots
+    world = load_world(path.parent / found.world)
+    return world, world.places(), robots
 
 
 def _mission(entry: MissionEntry, kind: str, path: Path) -> Mission:
-    world, robots = _setting(entry.setting)
+    world, places, robots = _setting(entry.setting)
     where = f"{path}: {entry.mission}"
     objects = dict(world.object_entries)
     for name in (*entry.lies, *entry.missing, *entry.unknown, *entry.wrong):
@@ -153,6 +158,7 @@ def _mission(entry: MissionEntry, kind: str, path: Path) -> Mission:
         entry=entry,
         kind=kind,
         world=replace(world, object_entries=objects),
+        places=places,
         robots=tuple(robots[robot] for robot in entry.robots),
         truth=tuple(parse_truth(text, names, where) for text in entry.truth),
         stages=tuple(

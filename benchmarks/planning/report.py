@@ -1,0 +1,209 @@
+"""Tables and a picture of how missions went."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+
+from benchmarks.planning.judge import Result
+from benchmarks.planning.missions import CLASSES
+
+HEAD = (
+    "planner",
+    "strategy",
+    "class",
+    "success",
+    "tasks",
+    "revisions",
+    "rounds",
+    "planning, median",
+    "planning, worst",
+    "makespan",
+)
+Row = tuple[str, ...]
+
+
+def rows_of(results: Sequence[Result]) -> list[Row]:
+    """A row for each planner, strategy and class, and one for all classes together.
+
+    Tasks, revisions, rounds and makespan [simulated s] are means over those missions to be done
+    that every planner and strategy carried out, so that rows can be compared; planning [s] is of
+    all missions.
+    """
+    comparable = comparable_missions(results)
+    rows: list[Row] = []
+    for planner, strategy in variants(results):
+        mine = [r for r in results if (r.planner, r.strategy) == (planner, strategy)]
+        for kind in (*CLASSES, "all"):
+            some = [r for r in mine if kind in (r.kind, "all")]
+            if not some:
+                continue
+            done = [r for r in some if r.mission in comparable]
+            seconds = sorted(r.planning_s for r in some)
+            rows.append(
+                (
+                    planner,
+                    strategy,
+                    kind,
+                    f"{sum(r.success for r in some)}/{len(some)}",
+                    _mean(done, lambda r: r.tasks),
+                    _mean(done, lambda r: r.revisions),
+                    _mean(some, lambda r: r.rounds),
+                    f"{seconds[len(seconds) // 2]:.2f} s",
+                    f"{seconds[-1]:.2f} s",
+                    _mean(done, lambda r: r.makespan_s, " s"),
+                )
+            )
+    return rows
+
+
+def variants(results: Sequence[Result]) -> tuple[tuple[str, str], ...]:
+    """Every planner and strategy there is a result of, in the order of the results."""
+    return tuple(dict.fromkeys((r.planner, r.strategy) for r in results))
+
+
+def comparable_missions(results: Sequence[Result]) -> frozenset[str]:
+    """Missions to be done that every planner and strategy carried out."""
+    failed = {r.mission for r in results if not r.success or r.expect != "done"}
+    return frozenset(r.mission for r in results) - failed
+
+
+def _mean(results: Sequence[Result], of: Callable[[Result], float], unit: str = "") -> str:
+    if not results:
+        return "-"
+    return f"{sum(of(r) for r in results) / len(results):.1f}{unit}"
+
+
+def machine() -> str:
+    """What it was measured on, in a line."""
+    name = platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        models = [
+            line.partition(":")[2].strip()
+            for line in cpuinfo.read_text(encoding="utf-8").splitlines()
+            if line.startswith("model name")
+        ]
+        name = models[0] if models else name
+    return (
+        f"{name}, {os.cpu_count()} cores, {platform.system()} {platform.release()}, "
+        f"Python {platform.python_version()}, {datetime.now(UTC):%Y-%m-%d}"
+    )
+
+
+def as_markdown(head: Sequence[str], rows: Sequence[Row]) -> str:
+    """A table."""
+    lines = ["| " + " | ".join(head) + " |", "| " + " | ".join("---" for _ in head) + " |"]
+    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
+
+
+def failures_of(results: Sequence[Result]) -> list[Row]:
+    """A row for each mission that did not come out right: what is wrong, and what was said."""
+    rows: list[Row] = []
+    for mission in dict.fromkeys(r.mission for r in results if not r.success):
+        failed = [r for r in results if r.mission == mission and not r.success]
+        where = sorted({f"{r.planner} {r.strategy}" for r in failed})
+        every = len(failed) == sum(r.mission == mission for r in results)
+        rows.append(
+            (
+                mission,
+                "everywhere" if every else ", ".join(where),
+                _cell("; ".join(failed[0].wrong)),
+                _cell("; ".join(failed[0].said[:2])),
+            )
+        )
+    return rows
+
+
+def _cell(text: str, most: int = 300) -> str:
+    short = text if len(text) <= most else text[:most] + " …"
+    return short.replace("|", "\\|").replace("\n", " ")
+
+
+def write_page(path: Path, results: Sequence[Result], command: str, took_s: float) -> None:
+    """The page about the suite, with the picture beside it."""
+    missions = len({r.mission for r in results})
+    comparable = len(comparable_missions(results))
+    packages = ", ".join(f"{name} {version(name)}" for name in ("pulp", "mujoco"))
+    text = f"""# Household missions
+
+Written by `{command}` in {took_s:.0f} s on {machine()} ({packages}).
+
+{missions} missions, written by hand in `benchmarks/planning/missions`: plain sentences, a world,
+what the planner is told of it, and what must really be true at the end. They go through the
+planner's own core and desk; robots carry the orders out with the workers' own skills and retries
+in a kinematic world (`sim.kinematic`: drives take the route's length, things do not fall).
+A mission succeeds if that world is then as the mission file says, if nothing was moved that the
+mission does not speak of, and if the planner's own statuses agree. Those that must be refused
+succeed if nothing is done and a reason is given; those to be given up, if a reason is given. Random
+seeds are fixed; the simulated clock stands still while the planner thinks.
+
+`planning` is wall time for all revisions of a mission. Tasks begun, revisions and makespan
+(simulated) are means over the {comparable} missions to be done that succeeded in every row group,
+so that they can be compared; rounds are answers of a language model.
+
+{as_markdown(HEAD, rows_of(results))}
+
+![Success, plan length, makespan and planning time](planning.png)
+
+## What did not come out right
+
+{as_markdown(("mission", "with", "what is wrong", "what the fleet said"), failures_of(results))}
+"""
+    path.write_text(text, encoding="utf-8")
+
+
+def draw(path: Path, results: Sequence[Result]) -> None:
+    """Four small charts by class, a bar for each planner and strategy."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    comparable = comparable_missions(results)
+    charts: tuple[tuple[str, Callable[[list[Result]], float], bool], ...] = (
+        ("missions that came out right, %", _success_percent, False),
+        ("tasks begun, mean", lambda rs: _average([r.tasks for r in rs]), True),
+        ("makespan, simulated s, mean", lambda rs: _average([r.makespan_s for r in rs]), True),
+        ("planning, wall s, mean", lambda rs: _average([r.planning_s for r in rs]), False),
+    )
+    kinds = [kind for kind in CLASSES if any(r.kind == kind for r in results)]
+    groups = variants(results)
+    width = 0.8 / len(groups)
+    figure, axes = plt.subplots(2, 2, figsize=(11, 7), layout="constrained")
+    for axis, (title, value, only_comparable) in zip(axes.flat, charts, strict=True):
+        for number, (planner, strategy) in enumerate(groups):
+            heights = [
+                value(
+                    [
+                        r
+                        for r in results
+                        if (r.planner, r.strategy, r.kind) == (planner, strategy, kind)
+                        and (not only_comparable or r.mission in comparable)
+                    ]
+                )
+                for kind in kinds
+            ]
+            places = [i + (number - (len(groups) - 1) / 2) * width for i in range(len(kinds))]
+            bars = axis.bar(places, heights, width * 0.92, label=f"{planner}, {strategy}")
+            axis.bar_label(bars, fmt="%.3g", fontsize=7, padding=1)
+        axis.set_title(title, fontsize=10)
+        axis.set_xticks(range(len(kinds)), kinds)
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.margins(y=0.12)
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(groups), frameon=False)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def _success_percent(results: list[Result]) -> float:
+    return 100.0 * _average([float(r.success) for r in results])
+
+
+def _average(values: Sequence[float]) -> float:
+    return sum(values) / len(values) if values else 0.0

@@ -321,8 +321,11 @@ def _words_changed(state: State) -> State:
     """Try again to understand what was not, now that there are other names."""
     for goal in state.goals.values():
         status = state.goal_states[goal.goal]
-        if status.state is GoalState.REJECTED and _understand(state, goal).reason != status.reason:
+        read = _understand(state, goal)
+        if status.state is GoalState.REJECTED and read.reason != status.reason:
             state = _take_goal(state, goal)
+        elif status.state is GoalState.WAITING and read.stages and read.stages != status.stages:
+            state = set_goal(state, read)  # "some robot" now has more to choose from
     for name, reading in state.understood.items():
         if reading.reason is not None:
             state = _read_statement(state, name)

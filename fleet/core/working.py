@@ -145,12 +145,13 @@ def _touches_what_is_dropped(book: PlanBook, action: Action, skills: Skills) -> 
 def _free(state: State, robot: str, plan: str) -> bool:
     """Whether a robot is connected and neither works now nor is in the middle of other work.
 
-    A robot that has begun an actor's work, or carries what another plan wants brought somewhere,
-    keeps to that plan until it has nothing left to do there: between a pick and its place no
-    other plan may have the hand.
+    A robot that carries what a plan wants brought somewhere is that plan's until it is delivered:
+    between a pick and its place no other plan may have the hand. Without a load, a robot that has
+    begun an actor's work keeps to that plan until it has nothing left to do there.
     """
     if not state.alive.get(robot):
         return False
+    carries = _carries_for(state, robot, state.plans[plan])
     for book in state.plans.values():
         begun: set[str] = set()
         unfinished: set[str] = set()
@@ -163,7 +164,7 @@ def _free(state: State, robot: str, plan: str) -> bool:
                 begun.add(record.actor)
             elif record.robot == robot and record.state is TaskState.WAITING:
                 unfinished.add(record.actor)
-        if book.plan.plan == plan or book.ended or not unfinished:
+        if book.plan.plan == plan or book.ended or carries:
             continue
         if begun & unfinished or _carries_for(state, robot, book):
             return False

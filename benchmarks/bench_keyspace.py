@@ -1,0 +1,199 @@
+"""How fast the key-space is: confirmed writes, reads, watches, applied puts.
+
+Run from anywhere: `python benchmarks/bench_keyspace.py` (or `make bench`). A real router with its
+store in a process of its own, on the loopback; wall times of this machine.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from fleet.service.router_process import with_port
+from fleet.stores.sqlite import SqliteStore
+from keyexpr_schema.keyspace import FACT, STORE_JOURNAL
+from keyexpr_schema.service import StoreAddress, StoreQuery
+from keyexpr_schema.session import Session, SessionConfig, open_session
+from keyexpr_schema.storage import Write
+from keyexpr_schema.world import Fact, FactAddress
+
+CALLS = 1500
+WATCHED = 500
+WRITERS = 20
+WRITES_EACH = 100
+PUTS = 20_000
+LISTED = 10_000
+BATCHES, BATCH = 100, 500
+
+
+def main() -> None:
+    """Print the tables."""
+    console = Console(width=140)
+    with tempfile.TemporaryDirectory() as folder, _router(Path(folder) / "data") as endpoint:
+        latencies, rates = asyncio.run(_measured(endpoint))
+    rates.extend(_store_alone())
+    console.print(latencies_table(latencies))
+    table = Table("what", "a second", title="throughput")
+    for what, rate in rates:
+        table.add_row(what, f"{rate:,.0f}")
+    console.print(table)
+
+
+def latencies_table(latencies: list[tuple[str, list[float]]]) -> Table:
+    """Percentiles of lists of seconds."""
+    table = Table("what", "times", "p50", "p99", "worst", title="latency, one after the other")
+    for what, seconds in latencies:
+        ordered = sorted(seconds)
+        marks = (ordered[len(ordered) // 2], ordered[int(len(ordered) * 0.99)], ordered[-1])
+        table.add_row(what, str(len(ordered)), *(f"{mark * 1e3:.2f} ms" for mark in marks))
+    return table
+
+
+@contextmanager
+def _router(data: Path) -> Iterator[str]:
+    """A router on a free port; its endpoint."""
+    endpoint = with_port("tcp/127.0.0.1:0")
+    command = [sys.executable, "-m", "fleet.service.router_process", endpoint, str(data)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        if not process.stdout.readline().startswith("router listening"):
+            raise SystemExit("the router did not start")
+        yield endpoint
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+def _fact(value: int) -> Fact:
+    return Fact(subject="cup", relation="at", value=value, source="benchmark")
+
+
+async def _measured(
+    endpoint: str,
+) -> tuple[list[tuple[str, list[float]]], list[tuple[str, float]]]:
+    config = SessionConfig((endpoint,))
+    async with open_session(config) as writer, open_session(config) as reader:
+        latencies = [
+            ("confirm: put, and read back from the store", await _repeat(_confirm(writer), CALLS)),
+            ("get", await _repeat(lambda i: reader.get(FACT, _at(f"c{i % 100}")), CALLS)),
+            ("watch: from put to the other session's watcher", await _watched(writer, reader)),
+        ]
+        rates = [
+            (f"confirmed writes, {WRITERS} at once", await _confirmed_together(writer)),
+            *await _puts(writer),
+            (f"values in a listing of {LISTED:,}", await _listed(writer, reader)),
+        ]
+    return latencies, rates
+
+
+def _at(subject: str) -> FactAddress:
+    return FactAddress(subject, "at")
+
+
+def _confirm(session: Session) -> Callable[[int], Awaitable[object]]:
+    return lambda i: session.confirm(FACT, _at(f"c{i % 100}"), _fact(i))
+
+
+async def _repeat(call: Callable[[int], Awaitable[object]], times: int) -> list[float]:
+    seconds = []
+    for i in range(times):
+        began_s = time.perf_counter()
+        await call(i)
+        seconds.append(time.perf_counter() - began_s)
+    return seconds
+
+
+async def _watched(writer: Session, reader: Session) -> list[float]:
+    seconds = []
+    async with reader.watch((FACT, {"subject": "watched"})) as watch:
+        await watch.synced()
+        for i in range(WATCHED):
+            began_s = time.perf_counter()
+            writer.put(FACT, _at("watched"), _fact(i))
+            change = await anext(watch)
+            seconds.append(time.perf_counter() - began_s)
+            assert change.value is not None
+            assert change.value.value == i
+    return seconds
+
+
+async def _confirmed_together(session: Session) -> float:
+    async def write(number: int) -> None:
+        for i in range(WRITES_EACH):
+            await session.confirm(FACT, _at(f"w{number}"), _fact(i))
+
+    began_s = time.perf_counter()
+    await asyncio.gather(*(write(number) for number in range(WRITERS)))
+    return WRITERS * WRITES_EACH / (time.perf_counter() - began_s)
+
+
+async def _puts(session: Session) -> list[tuple[str, float]]:
+    """Puts handed over, and puts applied by the store, a second."""
+    before = await _journaled(session)
+    began_s = time.perf_counter()
+    for i in range(PUTS):
+        session.put(FACT, _at(f"p{i % 1000}"), _fact(i))
+    handed_over_s = time.perf_counter() - began_s
+    await session.confirm(FACT, _at("last"), _fact(0), timeout_s=60.0)
+    while await _journaled(session) < before + PUTS + 1:
+        pass
+    applied_s = time.perf_counter() - began_s
+    return [
+        ("puts handed to Zenoh by one session", PUTS / handed_over_s),
+        ("puts applied and journaled by the store", PUTS / applied_s),
+    ]
+
+
+async def _journaled(session: Session) -> int:
+    return (await session.ask(STORE_JOURNAL, StoreAddress(), StoreQuery(limit=0))).last
+
+
+async def _listed(writer: Session, reader: Session) -> float:
+    for i in range(LISTED):
+        writer.put(FACT, _at(f"l{i}"), _fact(i))
+    await writer.confirm(FACT, _at("last"), _fact(1), timeout_s=60.0)
+    began_s = time.perf_counter()
+    found = await reader.list(FACT, timeout_s=30.0)
+    return len(found) / (time.perf_counter() - began_s)
+
+
+def _store_alone() -> list[tuple[str, float]]:
+    rates = []
+    for synchronous in ("NORMAL", "FULL"):
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            SqliteStore(Path(folder), synchronous=synchronous) as store,
+        ):
+            began_s = time.perf_counter()
+            for batch in range(BATCHES):
+                store.apply(
+                    [
+                        Write(
+                            f"realm/{FACT.build(_at(f'c{i}'))}",
+                            (batch * BATCH + i + 1) << 128,
+                            False,
+                            "application/json",
+                            b"x" * 120,
+                        )
+                        for i in range(BATCH)
+                    ]
+                )
+            took_s = time.perf_counter() - began_s
+            rates.append(
+                (f"store alone, {synchronous}, batches of {BATCH}", BATCHES * BATCH / took_s)
+            )
+    return rates
+
+
+if __name__ == "__main__":
+    main()

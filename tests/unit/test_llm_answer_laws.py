@@ -145,4 +145,4 @@ def _example(form: dict[str, Any]) -> Any:
         return {name: _example(inner) for name, inner in form["properties"].items()}
     if form["type"] == "array":
         return []
-    return "?a1" if form["pattern"].startswith(r"^\?") else "a1"
+    return "?a1" if form["pattern"].startswith(r"^\?") else "t1"

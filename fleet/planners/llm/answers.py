@@ -20,6 +20,10 @@ MAX_ENUMERATED = 100
 MAX_STARTS = 50
 """Places in an answer where a JSON object is looked for."""
 
+_TaskName = Annotated[str, msgspec.Meta(pattern=r"^t[0-9]{1,3}$")]
+_ActorName = Annotated[str, msgspec.Meta(pattern=r"^\?a[0-9]{1,2}$")]
+# In the schema names are short: servers turn it into grammars, which grow with every repetition.
+
 T = TypeVar("T")
 Actor = Annotated[str, msgspec.Meta(pattern=ACTOR_PATTERN)]
 
@@ -81,7 +85,7 @@ def plan_schema(
     for variant in variants[1:]:
         task = task | variant
     pin: Any = msgspec.defstruct(
-        "Pin", [("actor", Actor), ("robot", _name(world.team))], forbid_unknown_fields=True
+        "Pin", [("actor", _ActorName), ("robot", _name(world.team))], forbid_unknown_fields=True
     )
     tasks = Annotated[list[task], msgspec.Meta(max_length=max_tasks)]
     kind = msgspec.defstruct(
@@ -97,7 +101,7 @@ def _possible(skill: SkillModel, world: WorldModel) -> bool:
 
 def _task_type(number: int, skill: SkillModel, world: WorldModel, goal: Any, flat: bool) -> Any:
     kinds: dict[str, Any] = {
-        "robot": Actor,
+        "robot": _ActorName,
         "object": _name(world.objects),
         "place": _name(world.places),
     }
@@ -111,7 +115,7 @@ def _task_type(number: int, skill: SkillModel, world: WorldModel, goal: Any, fla
     )
     fields: list[tuple[str, Any]] = [("args", args), ("goal", goal)]
     if not flat:
-        fields = [("task", Id), *fields, ("after", list[Id])]
+        fields = [("task", _TaskName), *fields, ("after", list[_TaskName])]
     return msgspec.defstruct(
         f"Task{number}", fields, tag_field="skill", tag=skill.name, forbid_unknown_fields=True
     )

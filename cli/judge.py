@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import Enum
+from typing import NamedTuple
 
 import msgspec
 
 from keyexpr_schema.goals import Condition, GoalState, GoalStatus
 from keyexpr_schema.simulation import Truth
+from keyexpr_schema.world import Value
 
 
 class Judgement(str, Enum):
@@ -46,15 +48,25 @@ def judge(
     goals: Mapping[str, GoalStatus],
     truths: Mapping[str, Truth],
     robot_places: Mapping[str, str | None],
+    beliefs: Mapping[str, Value] = {},
 ) -> tuple[Verdict, ...]:
     """A verdict on every goal, in the order of `goals`.
 
-    `robot_places` says which place each robot really stands in (`None`: in none). `at(object)`
-    holds when the object's truth is that place, settled and in nobody's hand; lying in a robot's
-    basket counts, as the goal's definition says. `at(robot)` holds when the robot stands there.
-    Nothing else can be seen by the physics. A goal with no conditions is not judged either.
+    `robot_places` says which place each robot really stands in (`None`: in none), `beliefs` where
+    the fleet takes each thing to be. `at(object)` holds when the object's truth is that place,
+    settled and in nobody's hand; lying in a robot's basket counts, as the goal's definition says.
+    `at(robot)` holds when the robot stands there, `held(object)` when a hand really holds it, and
+    `located(object)` when the fleet takes it to be where it really is. Nothing else can be seen by
+    the physics. Of several subjects one is enough. A goal with no conditions is not judged either.
     """
-    return tuple(_verdict(status, truths, robot_places) for status in goals.values())
+    seen = _Seen(truths, robot_places, beliefs)
+    return tuple(_verdict(status, seen) for status in goals.values())
+
+
+class _Seen(NamedTuple):
+    truths: Mapping[str, Truth]
+    robot_places: Mapping[str, str | None]
+    beliefs: Mapping[str, Value]
 
 
 def all_agreed(verdicts: tuple[Verdict, ...]) -> bool:
@@ -62,14 +74,12 @@ def all_agreed(verdicts: tuple[Verdict, ...]) -> bool:
     return bool(verdicts) and all(verdict.agreed for verdict in verdicts)
 
 
-def _verdict(
-    status: GoalStatus, truths: Mapping[str, Truth], robot_places: Mapping[str, str | None]
-) -> Verdict:
-    found = tuple(_condition(each, truths, robot_places) for each in status.conditions)
-    seen = {each.judgement for each in found}
-    if Judgement.FAILS in seen:
+def _verdict(status: GoalStatus, seen: _Seen) -> Verdict:
+    found = tuple(_condition(each, seen) for each in status.conditions)
+    judgements = {each.judgement for each in found}
+    if Judgement.FAILS in judgements:
         physics = Judgement.FAILS
-    elif Judgement.NOT_JUDGED in seen or not found:
+    elif Judgement.NOT_JUDGED in judgements or not found:
         physics = Judgement.NOT_JUDGED
     else:
         physics = Judgement.HOLDS
@@ -91,21 +101,51 @@ def _verdict(
     )
 
 
-def _condition(
-    condition: Condition, truths: Mapping[str, Truth], robot_places: Mapping[str, str | None]
-) -> ConditionVerdict:
-    if condition.relation == "at" and condition.subject in truths:
-        judgement, sentence = _object_at(truths[condition.subject], condition.value)
-    elif condition.relation == "at" and condition.subject in robot_places:
-        place = robot_places[condition.subject]
-        holds = place == condition.value
-        judgement = Judgement.HOLDS if holds else Judgement.FAILS
-        aim = "" if holds else f", not in {condition.value}"
-        sentence = f"{condition.subject} stands in {place or 'no known place'}{aim}"
+def _condition(condition: Condition, seen: _Seen) -> ConditionVerdict:
+    """The best of what can be said of its subjects: one that holds is enough."""
+    said = [_for_subject(condition, subject, seen) for subject in condition.subjects]
+    judgements = [judgement for judgement, _ in said]
+    if Judgement.HOLDS in judgements:
+        judgement = Judgement.HOLDS
     else:
-        judgement = Judgement.NOT_JUDGED
-        sentence = f"{condition} is not judged by physics"
+        unsure = Judgement.NOT_JUDGED in judgements
+        judgement = Judgement.NOT_JUDGED if unsure else Judgement.FAILS
+    sentence = "; ".join(sentence for found, sentence in said if found is judgement)
     return ConditionVerdict(condition=condition, judgement=judgement, sentence=sentence)
+
+
+def _for_subject(condition: Condition, subject: str, seen: _Seen) -> tuple[Judgement, str]:
+    relation, wanted = condition.relation, condition.value
+    if relation == "at" and subject in seen.truths:
+        return _object_at(seen.truths[subject], wanted)
+    if relation == "at" and subject in seen.robot_places:
+        place = seen.robot_places[subject]
+        aim = "" if place == wanted else f", not in {wanted}"
+        return _holds(place == wanted), f"{subject} stands in {place or 'no known place'}{aim}"
+    if relation == "held" and subject in seen.truths:
+        by = seen.truths[subject].held_by
+        where = f"in the hand of {by}" if by else "in nobody's hand"
+        return _holds((by is not None) is wanted), f"{subject} is {where}"
+    if relation == "located" and wanted is True and subject in seen.truths:
+        return _located(seen.truths[subject], seen)
+    return Judgement.NOT_JUDGED, f"{condition} is not judged by physics"
+
+
+def _holds(holds: bool) -> Judgement:
+    return Judgement.HOLDS if holds else Judgement.FAILS
+
+
+def _located(truth: Truth, seen: _Seen) -> tuple[Judgement, str]:
+    """Whether the fleet has it where it is; what it takes to be on a robot is where that stands."""
+    told = seen.beliefs.get(truth.object)
+    where = truth.place or "no known place"
+    if told is None:
+        return Judgement.FAILS, f"{truth.object} lies in {where}, and the fleet does not know where"
+    name = str(told)
+    place = seen.robot_places.get(name, name)
+    right = place == truth.place
+    rest = "as the fleet says" if right else f"and the fleet says in {place}"
+    return _holds(right), f"{truth.object} is in {where}, {rest}"
 
 
 def _object_at(truth: Truth, wanted: object) -> tuple[Judgement, str]:

@@ -76,12 +76,8 @@ async def add(
                 timeout_s if wait else UNDERSTANDING_S,
                 f"the planner to read goal {spec.goal} (it is stored)",
             )
-            # With a language model, what the grammar refuses waits, without a meaning yet.
             await board.until(
-                lambda: (
-                    board.goal_status[spec.goal].state is not GoalState.WAITING
-                    or bool(board.goal_status[spec.goal].conditions)
-                ),
+                lambda: board.goal_status[spec.goal].state is not GoalState.READING,
                 timeout_s if wait else READING_S,
                 f"a language model to read goal {spec.goal} (it is stored)",
             )

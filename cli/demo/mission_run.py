@@ -75,6 +75,11 @@ class Demo:
             UNDERSTAND_S,
             "the planner to read the goals",
         )
+        await self.board.until(
+            lambda: not any(s.state is GoalState.READING for s in self._statuses().values()),
+            PLAN_S,
+            "a language model to read the goals",
+        )
         for status in self._statuses().values():
             if status.state is GoalState.REJECTED:
                 raise Refused(f"goal {status.goal} is rejected: {status.reason}")
@@ -143,7 +148,10 @@ class Demo:
             await board.until(settled, SETTLE_S, "the objects to come to rest")
         robots = [robot.spec.robot for robot in self.mission.robots]
         places = {robot: senses.place for robot, senses in board.senses.items()}
-        verdicts = judge(self._statuses(), board.truths, places)
+        beliefs = {
+            thing: fact.value for (thing, relation), fact in board.facts.items() if relation == "at"
+        }
+        verdicts = judge(self._statuses(), board.truths, places, beliefs)
         records = list(board.tasks.values())
         makespan_s, busy_s, idle_s = times(records, robots)
         recording = self.options.out / RECORDING

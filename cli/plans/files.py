@@ -63,10 +63,10 @@ def write_plan(path: Path, plan: Plan) -> None:
     """
     check_suffix(path)
     if path.suffix == ".json":
-        text = msgspec.json.format(msgspec.json.encode(plan), indent=2).decode() + "\n"
+        text = msgspec.json.format(msgspec.json.encode(_lean(plan)), indent=2).decode() + "\n"
     else:
         text = yaml.dump(
-            msgspec.to_builtins(plan),
+            _lean(plan),
             Dumper=_Dumper,
             sort_keys=False,
             allow_unicode=True,
@@ -74,6 +74,24 @@ def write_plan(path: Path, plan: Plan) -> None:
             width=100,
         )
     path.write_text(text, encoding="utf-8")
+
+
+def _lean(value: object) -> object:
+    """Builtins without the fields that say what their payload takes for granted."""
+    if isinstance(value, msgspec.Struct):
+        return {
+            field.encode_name: _lean(getattr(value, field.name))
+            for field in msgspec.structs.fields(value)
+            if field.required or getattr(value, field.name) != _default(field)
+        }
+    if isinstance(value, list | tuple):
+        return [_lean(each) for each in value]
+    return msgspec.to_builtins(value)
+
+
+def _default(field: msgspec.structs.FieldInfo) -> object:
+    made = field.default_factory
+    return field.default if made is msgspec.NODEFAULT else made()
 
 
 class _Dumper(yaml.SafeDumper):

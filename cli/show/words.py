@@ -13,7 +13,9 @@ from keyexpr_schema.world import Value
 
 STATE_STYLE = {
     "waiting": "dim",
+    "reading": "dim",
     "planned": "cyan",
+    "proposed": "yellow",
     "planning": "cyan",
     "ready": "cyan",
     "ordered": "cyan",

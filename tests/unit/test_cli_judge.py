@@ -113,3 +113,48 @@ def test_one_failing_condition_fails_the_goal() -> None:
 def test_no_goals_is_no_success() -> None:
     assert not all_agreed(())
     assert all_agreed(judge({"g": status()}, {"cup_1": truth()}, {}))
+
+
+def derived(relation: str, value: bool = True, *subjects: str) -> GoalStatus:
+    condition = Condition(
+        relation=relation, subject=(subjects or ("cup_1",))[0], value=value, any_of=subjects
+    )
+    return GoalStatus(goal="g", state=GoalState.REACHED, conditions=(condition,))
+
+
+def test_one_subject_of_several_is_enough() -> None:
+    goal = GoalStatus(
+        goal="g",
+        state=GoalState.REACHED,
+        conditions=(
+            Condition(
+                relation="at", subject="cup_2", value="hallway", any_of=("cup_2", "cup_1", "ghost")
+            ),
+        ),
+    )
+    truths = {"cup_1": truth(), "cup_2": truth("kitchen")}
+    (found,) = judge({"g": goal}, truths, {})
+    assert found.agreed
+    assert found.sentence == "cup_1 lies in hallway on hallway_table"
+    (nowhere,) = judge({"g": goal}, {"cup_1": truth("kitchen"), "cup_2": truth("kitchen")}, {})
+    assert nowhere.physics is Judgement.NOT_JUDGED  # nobody sees the ghost
+
+
+@pytest.mark.parametrize(
+    ("held_by", "wanted", "agreed"),
+    [("hsr", True, True), (None, True, False), (None, False, True), ("hsr", False, False)],
+)
+def test_the_physics_sees_hands(held_by: str | None, wanted: bool, agreed: bool) -> None:
+    said = verdict(derived("held", wanted), truth(held_by=held_by), {})
+    assert said.agreed is agreed
+
+
+@pytest.mark.parametrize(
+    ("told", "agreed"), [("hallway", True), ("kitchen", False), (None, False), ("hsr", True)]
+)
+def test_what_is_found_is_where_the_fleet_says(told: str | None, agreed: bool) -> None:
+    (said,) = judge(
+        {"g": derived("located")}, {"cup_1": truth()}, {"hsr": "hallway"}, {"cup_1": told}
+    )
+    assert said.agreed is agreed
+    assert said.physics is not Judgement.NOT_JUDGED

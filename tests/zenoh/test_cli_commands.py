@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import pytest
 
@@ -35,6 +32,7 @@ from keyexpr_schema.robots import AliveAddress, RobotActivity, RobotAddress, Rob
 from keyexpr_schema.service import PlannerAliveAddress
 from keyexpr_schema.session import Session, SessionConfig, open_session
 from keyexpr_schema.tasks import TaskAddress, TaskRecord, TaskState
+from tests.robotctl import Robotctl
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 ROBOTS = sorted(str(file) for file in (CONFIGS / "robots").glob("*.yaml"))
@@ -43,46 +41,6 @@ WORLD = str(CONFIGS / "worlds" / "home.yaml")
 
 class Router(Protocol):
     endpoint: str
-
-
-@dataclass(frozen=True)
-class Said:
-    """What a run of robotctl printed and how it ended."""
-
-    code: int
-    out: str
-    err: str
-
-    @property
-    def data(self) -> Any:
-        return json.loads(self.out)
-
-
-class Robotctl:
-    """Calls robotctl as a process, in a folder without configuration."""
-
-    def __init__(self, endpoint: str, folder: Path) -> None:
-        self.env = {
-            **{k: v for k, v in os.environ.items() if not k.startswith("ROBOTFLEET_")},
-            "ROBOTFLEET_ROUTER": endpoint,
-            "HOME": str(folder),
-        }
-        self.folder = folder
-
-    def __call__(self, *arguments: str) -> Said:
-        done = subprocess.run(
-            [sys.executable, "-m", "cli.main", *arguments],
-            capture_output=True,
-            text=True,
-            env=self.env,
-            cwd=self.folder,
-            timeout=60,
-        )
-        assert "Traceback" not in done.stderr, done.stderr
-        return Said(done.returncode, done.stdout, done.stderr)
-
-    async def soon(self, *arguments: str) -> Said:
-        return await asyncio.to_thread(self, *arguments)
 
 
 @pytest.fixture

@@ -1,0 +1,53 @@
+"""robotctl as a person or a script would call it."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a run of robotctl printed and how it ended."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def data(self) -> Any:
+        return json.loads(self.out)
+
+
+class Robotctl:
+    """Calls robotctl as a process, in a folder without configuration."""
+
+    def __init__(self, endpoint: str, folder: Path, realm: str | None = None) -> None:
+        self.env = {
+            **{k: v for k, v in os.environ.items() if not k.startswith("ROBOTFLEET_")},
+            "ROBOTFLEET_ROUTER": endpoint,
+            "HOME": str(folder),
+            **({"ROBOTFLEET_REALM": realm} if realm else {}),
+        }
+        self.folder = folder
+
+    def __call__(self, *arguments: str) -> Said:
+        done = subprocess.run(
+            [sys.executable, "-m", "cli.main", *arguments],
+            capture_output=True,
+            text=True,
+            env=self.env,
+            cwd=self.folder,
+            timeout=60,
+        )
+        assert "Traceback" not in done.stderr, done.stderr
+        return Said(done.returncode, done.stdout, done.stderr)
+
+    async def soon(self, *arguments: str) -> Said:
+        return await asyncio.to_thread(self, *arguments)

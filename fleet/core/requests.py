@@ -192,6 +192,8 @@ def control_asked(state: State, event: events.ControlAsked) -> State:
     if ask.control is Control.CANCEL:
         if book.ended:
             return answer(state, ask.request, False, f"plan {ask.plan} is {book.state.value}")
+        waiting = book.job.request if book.job is not None else None
+        state = answer(state, waiting, False, f"plan {ask.plan} was cancelled while it was made")
         state = set_book(state, replace(book, cancelling=True, job=None))
         return answer(state, ask.request, True, f"plan {ask.plan} is being cancelled", ask.plan)
     if ask.control is Control.DELETE:

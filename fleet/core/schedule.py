@@ -6,14 +6,19 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
+from math import inf
+from typing import TypeVar
 
 from fleet.core.checker import CheckedPlan
 from fleet.core.graph import Cycle, TaskGraph
 from fleet.core.skills import Action, Variable
+from fleet.core.timetable import Timetable
 from fleet.core.world_model import WorldModel
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.plans import Plan
 from keyexpr_schema.world import Value
+
+T = TypeVar("T")
 
 EXHAUSTIVE_GROUPS = 5
 """Up to this many groups every order is tried (120); beyond, neighbours are swapped."""
@@ -91,39 +96,49 @@ def best_schedule(
     One robot does its actors one after the other. Robots take groups in the same order, so they
     never wait for each other in a circle.
     """
-    groups = actor_groups(plan)
+    if checked.graph is None:
+        return None
+    timetable = Timetable(checked.graph, checked.actions, allocation, world)
+    groups = [sorted(group, key=timetable.first.__getitem__) for group in actor_groups(plan)]
     if len(groups) <= EXHAUSTIVE_GROUPS:
-        tried = (
-            schedule(plan, checked, allocation, world, order) for order in permutations(groups)
-        )
-        return min((found for found in tried if found is not None), key=_quality, default=None)
-    return _swap_neighbours(plan, checked, allocation, world, groups)
+        rated = ((_quality(timetable.ends_s(order)), order) for order in permutations(groups))
+        order: Sequence[Sequence[str]] = min(rated, key=lambda pair: pair[0])[1]
+    else:
+        order = _swap_neighbours(timetable, groups, allocation)
+    return schedule(plan, checked, allocation, world, order)
 
 
-def _quality(found: Schedule) -> tuple[float, float]:
-    return round(found.makespan_s, 3), sum(found.end_s.values())
+def _quality(ends_s: Sequence[float] | None) -> tuple[float, float]:
+    """Less is better: the last task's end [s], then the sum of all ends; a deadlock is worst."""
+    if ends_s is None:
+        return inf, inf
+    return round(max(ends_s, default=0.0), 3), sum(ends_s)
 
 
 def _swap_neighbours(
-    plan: Plan,
-    checked: CheckedPlan,
-    allocation: Mapping[str, str],
-    world: WorldModel,
-    groups: Sequence[tuple[str, ...]],
-) -> Schedule | None:
+    timetable: Timetable, groups: Sequence[Sequence[str]], allocation: Mapping[str, str]
+) -> Sequence[Sequence[str]]:
     order = list(groups)
-    best = schedule(plan, checked, allocation, world, order)
+    robots = [{allocation[actor] for actor in group} for group in order]
+    best = _quality(timetable.ends_s(order))
     improved = True
     while improved:
         improved = False
         for left in range(len(order) - 1):
-            order[left], order[left + 1] = order[left + 1], order[left]
-            found = schedule(plan, checked, allocation, world, order)
-            if found is not None and (best is None or _quality(found) < _quality(best)):
-                best, improved = found, True
+            if robots[left].isdisjoint(robots[left + 1]):
+                continue  # no robot's own order would change, so nothing would
+            _swap(order, left)
+            quality = _quality(timetable.ends_s(order))
+            if quality < best:
+                best, improved = quality, True
+                _swap(robots, left)
             else:
-                order[left], order[left + 1] = order[left + 1], order[left]
-    return best
+                _swap(order, left)
+    return order
+
+
+def _swap(items: list[T], left: int) -> None:
+    items[left], items[left + 1] = items[left + 1], items[left]
 
 
 def schedule(
@@ -131,7 +146,7 @@ def schedule(
     checked: CheckedPlan,
     allocation: Mapping[str, str],
     world: WorldModel,
-    groups: Iterable[tuple[str, ...]],
+    groups: Iterable[Sequence[str]],
 ) -> Schedule | None:
     """The earliest schedule if robots take groups of actors in this order; `None` on deadlock."""
     graph = checked.graph

@@ -266,7 +266,12 @@ def robot_told(state: State, event: events.RobotTold) -> State:
     """Know the robot."""
     if state.robots.get(event.spec.robot) == event.spec:
         return state
-    return _words_changed(replace(state, robots=put(state.robots, event.spec.robot, event.spec)))
+    robot = event.spec.robot
+    gone = state.gone_since
+    if state.alive.get(robot):
+        gone = without(gone, robot)
+    state = replace(state, robots=put(state.robots, robot, event.spec), gone_since=gone)
+    return _words_changed(state)
 
 
 def robot_forgotten(state: State, event: events.RobotForgotten) -> State:
@@ -276,8 +281,7 @@ def robot_forgotten(state: State, event: events.RobotForgotten) -> State:
     return replace(
         state,
         robots=without(state.robots, event.robot),
-        alive=without(state.alive, event.robot),
-        gone_since=put(state.gone_since, event.robot, float("-inf")),
+        gone_since=put(state.gone_since, event.robot, 0.0),
     )
 
 

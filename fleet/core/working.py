@@ -211,10 +211,15 @@ def _needs(book: PlanBook, robot: str) -> bool:
 
 
 def next_timer(state: State) -> float | None:
-    """The Unix time [s] at which a robot that is away becomes lost, if a plan needs it."""
+    """The Unix time [s] at which a robot that is away becomes lost to a plan that counts on it."""
+    counting = [
+        book
+        for book in state.plans.values()
+        if not book.ended and book.job is None and book.replan_reason is None
+    ]
     times = [
         since + state.policy.lost_after_s
         for robot, since in state.gone_since.items()
-        if any(_needs(book, robot) and not book.ended for book in state.plans.values())
+        if any(_needs(book, robot) for book in counting)
     ]
     return min(times, default=None)

@@ -223,6 +223,21 @@ def test_a_ready_plan_waits_for_start_and_can_be_cancelled_and_deleted() -> None
     assert not [key for key in model.documents if key.startswith("plans/")]
 
 
+def test_a_robot_that_is_unregistered_loses_its_work_and_gets_new_once_it_is_back() -> None:
+    model = FleetModel((manipulator("r1"), manipulator("r2")), cups=2)
+    model.plan(bring(1, "hallway"))
+    (order,) = model.orders()
+    other = {"r1": "r2", "r2": "r1"}[order.robot]
+    model.tell(events.RobotForgotten, robot=order.robot)
+    assert {o.robot for o in model.orders()} == {other}
+    model.finish()
+    model.tell(events.RobotTold, spec=manipulator(order.robot))
+    assert model.state.ready(order.robot)
+    model.plan(bring(2, "hallway"))
+    model.finish()
+    assert goal_state(model, "g2") is GoalState.REACHED
+
+
 def test_a_task_can_be_added_to_a_running_plan() -> None:
     model = fleet()
     model.plan(bring(1, "hallway"))

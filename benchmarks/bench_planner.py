@@ -129,7 +129,11 @@ def _goals(count: int) -> tuple[Goal, ...]:
             goal=f"g{i}",
             text=f"bring cup {i}",
             conditions=(
-                Condition(relation="at", subject=f"cup_{i}", value=f"room_{(i * 5 + 2) % PLACES}"),
+                Condition(
+                    relation="at",
+                    subject=f"cup_{i}",
+                    value=f"room_{(i + 1 + i % (PLACES - 1)) % PLACES}",
+                ),
             ),
             ordinal=i,
         )

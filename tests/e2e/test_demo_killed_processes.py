@@ -13,10 +13,12 @@ from keyexpr_schema.tasks import TaskState
 pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(240)]
 
 
-async def mission_with_a_death(out: Path, victim: str, skill: str, robot: str) -> Summary:
+async def mission_with_a_death(
+    mission: str, out: Path, victim: str, skill: str, robot: str
+) -> Summary:
     """Kill `victim` while `robot` carries out `skill`, start it again, and see it through."""
     options = DemoOptions(
-        mission="two-cups", out=out, backend="kinematic", speed="10", timeout_s=120.0
+        mission=mission, out=out, backend="kinematic", speed="10", timeout_s=120.0
     )
     async with running(options) as demo:
 
@@ -38,18 +40,24 @@ async def mission_with_a_death(out: Path, victim: str, skill: str, robot: str) -
 
 
 @pytest.mark.parametrize(
-    ("victim", "skill", "robot"),
+    ("mission", "victim", "skill", "robot"),
     [
-        ("planner", "pick", "hsr"),
-        ("router", "pick", "hsr"),
-        ("record", "pick", "hsr"),
-        ("worker-hsr", "navigate", "hsr"),
-        ("worker-locobot", "navigate", "locobot"),
+        ("two-cups", "planner", "pick", "hsr"),
+        ("two-cups", "router", "pick", "hsr"),
+        ("two-cups", "record", "pick", "hsr"),
+        ("two-cups", "worker-hsr", "navigate", "hsr"),
+        ("two-cups", "worker-locobot", "navigate", "locobot"),
+        # While nobody plans, the cup is found, and both robots look on in vain.
+        ("find-cup", "planner", "search", "locobot"),
+        ("find-cup", "planner", "pick", "hsr"),
+        ("find-cup", "worker-locobot", "search", "locobot"),
     ],
 )
-async def test_the_mission_survives(tmp_path: Path, victim: str, skill: str, robot: str) -> None:
+async def test_the_mission_survives(
+    tmp_path: Path, mission: str, victim: str, skill: str, robot: str
+) -> None:
     out = tmp_path / "run"
-    summary = await mission_with_a_death(out, victim, skill, robot)
+    summary = await mission_with_a_death(mission, out, victim, skill, robot)
     logs = "\n".join(f"{log.name}:\n{log.read_text()[-2000:]}" for log in out.glob("*.log"))
     assert summary.ok, f"{[verdict.sentence for verdict in summary.goals]}\n{logs}"
     assert summary.contacts is not None

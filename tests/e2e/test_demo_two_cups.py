@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -13,41 +12,18 @@ from typing import Any
 
 import pytest
 
+from tests.demo_process import demo, left_behind
+
 pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(300)]
 
 WALL_S = 90.0
-
-
-def demo(out: Path, backend: str, *more: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [
-            *(sys.executable, "-m", "cli.main", "demo", "two-cups"),
-            *("--json", "--backend", backend, "--out", str(out), *more),
-        ],
-        capture_output=True,
-        text=True,
-        timeout=240,
-    )
-
-
-def left_behind(out: Path) -> list[str]:
-    """Command lines of processes that were started for `out` and still run."""
-    lines = []
-    for entry in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            line = entry.read_bytes().replace(b"\0", b" ").decode(errors="replace")
-        except OSError:
-            continue
-        if str(out) in line and int(entry.parent.name) != os.getpid():
-            lines.append(line)
-    return lines
 
 
 @pytest.mark.parametrize("backend", ["kinematic", "mujoco"])
 def test_both_cups_arrive_and_the_physics_agrees(tmp_path: Path, backend: str) -> None:
     out = tmp_path / "run"
     begun_s = time.monotonic()
-    done = demo(out, backend)
+    done = demo("two-cups", out, backend)
     wall_s = time.monotonic() - begun_s
 
     logs = "\n".join(f"{log.name}:\n{log.read_text()[-1500:]}" for log in out.glob("*.log"))
@@ -91,7 +67,7 @@ def test_a_process_that_dies_is_said_with_its_log(tmp_path: Path) -> None:
     """A recording that cannot be written: the recorder ends at once, and so does the demo."""
     out = tmp_path / "run"
     (out / "recording.rrd").mkdir(parents=True)
-    done = demo(out, "kinematic")
+    done = demo("two-cups", out, "kinematic")
     assert done.returncode == 1
     assert done.stdout == ""
     assert "Error: record ended unexpectedly" in done.stderr

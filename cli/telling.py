@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from cli.errors import BadArgument, check_known
 from cli.naming import free_name
+from cli.presence import planner_alive
 from keyexpr_schema.goals import Goal, GoalAddress
 from keyexpr_schema.keyspace import (
     FACT,
@@ -23,6 +24,7 @@ from keyexpr_schema.keyspace import (
     SIM_CLOCK,
     SIM_SCENE,
     STATEMENT,
+    STATEMENT_STATUS,
 )
 from keyexpr_schema.world import (
     Fact,
@@ -33,6 +35,7 @@ from keyexpr_schema.world import (
     PlaceAddress,
     Statement,
     StatementAddress,
+    StatementStatus,
     Value,
 )
 
@@ -42,6 +45,10 @@ if TYPE_CHECKING:
 
 CLOCK_S = 0.6
 """How long to listen for a simulation's clock [s, wall]; it ticks several times as often."""
+
+
+READ_S = 5.0
+"""How long the planner may take to read a statement."""
 
 
 async def put_world(session: Session, places: Iterable[Place], objects: Iterable[Object]) -> None:
@@ -61,6 +68,22 @@ async def add_statement(session: Session, text: str, name: str | None = None) ->
     said = Statement(statement=name, text=text)
     await session.confirm(STATEMENT, StatementAddress(name), said)
     return said
+
+
+async def statement_read(session: Session, statement: str) -> StatementStatus | None:
+    """What the planner read out of a statement; `None` if no planner runs, or it does not say."""
+    if not await planner_alive(session):
+        return None
+    with suppress(TimeoutError):
+        async with (
+            asyncio.timeout(READ_S),
+            session.watch((STATEMENT_STATUS, {"statement": statement})) as watch,
+        ):
+            async for change in watch:
+                if change.value is not None:
+                    status: StatementStatus = change.value
+                    return status
+    return None
 
 
 async def add_fact(session: Session, relation: str, subject: str, written: str) -> Fact:

@@ -99,7 +99,8 @@ async def add(
     --object cup_3 --kind cup --home kitchen   --place pantry --distance kitchen=2.5
     """
     from cli.errors import BadArgument
-    from cli.telling import add_fact, add_statement
+    from cli.show.words import statement_means
+    from cli.telling import add_fact, add_statement, statement_read
     from cli.world_things import check_options, told_object, told_place
 
     check_options(
@@ -141,7 +142,11 @@ async def add(
             )
         else:
             told = await add_statement(session, " ".join(words), name)
-            call.show(told, lambda: f"stored statement {told.statement}: “{told.text}”")
+            read = await statement_read(session, told.statement)
+            call.show(
+                {"statement": told, "status": read},
+                lambda: f"stored statement {told.statement}: “{told.text}”{statement_means(read)}",
+            )
 
 
 def _words(value: Value) -> str:
@@ -153,7 +158,7 @@ def _words(value: Value) -> str:
 @command(app, "list")
 async def list_(call: Call) -> None:
     """Everything that is known of the world."""
-    from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, STATEMENT
+    from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, STATEMENT, STATEMENT_STATUS
 
     async with call.session() as session:
         places = sorted((await session.list(PLACE)).values(), key=lambda each: each.place)
@@ -164,6 +169,7 @@ async def list_(call: Call) -> None:
         statements = sorted(
             (await session.list(STATEMENT)).values(), key=lambda each: each.statement
         )
+        read = {a.statement: s for a, s in (await session.list(STATEMENT_STATUS)).items()}
 
     def draw() -> RenderableType:
         from rich.console import Group
@@ -174,12 +180,19 @@ async def list_(call: Call) -> None:
             fleet_tables.places_table(places) if places else "No places: load a world file.",
             fleet_tables.objects_table(objects) if objects else "No objects.",
             fleet_tables.facts_table(facts) if facts else "No facts.",
-            fleet_tables.statements_table(statements) if statements else "No statements.",
+            fleet_tables.statements_table(statements, read) if statements else "No statements.",
         ]
         return Group(*(part for each in parts for part in (each, "")))
 
     call.show(
-        {"places": places, "objects": objects, "facts": facts, "statements": statements}, draw
+        {
+            "places": places,
+            "objects": objects,
+            "facts": facts,
+            "statements": statements,
+            "read": [read[said.statement] for said in statements if said.statement in read],
+        },
+        draw,
     )
 
 

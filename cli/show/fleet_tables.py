@@ -18,6 +18,7 @@ from cli.show.words import (
     outcome,
     seconds,
     spent_s,
+    statement_means,
     value,
 )
 from keyexpr_schema.goals import Goal, GoalState, GoalStatus
@@ -25,7 +26,7 @@ from keyexpr_schema.plans import Plan, PlanStatus
 from keyexpr_schema.robots import RobotSpec, RobotState
 from keyexpr_schema.service import Reject
 from keyexpr_schema.tasks import Report, TaskRecord
-from keyexpr_schema.world import Fact, Object, Place, Statement
+from keyexpr_schema.world import Fact, Object, Place, Statement, StatementStatus
 
 
 class RobotRow(msgspec.Struct, frozen=True, kw_only=True):
@@ -188,11 +189,19 @@ def facts_table(facts: Sequence[Fact]) -> Table:
     )
 
 
-def statements_table(statements: Sequence[Statement]) -> Table:
-    """One line a statement."""
+def statements_table(statements: Sequence[Statement], read: Mapping[str, StatementStatus]) -> Table:
+    """One line a statement, with what the planner read out of it."""
     return table(
-        ["statement", "text", "source"],
-        ((s.statement, s.text, s.source) for s in statements),
+        ["statement", "text", "source", "read as"],
+        (
+            (
+                said.statement,
+                said.text,
+                said.source,
+                statement_means(read.get(said.statement)).removeprefix(", "),
+            )
+            for said in statements
+        ),
         title="Statements",
     )
 

@@ -9,7 +9,7 @@ from keyexpr_schema.goals import GoalStatus
 from keyexpr_schema.plans import PlanStatus
 from keyexpr_schema.robots import RobotSpec, RobotState
 from keyexpr_schema.tasks import TaskRecord, TaskState
-from keyexpr_schema.world import Value
+from keyexpr_schema.world import StatementStatus, Value
 
 STATE_STYLE = {
     "waiting": "dim",
@@ -68,6 +68,16 @@ def meaning(status: GoalStatus) -> str:
     """What a goal was understood as: its conditions, stage by stage."""
     stages = status.stages or ((status.conditions,) if status.conditions else ())
     return ", then ".join(" and ".join(str(each) for each in stage) for stage in stages)
+
+
+def statement_means(status: StatementStatus | None) -> str:
+    """What the planner read out of a statement, to go on with behind it; empty: nobody read it."""
+    if status is None:
+        return ""
+    if not status.facts:
+        return f", not understood: {status.reason or 'it says nothing of the world'}"
+    facts = (f"{f.relation}({f.subject}) = {value(f.value)}" for f in status.facts)
+    return f", understood as {' and '.join(facts)}"
 
 
 def carried(state: RobotState | None) -> str:

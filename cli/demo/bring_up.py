@@ -28,6 +28,7 @@ RECORDING = "recording.rrd"
 
 
 def declare_processes(fleet: Fleet, mission: Mission, options: DemoOptions) -> None:
+    """Say which processes a mission is made of, and which are stopped first at its end."""
     data = options.out / "data"
     fleet.declare("router", "router", "--listen", fleet.endpoint, "--data", str(data / "router"))
     view = ("--view",) if options.view else ()

@@ -109,7 +109,7 @@ def _robot(number: int) -> RobotSpec:
             robot=f"arm_{number}",
             model="hsr",
             skills=("navigate", "search", "pick", "place", "place_on_robot"),
-            capabilities={"drive": 0.6, "see": 4.0, "grip": 1.2},
+            capabilities={"drive": 0.6, "see": 4.0, "grip": 1.2, "reach": 1.0},
         )
     return RobotSpec(
         robot=f"cart_{number}",

@@ -20,6 +20,7 @@ HEAD = (
     "tasks",
     "revisions",
     "rounds",
+    "fallbacks",
     "planning, median",
     "planning, worst",
     "makespan",
@@ -53,6 +54,7 @@ def rows_of(results: Sequence[Result]) -> list[Row]:
                     _mean(done, lambda r: r.tasks),
                     _mean(done, lambda r: r.revisions),
                     _mean(some, lambda r: r.rounds),
+                    str(sum(r.fallbacks > 0 for r in some)),
                     f"{seconds[len(seconds) // 2]:.2f} s",
                     f"{seconds[-1]:.2f} s",
                     _mean(done, lambda r: r.makespan_s, " s"),
@@ -144,7 +146,8 @@ seeds are fixed; the simulated clock stands still while the planner thinks.
 
 `planning` is wall time for all revisions of a mission. Tasks begun, revisions and makespan
 (simulated) are means over the {comparable} missions to be done that succeeded in every row group,
-so that they can be compared; rounds are answers of a language model.
+so that they can be compared. Rounds are answers of a language model to the planner; fallbacks are
+missions in which the symbolic planner had to take over from it.
 
 {as_markdown(HEAD, rows_of(results))}
 
@@ -190,7 +193,7 @@ def draw(path: Path, results: Sequence[Result]) -> None:
             ]
             places = [i + (number - (len(groups) - 1) / 2) * width for i in range(len(kinds))]
             bars = axis.bar(places, heights, width * 0.92, label=f"{planner}, {strategy}")
-            axis.bar_label(bars, fmt="%.3g", fontsize=7, padding=1)
+            axis.bar_label(bars, fmt=_short, fontsize=7, padding=1)
         axis.set_title(title, fontsize=10)
         axis.set_xticks(range(len(kinds)), kinds)
         axis.spines[["top", "right"]].set_visible(False)
@@ -199,6 +202,10 @@ def draw(path: Path, results: Sequence[Result]) -> None:
     figure.legend(handles, labels, loc="outside lower center", ncols=len(groups), frameon=False)
     figure.savefig(path, dpi=110)
     plt.close(figure)
+
+
+def _short(value: float) -> str:
+    return f"{value:.2f}" if value < 1 else f"{value:.1f}".removesuffix(".0")
 
 
 def _success_percent(results: list[Result]) -> float:

@@ -107,6 +107,7 @@ def _with_model(config: LlmConfig, stack: ExitStack) -> tuple[Composition, LlmIn
     caller = ModelCaller()
     stack.callback(caller.close)
     planner = LlmPlanner(config, parts.planners["symbolic"], caller)
+    planner.warm()  # LiteLLM's start is no planning time
     interpreter = LlmInterpreter(config, parts.skills, caller)
     return changed(parts, planners={**parts.planners, planner.name: planner}), interpreter
 

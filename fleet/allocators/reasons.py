@@ -1,0 +1,88 @@
+"""Why actors cannot be bound to robots, in sentences that name tasks, capabilities and robots."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+
+from fleet.allocators.base import AllocationProblem, NotAllocated
+from fleet.core.checker import CheckedPlan
+from fleet.core.world_model import WorldModel
+from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.plans import Plan, Violation
+
+NAMED = 6
+"""So many names are listed; the rest are counted."""
+
+
+def tasks_nobody_can_do(
+    plan: Plan, checked: CheckedPlan, world: WorldModel
+) -> tuple[Violation, ...]:
+    """Tasks with a part that no connected robot can take, each with what is lacking.
+
+    `checked` must have actions: the plan's form is right.
+    """
+    found = []
+    for task in plan.tasks:
+        action = checked.actions[task.task]
+        for parameter in action.skill.robot_parameters:
+            lacks = [world.lacks(robot, action, parameter) for robot in world.team]
+            if all(lacks):
+                told = "; ".join(dict.fromkeys(map(str, lacks))) or "no robot is connected"
+                part = "" if parameter == action.skill.actor_parameter else f" (as its {parameter})"
+                found.append(
+                    Violation(
+                        code="no-robot",
+                        sentence=f"no robot can do task {task.task}, {task.skill}{part}: {told}",
+                        task=task.task,
+                    )
+                )
+    return tuple(found)
+
+
+def not_apart(problem: AllocationProblem, actors: Collection[str], proven: bool) -> NotAllocated:
+    """For actors that would have to be more robots than can be them (or none named)."""
+    if actors:
+        group = sorted(actors)
+        able = sorted({robot for actor in group for robot in problem.able[actor]})
+        sentence = (
+            f"actors {names(group)} must all be different robots ({_why(problem, group)}), "
+            f"and only {names(able)} can be any of them"
+        )
+    elif proven:
+        sentence = (
+            "there are too few robots: actors that meet in one task must be different robots, "
+            f"and no choice among those able makes them so (actors {names(_tied(problem))})"
+        )
+    else:
+        sentence = (
+            "no choice of robots was found in which all actors that must be apart are: "
+            f"{names(_tied(problem))}; that is no proof that there is none"
+        )
+    return NotAllocated((Violation(code="no-allocation", sentence=sentence),))
+
+
+def names(found: Iterable[str]) -> str:
+    """`a`, `a and b`, `a, b and 3 more`."""
+    listed = list(found)
+    if len(listed) > NAMED:
+        return f"{', '.join(listed[:NAMED])} and {len(listed) - NAMED} more"
+    return " and ".join(filter(None, [", ".join(listed[:-1]), *listed[-1:]]))
+
+
+def _tied(problem: AllocationProblem) -> list[str]:
+    return sorted({actor for pair in problem.apart for actor in pair})
+
+
+def _why(problem: AllocationProblem, group: Sequence[str]) -> str:
+    """Tasks in which two of the group meet, or what else keeps them apart."""
+    inside = set(group)
+    meet = [
+        task.task
+        for task in problem.plan.tasks
+        if len(inside & _actors(problem.checked.actions[task.task].participants)) > 1
+    ]
+    return f"they meet in {names(meet)}" if meet else "each still has a load at the end"
+
+
+def _actors(participants: Iterable[str]) -> set[str]:
+    return {name.removeprefix(ACTOR_PREFIX) for name in participants}

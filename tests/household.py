@@ -36,7 +36,7 @@ def manipulator(name: str = "hsr", grip_kg: float = 1.2) -> RobotSpec:
         robot=name,
         model="hsr",
         skills=("navigate", "search", "pick", "place", "place_on_robot"),
-        capabilities={"drive": 0.6, "see": 4.0, "grip": grip_kg},
+        capabilities={"drive": 0.6, "see": 4.0, "grip": grip_kg, "reach": 1.0},
     )
 
 

@@ -33,10 +33,18 @@ class Literal(NamedTuple):
 
 
 class Need(NamedTuple):
-    """A capability that a robot must have; with `at_least_mass_of`, at least that object's mass."""
+    """A capability that a robot must have; with `measure`, at least as much as `of` measures.
+
+    `mass` is an object's, kg; `height` is that of the highest surface in a place, m.
+    """
 
     capability: str
-    at_least_mass_of: str | None = None
+    measure: str | None = None
+    of: str | None = None
+
+
+MEASURES = {"mass": "object", "height": "place"}
+"""What can be measured, and of which type of parameter."""
 
 
 PARAMETER_TYPES = ("robot", "object", "place")
@@ -122,7 +130,7 @@ class SkillModel:
 
 _CONDITION = re.compile(r"^\s*(\w+)\(\s*(\w+)\s*\)\s*=\s*([\w.+-]+)\s*$")
 _SPACE = re.compile(rf"^\s*{SPACE}\(\s*(\w+)\s*\)\s*$")
-_NEED = re.compile(r"^\s*(\w+)(?:\s*>=\s*mass\(\s*(\w+)\s*\))?\s*$")
+_NEED = re.compile(r"^\s*(\w+)(?:\s*>=\s*(\w+)\(\s*(\w+)\s*\))?\s*$")
 _FIELDS = frozenset({"about", "parameters", "needs", "before", "after", "duration_s", "travel_to"})
 
 
@@ -228,10 +236,13 @@ def _needs(data: Any, parameters: Mapping[str, str], where: str) -> dict[str, tu
         found = []
         for text in _list_of_text(rows, f"{where}: `needs`"):
             match = _NEED.match(text)
-            if match is None or (match[2] and parameters.get(match[2]) != "object"):
+            if match is None or (
+                match[2] and parameters.get(match[3], "nothing") != MEASURES.get(match[2])
+            ):
                 raise BadSkillFile(
-                    f"{where}: {text!r} must look like `drive` or `grip >= mass(object)`"
+                    f"{where}: {text!r} must look like `drive`, `grip >= mass(object)` or "
+                    "`reach >= height(place)`"
                 )
-            found.append(Need(match[1], match[2]))
+            found.append(Need(match[1], match[2], match[3]))
         needs[parameter] = tuple(found)
     return needs

@@ -13,6 +13,7 @@ from keyexpr_schema.world import NOTHING, Fact, Object, Place, Value
 
 TRAVEL_SPEED_M_S = 0.5
 """Speed assumed for a robot whose spec gives none, m/s; a slow walk indoors."""
+UNITS = {"mass": "kg", "height": "m"}
 LOCATED = "located"
 HELD = "held"
 """Relations of goal conditions that are derived from `at` and `holding`."""
@@ -86,14 +87,22 @@ class WorldModel:
             has = spec.capabilities.get(need.capability)
             if has is None:
                 return f"{robot} has no {need.capability}"
-            if need.at_least_mass_of is not None:
-                thing = self.objects.get(action.args[need.at_least_mass_of])
-                if thing is not None and thing.mass_kg > has:
+            if need.measure is not None and need.of is not None:
+                thing = action.args[need.of]
+                least = self.measure(need.measure, thing)
+                if least > has:
                     return (
-                        f"{thing.object} weighs {thing.mass_kg:g} kg, "
-                        f"{robot}'s {need.capability} takes {has:g} kg"
+                        f"{thing} has a {need.measure} of {least:g} {UNITS[need.measure]}, "
+                        f"{robot}'s {need.capability} is {has:g} {UNITS[need.measure]}"
                     )
         return None
+
+    def measure(self, what: str, name: str) -> float:
+        """The mass of an object [kg], or the height of the highest surface in a place [m]."""
+        if what == "mass":
+            return self.objects[name].mass_kg if name in self.objects else 0.0
+        place = self.places.get(name)
+        return max((surface.z_m for surface in place.surfaces), default=0.0) if place else 0.0
 
     def travel_s(self, robot: str, origin: Value, target: str) -> float:
         """Seconds that a robot takes from one place to another; from anywhere if unknown."""

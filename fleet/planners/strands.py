@@ -13,7 +13,7 @@ from fleet.core.skills import Action, Variable
 from fleet.core.telling import SEARCHED
 from fleet.core.world_model import HELD, WorldModel
 from fleet.planners.base import PlanningProblem
-from fleet.planners.search import Facts, Found, cheapest, ground_actions
+from fleet.planners.search import DERIVED_FROM, Facts, Found, cheapest, ground_actions
 from keyexpr_schema.goals import Condition
 from keyexpr_schema.world import NOTHING, Value
 
@@ -22,6 +22,8 @@ ALTERNATIVES = 4
 UNLOADING_S = 30.0
 """What it counts for, in seconds, that an object ends in a basket and not on a table: somebody
 still has to take it out, which is about one more task for a hand."""
+MAX_OBJECTS = 8
+"""Objects looked at as possible tools where an aim cannot be reached without one."""
 REUSE_CHARGE_S = 200.0
 """What an action costs more for each strand that already uses it; more than any task takes."""
 
@@ -125,7 +127,33 @@ def _different(
         if isinstance(value := facts.get(Variable("holding", robot)), str) and value != NOTHING
     }
     objects = sorted(held | ({subject} & world.objects.keys()))
+    results = _cheapest_few(condition, robots, objects, start, facts, world)
+    if results or len(world.objects) == len(objects):
+        return results
+    # Something else may be needed for it, such as a tool.
+    known = [thing for thing in world.objects if facts.get(Variable("at", thing)) is not None]
+    wider = sorted({*objects, *known[:MAX_OBJECTS]})
+    return _cheapest_few(condition, robots, wider, start, facts, world)
+
+
+def _cheapest_few(
+    condition: Condition,
+    robots: Sequence[str],
+    objects: Sequence[str],
+    start: Facts,
+    facts: Facts,
+    world: WorldModel,
+) -> list[Found]:
     actions = ground_actions(world, robots, objects, condition)
+    if (
+        not any(
+            literal.variable == (condition.relation, condition.subject)
+            for action in actions
+            for literal in action.after
+        )
+        and condition.relation not in DERIVED_FROM
+    ):
+        return []  # nothing that these objects are good for makes it true
     used: dict[tuple[str, tuple[str, ...]], int] = {}
 
     def cost_s(action: Action, now: Mapping[Variable, Value]) -> float:

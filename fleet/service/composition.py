@@ -22,6 +22,8 @@ from fleet.planners.base import Planner
 from fleet.planners.llm import LlmPlanner, load_llm_config
 from fleet.planners.symbolic import SymbolicPlanner
 
+SKILL_MODELS = "robotfleet.skill_models"
+"""Entry points to mappings such as the YAML of a skill file holds: `{"skills": {name: model}}`."""
 DEFAULT_SKILLS = Path("skills") / "household.yaml"
 
 
@@ -66,18 +68,26 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
 
 
 def load_all_skills(skill_files: tuple[Path, ...] = ()) -> dict[str, SkillModel]:
-    """The skill models in these files together; those of the household if none is named.
+    """The household's skill models, those of installed packages, and those in these files.
+
+    A file or a package may model a skill of the household anew; two of them not the same one.
 
     Raises:
-        BadSkillFile: a file cannot be read, or two files model the same skill.
+        BadSkillFile: a file or a package offers something that is no skill model, or two model the
+            same skill.
     """
-    skills: dict[str, SkillModel] = {}
-    for path in skill_files or (default_skill_file(),):
-        for name, skill in load_skills(path).items():
-            if name in skills:
-                raise BadSkillFile(f"{path}: skill {name} is already modelled in another file")
-            skills[name] = skill
-    return skills
+    sources = [
+        (f"entry point {entry.name}", skills_from_data(entry.load(), f"entry point {entry.name}"))
+        for entry in entry_points(group=SKILL_MODELS)
+    ]
+    sources += [(str(path), load_skills(path)) for path in skill_files]
+    added: dict[str, SkillModel] = {}
+    for where, models in sources:
+        for name, skill in models.items():
+            if name in added:
+                raise BadSkillFile(f"{where}: skill {name} is already modelled elsewhere")
+            added[name] = skill
+    return {**load_skills(default_skill_file()), **added}
 
 
 def load_skills(path: Path) -> dict[str, SkillModel]:

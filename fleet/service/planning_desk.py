@@ -65,6 +65,9 @@ def _allocate(
             planning_time_s=time.perf_counter() - started,
         )
     schedule = made.schedule
+    durations_s = {task: end_s - schedule.start_s[task] for task, end_s in schedule.end_s.items()}
+    timed = [replace(task, duration_s=durations_s[task.task]) for task in plan.tasks]
+    plan = replace(plan, tasks=tuple(timed))
     return PlanMade(
         **at,
         job=job.job,
@@ -72,9 +75,7 @@ def _allocate(
         allocation=dict(made.allocation),
         sequence=dict(schedule.sequence),
         extra_after=dict(schedule.extra_after),
-        durations_s={
-            task: end_s - schedule.start_s[task] for task, end_s in schedule.end_s.items()
-        },
+        durations_s=durations_s,
         makespan_s=schedule.makespan_s,
         planning_time_s=time.perf_counter() - started,
     )

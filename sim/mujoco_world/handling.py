@@ -157,12 +157,22 @@ def let_down(act: Act, path: Reach, held: str, opening_m: float) -> Step:
 
 
 def hand_of(robot: RobotBody) -> tuple[Arm, Gripper]:
+    """The robot's arm and gripper.
+
+    Raises:
+        CannotDo: it has none.
+    """
     if robot.arm is None or robot.gripper is None:
         raise CannotDo(f"{robot.name} has no hand")
     return robot.arm, robot.gripper
 
 
 def held_by(robot: RobotBody) -> str:
+    """The object in the robot's hand.
+
+    Raises:
+        CannotDo: the hand is empty.
+    """
     if robot.held is None:
         raise CannotDo("the hand is empty")
     return robot.held
@@ -260,5 +270,6 @@ def _check_free(stage: Stage, robot: RobotBody, held: str, point: PointM) -> Non
 
 
 def width_m(stage: Stage, name: str) -> float:
+    """The larger horizontal extent of an object [m]."""
     entry = stage.world.object_entries[name]
     return max(stage.world.object_kinds[entry.kind].extent_m[:2])

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import msgspec
 import pytest
 
 from fleet.allocators.base import Allocated, NotAllocated
 from fleet.allocators.milp import MilpAllocator
 from fleet.core.checker import check_plan
+from fleet.core.skills import skills_from_data
 from fleet.core.world_model import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic import SymbolicPlanner
 from keyexpr_schema.goals import Condition, Goal
 from keyexpr_schema.plans import Plan
-from tests.household import PLACES, at, bring, carrier, fact, home, manipulator
+from keyexpr_schema.world import Surface
+from tests.household import PLACES, SKILLS, at, bring, carrier, fact, home, manipulator
 
 
 def solve(world: WorldModel, *goals: Goal, **more: object) -> Plan:
@@ -191,3 +196,43 @@ def test_choosing_for_all_goals_together_is_at_least_as_fast() -> None:
     }
     assert makespan["big-dag"] < makespan["per-goal"]
     assert makespan["big-dag"] < makespan["monolithic"]
+
+
+def test_a_skill_of_a_users_own_is_planned_with() -> None:
+    mop = {
+        "about": "Mop a floor, with the mop in the hand.",
+        "parameters": {"robot": "robot", "place": "place", "mop": "object"},
+        "needs": {"robot": ["grip"]},
+        "before": ["at(robot) = place", "holding(robot) = mop"],
+        "after": ["clean(place) = true"],
+        "duration_s": 60,
+    }
+    skills_known = {**SKILLS, **skills_from_data({"skills": {"mop": mop}}, "test")}
+    spec = manipulator()
+    handy = type(spec)(
+        robot="hsr", model="hsr", skills=(*spec.skills, "mop"), capabilities=spec.capabilities
+    )
+    world = home((handy,))
+    world = replace(world, skills=skills_known)
+    clean = Condition(relation="clean", subject="hallway", value=True)
+    plan = solve(world, Goal(goal="g", text="", conditions=(clean,)))
+    assert skills(plan) == ["navigate", "pick", "navigate", "mop"]
+
+
+def test_what_lies_too_high_or_is_too_heavy_is_left_to_another_robot() -> None:
+    shelf = Surface(surface="shelf", x_m=0, y_m=0, z_m=1.5, yaw_rad=0, length_m=1, width_m=0.4)
+    spec = manipulator("tall")
+    tall = type(spec)(
+        robot="tall",
+        model="m",
+        skills=spec.skills,
+        capabilities={**spec.capabilities, "reach": 1.8},
+    )
+    world = home((manipulator("small"), tall))
+    kitchen = msgspec.structs.replace(world.places["kitchen"], surfaces=(shelf,))
+    world = replace(world, places={**world.places, "kitchen": kitchen})
+    made = allocate(solve(world, bring(1, "hallway")), world)
+    assert set(made.allocation.values()) == {"tall"}
+    only_small = replace(world, available=frozenset({"small"}))
+    refused = SymbolicPlanner().plan(PlanningProblem("p", (bring(1, "hallway"),), only_small))
+    assert isinstance(refused, NoPlan)

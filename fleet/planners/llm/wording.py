@@ -58,7 +58,7 @@ def _skill(skill: SkillModel) -> str:
     parts = [f"- {skill.name}({parameters}): {skill.about}".rstrip(": ")]
     needs = [
         f"{parameter} has {need.capability}"
-        + (f" >= mass({need.at_least_mass_of})" if need.at_least_mass_of else "")
+        + (f" >= {need.measure}({need.of})" if need.measure else "")
         for parameter, rows in skill.needs.items()
         for need in rows
     ]

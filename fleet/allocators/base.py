@@ -4,21 +4,62 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 from fleet.core.binding import able_robots, actors_apart, task_counts
 from fleet.core.checker import CheckedPlan, check_plan
-from fleet.core.schedule import Schedule, best_schedule
+from fleet.core.schedule import Schedule, best_schedule, schedule
 from fleet.core.world_model import WorldModel
 from keyexpr_schema.plans import Plan, Violation
 
 
 @dataclass(frozen=True)
 class Allocated:
-    """A plan with a robot for every actor and an order of actors for every robot."""
+    """A plan with a robot for every actor and an order of actors for every robot.
+
+    `lower_bound_s` is proven, where the allocator gives one: no allocation has a shorter schedule.
+    `notes` say how the answer was found, for people.
+    """
 
     allocation: Mapping[str, str]
     schedule: Schedule
+    lower_bound_s: float | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def gap(self) -> float | None:
+        """How far from optimal at most, as a share of the makespan; 0 is proven optimal."""
+        if self.lower_bound_s is None:
+            return None
+        makespan_s = self.schedule.makespan_s
+        return max(0.0, 1 - self.lower_bound_s / makespan_s) if makespan_s > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """What an allocator chose: a robot for every actor, and perhaps in which order they come.
+
+    `sequence` lists all actors; every robot takes its own in that order. Without it the base class
+    looks for a good order.
+    """
+
+    allocation: Mapping[str, str]
+    sequence: tuple[str, ...] | None = None
+    lower_bound_s: float | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Circumstances:
+    """What counts in an allocation besides plan and world.
+
+    `ready_s` says from when on a robot is free [s from now]; `priority` of a goal decides between
+    equal makespans (each step up counts twice); `due_s` says when a goal should be done [s from now].
+    """
+
+    ready_s: Mapping[str, float] = field(default_factory=dict)
+    priority: Mapping[str, int] = field(default_factory=dict)
+    due_s: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -42,6 +83,7 @@ class AllocationProblem:
     able: Mapping[str, tuple[str, ...]]
     load: Mapping[str, int]
     apart: frozenset[tuple[str, str]]
+    circumstances: Circumstances = field(default_factory=Circumstances)
 
 
 class Allocator(ABC):
@@ -49,7 +91,9 @@ class Allocator(ABC):
 
     name: str
 
-    def allocate(self, plan: Plan, world: WorldModel) -> Allocated | NotAllocated:
+    def allocate(
+        self, plan: Plan, world: WorldModel, circumstances: Circumstances | None = None
+    ) -> Allocated | NotAllocated:
         """A checked allocation of `plan` to the available robots of `world`, or why there is none.
 
         Tasks of one actor go to one robot, in order; a robot does its actors one after the other.
@@ -57,22 +101,40 @@ class Allocator(ABC):
         checked = check_plan(plan, world)
         if not checked.valid:
             return NotAllocated(checked.violations)
-        problem = _problem(plan, world, checked)
+        problem = _problem(plan, world, checked, circumstances or Circumstances())
         chosen = self._assign(problem)
         if isinstance(chosen, NotAllocated):
             return chosen
-        schedule = best_schedule(plan, checked, chosen, world)
-        if schedule is None:
+        if not isinstance(chosen, Assignment):
+            chosen = Assignment(chosen)
+        found = self._scheduled(problem, chosen)
+        if isinstance(found, NotAllocated) and chosen.sequence is not None:
+            # What the order's maker did not know of may still work out in another order.
+            chosen = replace(chosen, sequence=None)
+            found = self._scheduled(problem, chosen)
+        return found
+
+    def _scheduled(self, problem: AllocationProblem, chosen: Assignment) -> Allocated | NotAllocated:
+        plan, world, allocation = problem.plan, problem.world, chosen.allocation
+        ready_s = problem.circumstances.ready_s
+        if chosen.sequence is None:
+            order = best_schedule(plan, problem.checked, allocation, world)
+        else:
+            groups = [(actor,) for actor in chosen.sequence]
+            order = schedule(plan, problem.checked, allocation, world, groups, ready_s)
+        if order is None:
             return _refused(
                 f"{self.name}: with this allocation robots wait for each other for ever"
             )
-        final = check_plan(plan, world, chosen, schedule.extra_after)
+        final = check_plan(plan, world, allocation, order.extra_after)
         if not final.valid:
             return NotAllocated(final.violations)
-        return Allocated(chosen, schedule)
+        return Allocated(allocation, order, chosen.lower_bound_s, chosen.notes)
 
     @abstractmethod
-    def _assign(self, problem: AllocationProblem) -> dict[str, str] | NotAllocated:
+    def _assign(
+        self, problem: AllocationProblem
+    ) -> Mapping[str, str] | Assignment | NotAllocated:
         """A robot for every actor, among those able; or why there is none."""
 
 
@@ -80,7 +142,9 @@ def _refused(sentence: str) -> NotAllocated:
     return NotAllocated((Violation(code="no-allocation", sentence=sentence),))
 
 
-def _problem(plan: Plan, world: WorldModel, checked: CheckedPlan) -> AllocationProblem:
+def _problem(
+    plan: Plan, world: WorldModel, checked: CheckedPlan, circumstances: Circumstances
+) -> AllocationProblem:
     return AllocationProblem(
         plan=plan,
         world=world,
@@ -88,4 +152,5 @@ def _problem(plan: Plan, world: WorldModel, checked: CheckedPlan) -> AllocationP
         able=able_robots(plan, checked, world),
         load=task_counts(plan),
         apart=actors_apart(plan, checked),
+        circumstances=circumstances,
     )

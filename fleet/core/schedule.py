@@ -147,11 +147,16 @@ def schedule(
     allocation: Mapping[str, str],
     world: WorldModel,
     groups: Iterable[Sequence[str]],
+    ready_s: Mapping[str, float] | None = None,
 ) -> Schedule | None:
-    """The earliest schedule if robots take groups of actors in this order; `None` on deadlock."""
+    """The earliest schedule if robots take groups of actors in this order; `None` on deadlock.
+
+    `ready_s` says from when on a robot is free, s.
+    """
     graph = checked.graph
     if graph is None:
         return None
+    number = {task: i for i, task in enumerate(graph.order)}
     tasks_of: dict[str, list[str]] = defaultdict(list)
     for task in graph.order:
         for participant in checked.actions[task].participants:
@@ -159,7 +164,7 @@ def schedule(
     sequence: dict[str, list[str]] = defaultdict(list)
     extra: dict[str, set[str]] = defaultdict(set)
     for group in groups:
-        for actor in sorted(group, key=lambda name: graph.order.index(tasks_of[name][0])):
+        for actor in sorted(group, key=lambda name: number[tasks_of[name][0]]):
             robot = allocation[actor]
             if sequence[robot]:
                 extra[tasks_of[actor][0]].add(tasks_of[sequence[robot][-1]][-1])
@@ -170,7 +175,7 @@ def schedule(
         )
     except Cycle:
         return None
-    start_s, end_s = _earliest(whole, checked.actions, allocation, world)
+    start_s, end_s = _earliest(whole, checked.actions, allocation, world, ready_s or {})
     return Schedule(
         start_s,
         end_s,
@@ -184,6 +189,7 @@ def _earliest(
     actions: Mapping[str, Action],
     allocation: Mapping[str, str],
     world: WorldModel,
+    ready_s: Mapping[str, float],
 ) -> tuple[dict[str, float], dict[str, float]]:
     where: dict[str, Value] = {robot: world.value("at", robot) for robot in world.robots}
     start_s: dict[str, float] = {}
@@ -192,6 +198,8 @@ def _earliest(
         action = actions[task]
         robot = _robot(action.actor, allocation)
         start = max((end_s[before] for before in graph.predecessors[task]), default=0.0)
+        for participant in action.participants if ready_s else ():
+            start = max(start, ready_s.get(_robot(participant, allocation), 0.0))
         start_s[task] = start
         end_s[task] = start + predicted_duration_s(action, where.get(robot), robot, world)
         for variable, value in action.after:

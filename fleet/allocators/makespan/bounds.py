@@ -1,0 +1,169 @@
+"""Lower bounds on the makespan that hold for every schedule.
+
+- Critical path: the longest chain of steps, each at its shortest.
+- Load: a set of machines does at least the work that no other machine can do; before it every such
+  block has a head, after it a tail (Carlier 1982; for several machines Carlier 1987).
+- Pigeonhole: of the m + 1 longest blocks for m machines two share one.
+- Weighted load for machines of different speed: for prices `y` with `sum(y) = 1`, no machine ends
+  before `sum over blocks of min over machines (y · duration)` (the dual of the fractional assignment,
+  Lenstra, Shmoys, Tardos 1990). The prices come from a few subgradient steps; any prices are a proof.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+
+from fleet.allocators.makespan.compiled import Compiled
+
+STEPS = 60
+"""Subgradient steps for the prices."""
+CUTS = 24
+"""Heads, and tails, that are tried as thresholds."""
+MAX_SETS = 200
+"""Sets of machines that are looked at; those with the most blocks come first."""
+
+
+def lower_bound(shop: Compiled) -> float:
+    """Seconds that no schedule is shorter than."""
+    if not shop.befores:
+        return 0.0
+    way = [_least_way_s(shop, block) for block in range(len(shop.steps_of))]
+    heads = _heads(shop, way)
+    best = max(
+        head + least + tail
+        for head, least, tail in zip(heads, shop.least_ended(way), shop.tails, strict=True)
+    )
+    rows = _rows(shop, way, heads)
+    sets: dict[tuple[int, ...], int] = defaultdict(int)
+    for machines, *_ in rows:
+        sets[machines] += 1
+    chosen = sorted(sets, key=lambda machines: -sets[machines])[:MAX_SETS]
+    union = tuple(sorted(set().union(*chosen)))
+    for machines in dict.fromkeys([*chosen, union]):
+        inside = set(machines)
+        mine = [row for row in rows if row[0] == machines or inside.issuperset(row[0])]
+        best = max(best, _load(shop, machines, mine))
+    return max(best, _priced(shop, rows))
+
+
+_Block = tuple[tuple[int, ...], float, float, float, int]
+"""Machines, least time on one [s], head [s], tail [s], block."""
+
+
+def _least_way_s(shop: Compiled, block: int) -> float:
+    """The shortest way to the block's first target: from where a machine starts, or from where any
+    block that could come before it leaves a machine."""
+    target = shop.entry[block]
+    if target < 0:
+        return 0.0
+    return shop.shortest_way_s(block, target)
+
+
+def _heads(shop: Compiled, way: Sequence[float]) -> list[float]:
+    """Seconds before which no step can start."""
+    least = shop.least_ended(way)
+    heads = [0.0] * len(shop.befores)
+    first = {steps[0]: block for block, steps in enumerate(shop.steps_of)}
+    machines = shop.shop.machines
+    for step in shop.order:
+        head = max((heads[b] + least[b] for b in shop.befores[step]), default=0.0)
+        if step in first:
+            block = shop.shop.blocks[first[step]]
+            head = max(head, min(machines[m].ready_s for m in block.machines))
+        heads[step] = head
+    return heads
+
+
+def _rows(shop: Compiled, way: Sequence[float], heads: Sequence[float]) -> list[_Block]:
+    least = shop.least_ended(way)
+    rows: list[_Block] = []
+    for block, steps in enumerate(shop.steps_of):
+        inside = sum(least[s] for s in steps)
+        machines = tuple(sorted(shop.shop.blocks[block].machines))
+        rows.append((machines, inside, heads[steps[0]], shop.tails[steps[-1]], block))
+    return rows
+
+
+def _load(shop: Compiled, machines: Sequence[int], rows: Sequence[_Block]) -> float:
+    count = len(machines)
+    ready = sorted(shop.shop.machines[m].ready_s for m in machines)
+    work = sum(row[1] for row in rows)
+    best = (work + sum(ready)) / count + min(row[3] for row in rows)
+    longest = sorted((row[1] for row in rows), reverse=True)
+    if len(longest) > count:
+        best = max(best, longest[count - 1] + longest[count] + ready[0])
+    heads = _cuts(row[2] for row in rows)
+    tails = _cuts(row[3] for row in rows)
+    for tail in tails:
+        late = [row for row in rows if row[3] >= tail]
+        for head in heads:
+            total = sum(row[1] for row in late if row[2] >= head)
+            if total > 0:
+                best = max(best, head + total / count + tail)
+    return best
+
+
+def _cuts(values: Iterable[float]) -> list[float]:
+    distinct = sorted(set(values))
+    if len(distinct) <= CUTS:
+        return distinct
+    return [distinct[i * (len(distinct) - 1) // (CUTS - 1)] for i in range(CUTS)]
+
+
+def _priced(shop: Compiled, rows: Sequence[_Block]) -> float:
+    """The weighted load over kinds of machines that are alike in all blocks' eyes."""
+    alike: dict[tuple[int, int], int] = {}
+    masks: dict[int, int] = defaultdict(int)
+    sets = {machines: i for i, machines in enumerate(dict.fromkeys(row[0] for row in rows))}
+    if len(sets) > MAX_SETS:
+        return 0.0
+    for machines, bit in sets.items():
+        for machine in machines:
+            masks[machine] |= 1 << bit
+    group_of: dict[int, int] = {}
+    sizes: list[int] = []
+    for machine, mask in masks.items():
+        key = (shop.kinds[machine], mask)
+        if key not in alike:
+            alike[key] = len(alike)
+            sizes.append(0)
+        group_of[machine] = alike[key]
+        sizes[alike[key]] += 1
+    kind_of = [kind for kind, _ in alike]
+    work: dict[tuple[tuple[int, float], ...], int] = defaultdict(int)
+    for machines, _, _, _, block in rows:
+        own = shop.own_s[block]
+        groups = sorted({group_of[m] for m in machines})
+        work[tuple((g, own[kind_of[g]] if own else 0.0) for g in groups)] += 1
+    if len(sizes) < 2 or len(work) > 2000:
+        return 0.0
+    return _subgradient(list(work.items()), sizes)
+
+
+def _subgradient(
+    work: Sequence[tuple[tuple[tuple[int, float], ...], int]], sizes: Sequence[int]
+) -> float:
+    count = len(sizes)
+    prices = [1.0 / sum(sizes)] * count
+    best = 0.0
+    for step in range(STEPS):
+        total = 0.0
+        load = [0.0] * count
+        for options, times in work:
+            group, seconds = min(options, key=lambda o: prices[o[0]] * o[1])
+            total += times * prices[group] * seconds
+            load[group] += times * seconds
+        best = max(best, total)
+        top = max((load[g] / sizes[g] for g in range(count)), default=0.0)
+        if top <= total * (1 + 1e-9):
+            break
+        # Groups that are asked for too much become dearer, multiplicatively (Plotkin et al. 1995).
+        rate = 0.5 / (1 + step * 0.2)
+        prices = [
+            max(price * (1 + rate * (load[g] / sizes[g] - total) / top), 1e-12)
+            for g, price in enumerate(prices)
+        ]
+        whole = sum(price * size for price, size in zip(prices, sizes, strict=True))
+        prices = [price / whole for price in prices]
+    return best

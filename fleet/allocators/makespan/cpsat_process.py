@@ -1,0 +1,182 @@
+"""A process that runs CP-SAT: a shop as JSON on standard input, solutions as JSON lines out.
+
+Run as a script by `fleet.allocators.makespan.cpsat`, with nothing of this package imported. A line
+is printed for every better solution, so that whoever ends the process early has the best so far;
+the last line has the status and the proven bound.
+
+The model: a start and an end for every step; every block chooses a machine, or a pool of machines
+that are alike. Without travel a pool is one cumulative, a single machine one no-overlap. With travel
+every machine is a circuit through its blocks, and the way is part of the first step.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from typing import Any
+
+
+def main() -> None:
+    """Read, solve until the deadline, print."""
+    data = json.load(sys.stdin)
+    from ortools.sat.python import cp_model
+
+    model = _Model(cp_model, data)
+    solver = cp_model.CpSolver()
+    solver.parameters.max_time_in_seconds = max(data["until"] - time.time(), 0.05)
+    solver.parameters.num_workers = data["workers"]
+    solver.parameters.random_seed = data["seed"]
+
+    class Print(cp_model.CpSolverSolutionCallback):  # type: ignore[misc]
+        def on_solution_callback(self) -> None:
+            _tell(model.answer(self.value))
+
+    status = solver.solve(model.model, Print())
+    bound = solver.best_objective_bound if status != cp_model.MODEL_INVALID else 0
+    _tell({"status": solver.status_name(status), "bound": bound})
+
+
+def _tell(row: dict[str, Any]) -> None:
+    print(json.dumps(row), flush=True)  # noqa: T201 (standard output is the way out)
+
+
+class _Model:
+    def __init__(self, cp: Any, data: dict[str, Any]) -> None:
+        self.data = data
+        self.model = model = cp.CpModel()
+        self.horizon = horizon = data["horizon"]
+        self.top = model.new_int_var(data["bound"], horizon, "")
+        self.starts = [model.new_int_var(0, horizon, "") for _ in data["steps"]]
+        self.ends = [model.new_int_var(0, horizon, "") for _ in data["steps"]]
+        self.lits: list[dict[int, Any]] = []
+        self.sizes: dict[int, Any] = {}
+        for step, row in enumerate(data["steps"]):
+            for before in row["befores"]:
+                model.add(self.starts[step] >= self.ends[before])
+            model.add(self.top >= self.ends[step] + row["tail"])
+        for block in data["blocks"]:
+            lits = {group: model.new_bool_var("") for group in block["groups"]}
+            model.add_exactly_one(lits.values())
+            self.lits.append(lits)
+        self._durations()
+        if data["travel"] is None:
+            self._cumulatives()
+        else:
+            self._circuits()
+        for number, block in enumerate(data["blocks"]):
+            for other in block["apart"]:
+                for group, lit in self.lits[number].items():
+                    if other > number and group in self.lits[other]:
+                        if data["groups"][group]["size"] == 1:
+                            model.add_at_most_one(lit, self.lits[other][group])
+        model.minimize(self.top)
+        self._hint()
+
+    def _durations(self) -> None:
+        """A step takes what its machine's kind takes, and at least that where it travels."""
+        groups = self.data["groups"]
+        for step, row in enumerate(self.data["steps"]):
+            lits = self.lits[row["block"]]
+            kinds = {groups[group]["kind"] for group in lits}
+            durations = row["durations"]
+            start, end = self.starts[step], self.ends[step]
+            flexible = row["target"] >= 0 and self.data["travel"] is not None
+            if len({durations[kind] for kind in kinds}) == 1:
+                fixed = durations[next(iter(kinds))]
+            else:
+                fixed = sum(lit * durations[groups[group]["kind"]] for group, lit in lits.items())
+            if flexible:
+                self.model.add(end >= start + fixed)
+            else:
+                self.model.add(end == start + fixed)
+
+    def _span(self, block: int) -> tuple[Any, Any]:
+        steps = self.data["blocks"][block]["steps"]
+        return self.starts[steps[0]], self.ends[steps[-1]]
+
+    def _cumulatives(self) -> None:
+        model, groups = self.model, self.data["groups"]
+        intervals: list[list[Any]] = [[] for _ in groups]
+        for number, block in enumerate(self.data["blocks"]):
+            begin, end = self._span(number)
+            single = len(block["steps"]) == 1 and block["place"] == 1
+            for group, lit in self.lits[number].items():
+                if groups[group]["ready"]:
+                    model.add(begin >= groups[group]["ready"]).only_enforce_if(lit)
+                if single:
+                    row = self.data["steps"][block["steps"][0]]
+                    size = row["durations"][groups[group]["kind"]]
+                else:
+                    # A block that must be first has the machine from the start, one that must be
+                    # last keeps it to the end.
+                    begin = begin if block["place"] else 0
+                    end = end if block["place"] < 2 else self.horizon
+                    size = model.new_int_var(0, self.horizon, "")
+                interval = model.new_optional_interval_var(begin, size, end, lit, "")
+                intervals[group].append(interval)
+        for group, rows in zip(groups, intervals, strict=True):
+            if group["size"] == 1:
+                model.add_no_overlap(rows)
+            elif len(rows) > group["size"]:
+                model.add_cumulative(rows, [1] * len(rows), group["size"])
+
+    def _circuits(self) -> None:
+        model, data = self.model, self.data
+        for number, group in enumerate(data["groups"]):
+            mine = [b for b, lits in enumerate(self.lits) if number in lits]
+            travel = data["travel"][group["kind"]]
+            empty = model.new_bool_var("")
+            arcs = [(0, 0, empty)]
+            for here, block in enumerate(mine, start=1):
+                row = data["blocks"][block]
+                lit = self.lits[block][number]
+                arcs.append((here, here, ~lit))
+                model.add_implication(lit, ~empty)
+                first, last = model.new_bool_var(""), model.new_bool_var("")
+                arcs += [(0, here, first), (here, 0, last)]
+                self._follows(block, group, first, group["ready"], travel[group["site"]])
+                if row["place"] == 2:
+                    continue
+                for there, other in enumerate(mine, start=1):
+                    follows = data["blocks"][other]["place"]
+                    if here == there or follows < row["place"]:
+                        continue
+                    arc = model.new_bool_var("")
+                    arcs.append((here, there, arc))
+                    end = self._span(block)[1]
+                    self._follows(other, group, arc, end, travel[row["exit"]])
+            model.add_circuit(arcs)
+
+    def _follows(self, block: int, group: Any, arc: Any, free: Any, ways: list[int]) -> None:
+        begin, _ = self._span(block)
+        self.model.add(begin >= free).only_enforce_if(arc)
+        entry = self.data["blocks"][block]["entry"]
+        if entry < 0:
+            return
+        row = self.data["steps"][entry]
+        size = row["durations"][group["kind"]] + ways[row["target"]]
+        self.model.add(self.ends[entry] >= self.starts[entry] + size).only_enforce_if(arc)
+
+    def _hint(self) -> None:
+        hint = self.data["hint"]
+        for step, start in enumerate(hint["starts"]):
+            self.model.add_hint(self.starts[step], start)
+            self.model.add_hint(self.ends[step], hint["ends"][step])
+        for lits, chosen in zip(self.lits, hint["groups"], strict=True):
+            for group, lit in lits.items():
+                self.model.add_hint(lit, group == chosen)
+
+    def answer(self, value: Any) -> dict[str, Any]:
+        """The solution: a start for every block, and its group."""
+        return {
+            "starts": [value(self._span(b)[0]) for b in range(len(self.lits))],
+            "ends": [value(self._span(b)[1]) for b in range(len(self.lits))],
+            "groups": [
+                next(group for group, lit in lits.items() if value(lit)) for lits in self.lits
+            ],
+        }
+
+
+if __name__ == "__main__":
+    main()

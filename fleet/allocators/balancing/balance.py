@@ -89,11 +89,14 @@ def balance(problem: LoadProblem) -> Balance | Unbalanced:
             return Balance(robot, relaxed, least_top, proven=True)
     if told := why_not_apart(problem.able, problem.apart):
         return Unbalanced(True, told)
-    starts = [longest_first(problem.able, problem.load, problem.robots, problem.apart)]
+    best: Sharing | None = None
     if alike:
-        starts.append(Sharing.mended(problem.load, problem.robots, problem.apart, robot))
-    found = [improve(start, problem.able, relaxed) for start in starts if start is not None]
-    best = min(filter(None, found), key=Sharing.sorted_loads, default=None)
+        mended = Sharing.mended(problem.load, problem.robots, problem.apart, robot)
+        best = improve(mended, problem.able, relaxed)
+    if best is None or best.sorted_loads() != relaxed:
+        greedy = longest_first(problem.able, problem.load, problem.robots, problem.apart)
+        found = [best, greedy and improve(greedy, problem.able, relaxed)]
+        best = min(filter(None, found), key=Sharing.sorted_loads, default=None)
     complete = best is not None and best.sorted_loads() == relaxed
     if not complete:
         best, complete = branch_and_bound(

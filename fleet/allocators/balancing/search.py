@@ -5,6 +5,7 @@ Everything here counts steps and not seconds, so that the same problem has the s
 
 from __future__ import annotations
 
+from bisect import insort
 from collections.abc import Collection, Sequence
 
 from fleet.allocators.balancing.apart import neighbours
@@ -78,13 +79,33 @@ def longest_first(
     near = neighbours(apart, len(load))
     made = Sharing(load, robots, near)
     order = sorted(range(len(load)), key=lambda a: (-len(near[a]), -load[a], able[a].bit_count()))
+    at = {0: (1 << robots) - 1}
+    levels = [0]
     for actor in order:
-        taken = {made.robot[other] for other in near[actor]}
-        free = [robot for robot in bits(able[actor]) if robot not in taken]
-        if not free:
+        free = able[actor] & ~_taken(made, actor)
+        level = next((level for level in levels if free & at[level]), -1)
+        if level < 0:
             return None
-        made.put(actor, min(free, key=made.loads.__getitem__))
+        bit = (found := free & at[level]) & -found
+        made.put(actor, bit.bit_length() - 1)
+        at[level] ^= bit
+        if not at[level]:
+            del at[level]
+            levels.remove(level)
+        if (higher := level + load[actor]) not in at:
+            at[higher] = 0
+            insort(levels, higher)
+        at[higher] |= bit
     return made
+
+
+def _taken(sharing: Sharing, actor: int) -> int:
+    """The robots that the actor must not be, since another one is."""
+    mask = 0
+    for other in sharing.near[actor]:
+        if sharing.robot[other] >= 0:
+            mask |= 1 << sharing.robot[other]
+    return mask
 
 
 def improve(sharing: Sharing, able: Sequence[int], relaxed: Sequence[int]) -> Sharing | None:
@@ -242,8 +263,7 @@ class _Search:
         partial = self.partial
         rated = []
         for actor in self.left:
-            taken = {partial.robot[other] for other in partial.near[actor]}
-            free = [robot for robot in bits(self.able[actor]) if robot not in taken]
+            free = list(bits(self.able[actor] & ~_taken(partial, actor)))
             self.steps += 1 + len(free)
             rated.append((len(free), -partial.load[actor], actor, free))
         _, _, actor, free = min(rated)

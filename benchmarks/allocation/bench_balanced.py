@@ -1,0 +1,185 @@
+"""How long it takes to share tasks evenly, and how much memory, beside the paper's MILP.
+
+`python -m benchmarks.allocation.bench_balanced` from the top folder. Each row is a process of its
+own, which builds the problem from what tasks need and robots have (`alike`, `types`, `different`:
+a robot's capabilities) or from the list of robots that can do each task (`random`: about half of
+them; `sparse`: two or three; `weighted`: as random, actors of 1 to 7 tasks; `apart`: as random,
+every two actors different robots), solves it, and gives every task its robot. The time is for all
+of that, the memory what the process' peak grew by over its input. Wall times, one run
+each; numbers are of this machine and of whatever else it was doing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import resource
+import subprocess
+import sys
+import time
+
+from rich.console import Console
+from rich.table import Table
+
+from fleet.allocators.balancing import (
+    Balance,
+    LoadProblem,
+    balance,
+    classes_of_needs,
+    loads_of,
+    semi_matching,
+)
+from fleet.allocators.balancing.balance import spread
+from fleet.allocators.balancing.bits import bits, mask_of
+from fleet.allocators.min_max_load import Bound, min_max_load
+
+SIZES = ((100, 20), (1_000, 100), (10_000, 1_000))
+KINDS = ("alike", "types", "different", "random", "sparse", "weighted", "apart")
+CAPABILITIES = 12
+MILP_LIMIT_S = 20.0
+MILP_TASKS = 100
+"""With more tasks the paper's MILP, left to itself, takes minutes."""
+TARGET_S, TARGET_MB = 1.0, 100.0
+
+
+def main() -> None:
+    """Print the table."""
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--one", nargs=3, metavar=("KIND", "TASKS", "ROBOTS"))
+    options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--milp", action="store_true", help="the paper's MILP for small sizes too")
+    given = options.parse_args()
+    if given.one:
+        kind, tasks, robots = given.one[0], int(given.one[1]), int(given.one[2])
+        sys.stdout.write(json.dumps(measured(kind, tasks, robots, given.seed, given.milp)))
+        return
+    table = Table(
+        "robots",
+        "tasks x robots",
+        "time",
+        "memory",
+        "loads: most, least",
+        "bound",
+        "proven",
+        "MILP alone",
+        title="evenest loads, build and answer included",
+    )
+    for kind in KINDS:
+        for tasks, robots in SIZES:
+            command = [sys.executable, "-m", "benchmarks.allocation.bench_balanced", "--one"]
+            command += [kind, str(tasks), str(robots), "--seed", str(given.seed)]
+            command += ["--milp"] if given.milp and tasks <= MILP_TASKS else []
+            ran = subprocess.run(command, capture_output=True, text=True, check=True)
+            row = json.loads(ran.stdout)
+            met = row["s"] < TARGET_S and row["mb"] < TARGET_MB
+            table.add_row(
+                kind,
+                f"{tasks} x {robots}",
+                f"{row['s']:.3f} s" + ("" if met else " (missed)"),
+                f"{row['mb']:.0f} MB",
+                f"{row['most']}, {row['least']}",
+                str(row["bound"]),
+                "yes" if row["proven"] else "no",
+                row.get("milp", ""),
+            )
+    Console(width=120).print(table)
+
+
+def measured(kind: str, tasks: int, robots: int, seed: int, milp: bool) -> dict[str, object]:
+    """Solve one problem: time [s], memory [MB], greatest and least load, and whether proven."""
+    chance = random.Random(seed)
+    if kind in ("alike", "types", "different"):
+        needs, has = _capabilities(kind, tasks, robots, chance)
+        before_kb, start = _peak_kb(), time.perf_counter()
+        classes = classes_of_needs(needs, has, frozenset.issubset)
+        members = [len(found) for found in classes.robots]
+        shares = semi_matching([len(found) for found in classes.actors], classes.able, members)
+        robot = spread(classes, shares)
+        took_s = time.perf_counter() - start
+        loads, bound, proven = loads_of(shares, members), 0, True
+        grown_mb = (_peak_kb() - before_kb) / 1024
+        assert all(needs[t] <= has[r] for t, r in enumerate(robot))
+        bound = loads[0]
+        problem = LoadProblem(
+            [mask_of((r for r, h in enumerate(has) if need <= h), robots) for need in needs]
+            if milp
+            else [],
+            [1] * tasks,
+            robots,
+        )
+    else:
+        able = _able(kind, tasks, robots, chance)
+        load = [chance.randint(1, 7) if kind == "weighted" else 1 for _ in range(tasks)]
+        pairs = tasks // 2 if kind == "apart" else 0
+        apart = frozenset((2 * n, 2 * n + 1) for n in range(pairs))
+        before_kb, start = _peak_kb(), time.perf_counter()
+        rows = [mask_of(found, robots) for found in able]
+        problem = LoadProblem(rows, load, robots, apart)
+        made = balance(problem)
+        took_s = time.perf_counter() - start
+        grown_mb = (_peak_kb() - before_kb) / 1024
+        assert isinstance(made, Balance)
+        loads, bound, proven = list(made.loads), made.least_top, made.proven
+    row: dict[str, object] = {
+        "s": took_s,
+        "mb": grown_mb,
+        "most": loads[0],
+        "least": loads[-1],
+        "bound": bound,
+        "proven": proven,
+    }
+    if milp:
+        row["milp"] = _milp(problem)
+    return row
+
+
+def _peak_kb() -> int:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def _capabilities(
+    kind: str, tasks: int, robots: int, chance: random.Random
+) -> tuple[list[frozenset[int]], list[frozenset[int]]]:
+    """What every task needs, and what every robot has; some robot can do each task."""
+    all_of_them = range(CAPABILITIES)
+    if kind == "alike":
+        return [frozenset()] * tasks, [frozenset(all_of_them)] * robots
+    if kind == "types":
+        types = [frozenset(chance.sample(all_of_them, 6)) for _ in range(8)]
+        has = [chance.choice(types) for _ in range(robots)]
+    else:  # every robot has a serial number of its own, besides what it can do
+        has = [
+            frozenset(chance.sample(all_of_them, chance.randint(3, 9))) | {CAPABILITIES + r}
+            for r in range(robots)
+        ]
+    needs: list[frozenset[int]] = []
+    while len(needs) < tasks:
+        robot = chance.choice(has)
+        needs.append(frozenset(chance.sample(sorted(c for c in robot if c < CAPABILITIES), 2)))
+    return needs, has
+
+
+def _able(kind: str, tasks: int, robots: int, chance: random.Random) -> list[list[int]]:
+    """The robots that can do each task: half of all by chance, or for `sparse` two or three."""
+    return [
+        chance.sample(range(robots), chance.randint(2, 3))
+        if kind == "sparse"
+        else list(bits(chance.getrandbits(robots) or 1))
+        for _ in range(tasks)
+    ]
+
+
+def _milp(problem: LoadProblem) -> str:
+    """The paper's program without any help: time, greatest load, whether proven."""
+    able = {str(a): tuple(map(str, bits(mask))) for a, mask in enumerate(problem.able)}
+    load = {str(a): load for a, load in enumerate(problem.load)}
+    apart = frozenset((str(one), str(other)) for one, other in problem.apart)
+    start = time.perf_counter()
+    made = min_max_load(able, load, apart, Bound(), MILP_LIMIT_S)
+    told = "" if made.proven else " (not proven)"
+    return f"{time.perf_counter() - start:.2f} s: {made.top}{told}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,308 @@
+"""The allocators that look at load or travel, on households, and what they say when it fails."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from fleet.allocators.balanced import BalancedAllocator
+from fleet.allocators.balancing import Balance, LoadProblem, balance
+from fleet.allocators.base import Allocated, AllocationProblem, Allocator, NotAllocated
+from fleet.allocators.cost_based import CostBasedAllocator
+from fleet.allocators.llm import Choice, LlmAllocator
+from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import Bound, min_max_load
+from fleet.allocators.reasons import tasks_nobody_can_do
+from fleet.allocators.round_robin import RoundRobinAllocator
+from fleet.allocators.solver_run import Found, available_solver, solve
+from fleet.core.checker import check_plan
+from fleet.core.world_model import WorldModel
+from fleet.planners.base import PlanningProblem
+from fleet.planners.llm import LlmConfig, ModelCaller
+from fleet.planners.llm.conversation import Conversation, GivenUp, Ledger, Rejected
+from fleet.planners.llm.prompts import Prompts
+from fleet.planners.symbolic import SymbolicPlanner
+from keyexpr_schema.plans import Plan, Task, Violation
+from tests.household import bring, carrier, fact, home, manipulator
+from tests.llm_server import LlmServer, Reply
+
+PLAIN = (BalancedAllocator(), MilpAllocator(), CostBasedAllocator(), RoundRobinAllocator())
+TEAM = (manipulator("r1"), manipulator("r2"), manipulator("r3"), carrier("c1"), carrier("c2"))
+
+
+def plan_for(world: WorldModel, goals: int) -> Plan:
+    wanted = [bring(n, "hallway" if n % 2 else "living_room") for n in range(1, goals + 1)]
+    made = SymbolicPlanner().plan(PlanningProblem("p", tuple(wanted), world))
+    assert isinstance(made, Plan), made
+    return made
+
+
+def loads(plan: Plan, made: Allocated) -> list[int]:
+    found = dict.fromkeys(made.allocation.values(), 0)
+    for task in plan.tasks:
+        found[made.allocation[task.actor]] += 1
+    return sorted(found.values(), reverse=True)
+
+
+def drives(
+    *robots: str, to: str = "kitchen", after: dict[int, tuple[str, ...]] | None = None
+) -> Plan:
+    """A plan of one drive for each; a name pins its actor to that robot, "" leaves it free."""
+    tasks = [
+        Task(
+            task=f"t{n}",
+            skill="navigate",
+            args={"robot": f"?a{n}", "to": "kitchen"},
+            actor=f"a{n}",
+            after=(after or {}).get(n, ()),
+        )
+        for n in range(len(robots))
+    ]
+    pins = {f"a{n}": robot for n, robot in enumerate(robots) if robot}
+    return Plan(plan="p", goals=(), conditions=(), tasks=tuple(tasks), pins=pins)
+
+
+@pytest.mark.parametrize("allocator", PLAIN, ids=lambda allocator: allocator.name)
+def test_every_allocator_passes_the_checker(allocator: Allocator) -> None:
+    world = home(TEAM, cups=8)
+    plan = plan_for(world, 8)
+    made = allocator.allocate(plan, world)
+    assert isinstance(made, Allocated), made
+    assert check_plan(plan, world, made.allocation, made.schedule.extra_after).valid
+    assert set(made.allocation) == {task.actor for task in plan.tasks}
+
+
+@pytest.mark.parametrize("allocator", PLAIN, ids=lambda allocator: allocator.name)
+def test_pins_and_capabilities_bind_every_allocator(allocator: Allocator) -> None:
+    world = home(TEAM)
+    made = allocator.allocate(drives("c2", "", "c2"), world)
+    assert isinstance(made, Allocated), made
+    assert made.allocation["a0"] == made.allocation["a2"] == "c2"
+    refused = allocator.allocate(plan_for(world, 2), home((carrier(),)))
+    assert isinstance(refused, NotAllocated)
+    assert "does not have the skill" in refused.violations[0].sentence
+
+
+@pytest.mark.parametrize("allocator", PLAIN, ids=lambda allocator: allocator.name)
+def test_a_plan_without_tasks_is_allocated(allocator: Allocator) -> None:
+    made = allocator.allocate(drives(), home())
+    assert isinstance(made, Allocated)
+    assert made.allocation == {}
+
+
+@pytest.mark.parametrize("allocator", PLAIN, ids=lambda allocator: allocator.name)
+def test_too_few_robots_are_said_with_tasks_and_names(allocator: Allocator) -> None:
+    """Two cups are to be in two baskets, and there is one: both loads stay at the end."""
+    world = home((manipulator(), carrier("c1")), cups=2)
+    rows: list[Task] = []
+    for n in (1, 2):
+        hand, basket = f"?h{n}", f"?b{n}"
+        cup = {"robot": hand, "object": f"cup_{n}", "place": "kitchen"}
+        rows += [
+            task(f"go{n}", "navigate", {"robot": hand, "to": "kitchen"}),
+            task(f"come{n}", "navigate", {"robot": basket, "to": "kitchen"}),
+            task(f"pick{n}", "pick", cup, f"go{n}"),
+            task(f"give{n}", "place_on_robot", {**cup, "carrier": basket}, f"pick{n}", f"come{n}"),
+        ]
+    plan = Plan(plan="p", goals=(), conditions=(), tasks=tuple(rows))
+    refused = allocator.allocate(plan, world)
+    assert isinstance(refused, NotAllocated), refused
+    told = refused.violations[0].sentence
+    assert "actors b1 and b2 must all be different robots" in told
+    assert "each still has a load at the end" in told
+    assert "only c1 can be any of them" in told
+
+
+def task(name: str, skill: str, args: dict[str, str], *after: str) -> Task:
+    return Task(task=name, skill=skill, args=args, actor=args["robot"][1:], after=after)
+
+
+def test_the_evenest_loads_are_found_where_round_robin_misses_them() -> None:
+    """Free actors come first in turn, and take the one robot that the pinned ones need."""
+    world = home((manipulator("r1"), manipulator("r2")))
+    plan = drives("", "", "r1", "r1")
+    even = BalancedAllocator().allocate(plan, world)
+    turn = RoundRobinAllocator().allocate(plan, world)
+    assert isinstance(even, Allocated) and isinstance(turn, Allocated)
+    assert loads(plan, even) == [2, 2]
+    assert loads(plan, turn) == [3, 1]
+
+
+def test_round_robin_goes_on_where_it_stopped() -> None:
+    made = RoundRobinAllocator().allocate(drives(*[""] * 7), home(TEAM))
+    assert isinstance(made, Allocated)
+    assert list(made.allocation.values()) == ["c1", "c2", "r1", "r2", "r3", "c1", "c2"]
+
+
+def test_cost_based_sends_the_robot_that_is_there() -> None:
+    world = home(
+        TEAM[:3],
+        facts=(
+            fact("r1", "at", "living_room"),
+            fact("r2", "at", "kitchen"),
+            fact("r3", "at", "hallway"),
+        ),
+    )
+    # The second drive waits for the first, so it is of the next round: r2 is still the nearest.
+    made = CostBasedAllocator().allocate(drives("", "", after={1: ("t0",)}), world)
+    assert isinstance(made, Allocated)
+    assert made.allocation == {"a0": "r2", "a1": "r2"}
+    # In one round every robot takes one at most.
+    made = CostBasedAllocator().allocate(drives("", ""), world)
+    assert isinstance(made, Allocated)
+    assert set(made.allocation.values()) == {"r2", "r3"}
+
+
+def test_the_milp_breaks_ties_by_travel() -> None:
+    world = home(TEAM[:2], facts=(fact("r1", "at", "living_room"), fact("r2", "at", "kitchen")))
+    made = MilpAllocator().allocate(drives(""), world)
+    assert isinstance(made, Allocated)
+    assert made.allocation == {"a0": "r2"}
+
+
+class Undecided(MilpAllocator):
+    """The program of a solver that never gets anywhere."""
+
+    def _assign(self, problem: AllocationProblem) -> dict[str, str] | NotAllocated:
+        told = Violation(code="no-allocation", sentence="the solver found nothing in time")
+        return self._otherwise(problem, NotAllocated((told,)))
+
+
+def test_the_papers_fallback_is_off_unless_asked_for_and_says_so(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    plan, world = drives("", ""), home(TEAM[:2])
+    refused = Undecided().allocate(plan, world)
+    assert isinstance(refused, NotAllocated)
+    with caplog.at_level(logging.WARNING):
+        made = Undecided(fallback_round_robin=True).allocate(plan, world)
+    assert isinstance(made, Allocated)
+    assert made.allocation == {"a0": "r1", "a1": "r2"}
+    assert "by round-robin and not by the MILP: the solver found nothing in time" in caplog.text
+
+
+def test_tasks_that_nobody_can_do_are_named_with_what_is_lacking() -> None:
+    plan = plan_for(home(), 1)
+    world = home((carrier("c1"), manipulator("weak", grip_kg=0.1)))
+    told = tasks_nobody_can_do(plan, check_plan(plan, world), world)
+    pick = next(row.task for row in plan.tasks if row.skill == "pick")
+    sentence = next(violation.sentence for violation in told if violation.task == pick)
+    assert sentence.startswith(f"no robot can do task {pick}, pick: ")
+    assert "c1 does not have the skill pick" in sentence
+    assert "weak's grip is 0.1 kg" in sentence
+
+
+@pytest.mark.parametrize("solver", ["cbc", "highs"])
+def test_a_solver_keeps_standard_output_clean_and_says_what_it_found(
+    solver: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    if solver == "highs" and available_solver() != "highs":
+        pytest.skip("highspy is not installed")
+    able = {f"a{n}": ("r1", "r2", "r3") for n in range(8)}
+    load = dict.fromkeys(able, 1)
+    made = min_max_load(able, load, frozenset(), Bound(), 20.0, solver=solver)
+    assert (made.top, made.proven) == (3, True)
+    pair, apart = {"a": ("r1",), "b": ("r1",)}, frozenset({("a", "b")})
+    none = min_max_load(pair, {"a": 1, "b": 1}, apart, Bound(), 20.0, solver=solver)
+    assert (none.robot, none.proven) == (None, True)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_solver_that_does_not_run_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    import pulp
+
+    monkeypatch.setattr(pulp.PULP_CBC_CMD, "pulp_cbc_path", "/no/such/solver")
+    model = pulp.LpProblem("m", pulp.LpMinimize)
+    model += model.add_variable("x", lowBound=1)
+    assert solve(model, 5.0, solver="cbc").found is Found.NOTHING
+
+
+def test_many_robots_that_are_alike_do_not_keep_the_milp_busy() -> None:
+    """202 tasks and 20 robots took the solver alone 20 s."""
+    able = {f"a{n}": tuple(f"r{r}" for r in range(20)) for n in range(202)}
+    made = balance(LoadProblem([(1 << 20) - 1] * 202, [1] * 202, 20))
+    assert isinstance(made, Balance)
+    robot = {actor: f"r{r}" for actor, r in zip(able, made.robot, strict=True)}
+    travel_s = {(a, r): float((n * 7 + m * 3) % 11) for n, a in enumerate(able)
+                for m, r in enumerate(able[a])}  # fmt: skip
+    bound = Bound(made.least_top, robot)
+    solved = min_max_load(able, dict.fromkeys(able, 1), frozenset(), bound, 20.0, travel_s)
+    assert (solved.top, solved.proven) == (11, True)
+    assert solved.robot is not None
+    before = sum(travel_s[pair] for pair in robot.items())
+    assert sum(travel_s[pair] for pair in solved.robot.items()) < before
+
+
+@pytest.fixture(scope="module")
+def caller() -> Iterator[ModelCaller]:
+    """One for all tests: LiteLLM takes seconds to import."""
+    caller = ModelCaller()
+    yield caller
+    caller.close()
+
+
+def by_model(server: LlmServer, caller: ModelCaller) -> LlmAllocator:
+    """Through the conversation of the language-model planner, repairs and budget included."""
+    config = LlmConfig(
+        model="openai/scripted", api_base=server.api_base, timeout_s=20.0, retry_wait_s=0.01
+    )
+
+    def ask(
+        system: str,
+        question: str,
+        repair: str,
+        schema: dict[str, Any],
+        read: Callable[[str], Choice | tuple[Violation, ...]],
+    ) -> Choice | str:
+        def taken(text: str) -> Choice | Rejected:
+            made = read(text)
+            return made if isinstance(made, dict) else Rejected(made)
+
+        prompts = Prompts("allocation", {"repair": repair, "house-rules": ""})
+        asked = Conversation(config, prompts, caller)
+        made = asked.ask(system, question, "repair", schema, taken, Ledger(config))
+        return made.reason if isinstance(made, GivenUp) else made
+
+    return LlmAllocator(ask, BalancedAllocator())
+
+
+def answer(**robots: str) -> Reply:
+    return Reply({"robots": [{"actor": a, "robot": r} for a, r in robots.items()]})
+
+
+def test_a_language_model_is_told_what_is_wrong_and_mends_it(caller: ModelCaller) -> None:
+    world, plan = home(TEAM[:2]), drives("", "r2")
+    replies = (Reply("no idea"), answer(a0="r9", a1="r1"), answer(a0="r2", a1="r2"))
+    with LlmServer(*replies) as server:
+        made = by_model(server, caller).allocate(plan, world)
+    assert isinstance(made, Allocated)
+    assert made.allocation == {"a0": "r2", "a1": "r2"}
+    told = json.dumps(server.requests[2]["messages"])
+    assert "r9 cannot be actor a0; it can be r1, r2" in told
+    assert "r1 cannot be actor a1; it can be r2" in told
+
+
+def test_a_language_model_that_is_never_right_is_replaced_and_that_is_said(
+    caller: ModelCaller, caplog: pytest.LogCaptureFixture
+) -> None:
+    world, plan = home(TEAM[:2]), drives("", "")
+    with LlmServer(answer(a0="r1")) as server, caplog.at_level(logging.WARNING):
+        made = by_model(server, caller).allocate(plan, world)
+    assert isinstance(made, Allocated)
+    assert set(made.allocation.values()) == {"r1", "r2"}
+    assert "allocated by balanced and not by language model" in caplog.text
+    assert "actor a1 is given no robot" in caplog.text
+
+
+def test_a_language_model_that_fails_stops_nothing(caplog: pytest.LogCaptureFixture) -> None:
+    def ask(*_: object, **__: object) -> Choice | str:
+        raise OSError("no network")
+
+    with caplog.at_level(logging.WARNING):
+        made = LlmAllocator(ask, RoundRobinAllocator()).allocate(drives(""), home(TEAM[:2]))
+    assert isinstance(made, Allocated)
+    assert "asking the language model failed: no network" in caplog.text

@@ -174,10 +174,13 @@ class PlanFlow:
                     if not any(self._graph.precedes(writer, other) for other, _ in rows)
                 ]
             )
-        for actor, robot in self._plan.pins.items():
-            for variable in self._writers:
-                if variable.subject == ACTOR_PREFIX + actor:
-                    final[Variable(variable.relation, robot)] = final[variable]
+        pinned = {ACTOR_PREFIX + actor: robot for actor, robot in self._plan.pins.items()}
+        for variable in self._writers:
+            value = final[variable]
+            if isinstance(value, str) and value in pinned:
+                value = final[variable] = pinned[value]
+            if variable.subject in pinned:
+                final[Variable(variable.relation, pinned[variable.subject])] = value
         return final
 
 

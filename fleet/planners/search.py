@@ -24,7 +24,7 @@ from keyexpr_schema.world import Value
 
 DERIVED_FROM = {LOCATED: {"at"}, HELD: {"at", "holding"}}
 """Relations that a derived one is read off."""
-MAX_EXPANSIONS = 200_000
+MAX_EXPANSIONS = 30_000
 """States looked at before the search gives up."""
 
 Facts = dict[Variable, Value]

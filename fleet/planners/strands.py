@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 
 from msgspec.structs import replace
@@ -99,7 +99,9 @@ def options_for(
     found.sort(key=lambda pair: pair[0].cost_s + _unloading_s(pair[0], pair[1], world))
     strands: dict[object, Strand] = {}
     for result, condition in found:
-        named = frozenset({condition.subject} & world.robots.keys())
+        named = frozenset(
+            robot for robot in world.robots if robot in (condition.subject, condition.value)
+        )
         content = tuple(_signature(action) for action in result.actions)
         strands.setdefault(content, Strand(aim.goal, result.actions, named))
     return Options(tuple(strands.values())[:ALTERNATIVES], found[0][0].facts)
@@ -117,7 +119,7 @@ def _different(
 ) -> list[Found]:
     """The cheapest sequence, and others made different by charging for what was used before."""
     subject = condition.subject
-    robots = _representatives(subject, facts, world)
+    robots = _representatives({subject, condition.value}, subject, facts, world)
     start: Facts = dict(facts)
     for robot in world.robots.keys() - settled:
         start[Variable("at", robot)] = None
@@ -128,12 +130,22 @@ def _different(
     }
     objects = sorted(held | ({subject} & world.objects.keys()))
     results = _cheapest_few(condition, robots, objects, start, facts, world)
-    if results or len(world.objects) == len(objects):
+    if results or not _needs_a_tool(condition, world):
         return results
     # Something else may be needed for it, such as a tool.
     known = [thing for thing in world.objects if facts.get(Variable("at", thing)) is not None]
     wider = sorted({*objects, *known[:MAX_OBJECTS]})
     return _cheapest_few(condition, robots, wider, start, facts, world)
+
+
+def _needs_a_tool(condition: Condition, world: WorldModel) -> bool:
+    """Whether a skill for it takes more objects than the one that the condition is about."""
+    own = condition.subject in world.objects
+    return any(
+        list(skill.parameters.values()).count("object") > own
+        for skill in world.skills.values()
+        if any(row[0] == condition.relation for row in skill.after)
+    )
 
 
 def _cheapest_few(
@@ -188,8 +200,8 @@ def _signature(action: Action) -> tuple[str, tuple[str, ...]]:
     return action.skill.name, tuple(action.args.values())
 
 
-def _representatives(subject: str, facts: Facts, world: WorldModel) -> list[str]:
-    """One robot of each kind that is interchangeable now, and the one that is spoken of."""
+def _representatives(named: Set[Value], subject: str, facts: Facts, world: WorldModel) -> list[str]:
+    """One robot of each kind that is interchangeable now, and those that are spoken of."""
     kinds: dict[object, str] = {}
     for robot in world.team:
         spec = world.robots[robot]
@@ -197,7 +209,7 @@ def _representatives(subject: str, facts: Facts, world: WorldModel) -> list[str]
             spec.skills,
             tuple(sorted(spec.capabilities.items())),
             facts.get(Variable("holding", robot)),
-            robot if robot == subject or facts.get(Variable("at", subject)) == robot else None,
+            robot if robot in named or facts.get(Variable("at", subject)) == robot else None,
         )
         kinds.setdefault(kind, robot)
     return sorted(kinds.values())

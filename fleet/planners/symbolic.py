@@ -104,11 +104,15 @@ def _choose(
         choice: list[Strand] = []
         for goal in dict.fromkeys(strands[0].goal for strands in options):
             mine = [strands for strands in options if strands[0].goal == goal]
-            best = _best(problem, mine, None)
-            if isinstance(best, NoPlan):
-                return best
-            choice.extend(best)
-        return _checked(problem, choice, explored)
+            alone = _best(problem, mine, None)
+            if isinstance(alone, NoPlan):
+                break
+            choice.extend(alone)
+        else:
+            merged = _checked(problem, choice, explored)
+            if isinstance(merged, Plan):
+                return merged
+        # What is best for each goal alone does not fit together, as where two want one helper.
     best = _best(problem, options, explored)
     return best if isinstance(best, NoPlan) else _plan(problem, best, explored)
 

@@ -236,3 +236,18 @@ def test_what_lies_too_high_or_is_too_heavy_is_left_to_another_robot() -> None:
     only_small = replace(world, available=frozenset({"small"}))
     refused = SymbolicPlanner().plan(PlanningProblem("p", (bring(1, "hallway"),), only_small))
     assert isinstance(refused, NoPlan)
+
+
+def test_a_robot_that_is_to_get_something_gets_it() -> None:
+    robots = (manipulator(), carrier("l1"), carrier("l2"))
+    goal = Goal(goal="g", text="", conditions=(at("cup_1", "l2"),))
+    world = home(robots)
+    made = allocate(solve(world, goal), world)
+    assert set(made.allocation.values()) == {"hsr", "l2"}
+
+
+def test_goals_that_want_the_same_helper_are_still_planned_one_by_one() -> None:
+    world = home(cups=4)
+    goals = [bring(n, "living_room") for n in range(1, 5)]
+    plan = solve(world, *goals, strategy="per-goal")
+    assert allocate(plan, world)

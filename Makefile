@@ -30,6 +30,12 @@ check: lint types imports test ## everything that CI runs
 bench: $(VENV)/development ## measure the key-space and the planner; prints tables
 	for file in benchmarks/bench_*.py; do $(BIN)/python $$file || exit 1; done
 
+bench-planning: $(VENV)/development ## the suite of household missions; writes docs/benchmarks/planning.md
+	$(BIN)/python -m benchmarks.planning.run --out docs/benchmarks
+
+bench-allocation: $(VENV)/development ## allocators and schedulers, beside each other
+	for file in benchmarks/allocation/bench_*.py; do $(BIN)/python $$file || exit 1; done
+
 docs: $(VENV)/development ## write the generated pages under docs/
 	$(BIN)/python -m keyexpr_schema.document
 
@@ -66,4 +72,4 @@ $(VENV)/development: requirements-dev.lock pyproject.toml | $(VENV)/created
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@ $(VENV)/runtime
 
-.PHONY: help demo test lint types imports check bench docs screenshots lock clean
+.PHONY: help demo test lint types imports check bench bench-planning bench-allocation docs screenshots lock clean

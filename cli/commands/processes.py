@@ -153,13 +153,27 @@ def sim(
     speed: Annotated[
         str, typer.Option("--speed", help="Simulated seconds a second, or max.")
     ] = "1",
+    spread: Annotated[
+        float,
+        typer.Option(
+            "--spread", min=0.0, help="Kinematic: how much durations vary (0.2: about a fifth)."
+        ),
+    ] = 0.0,
+    failing: Annotated[
+        float,
+        typer.Option("--failing", min=0.0, max=1.0, help="Kinematic: share of grasps that fail."),
+    ] = 0.0,
+    seed: Annotated[int, typer.Option("--seed", help="Of everything that is drawn.")] = 0,
 ) -> None:
     """Run a simulated world with a mission's robots in it."""
-    from cli.errors import check_known
+    from cli.errors import BadArgument, check_known
 
     check_known("backend", backend, BACKENDS, "")
     pace = parse_speed(speed)
+    if backend != "kinematic" and (spread or failing):
+        raise BadArgument("--spread and --failing are for --backend kinematic; physics needs none")
     from cli.running import end_with_parent
+    from sim.kinematic import Durations
     from sim.process import run
 
     end_with_parent()
@@ -169,6 +183,8 @@ def sim(
         realm=call.settings.realm,
         backend=backend,
         speed=pace,
+        seed=seed,
+        durations=Durations(spread=spread, failure_chance={"grasp": failing}),
     )
 
 

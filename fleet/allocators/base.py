@@ -54,7 +54,8 @@ class Circumstances:
     """What counts in an allocation besides plan and world.
 
     `ready_s` says from when on a robot is free [s from now]; `priority` of a goal decides between
-    equal makespans (each step up counts twice); `due_s` says when a goal should be done [s from now].
+    equal makespans (each step up counts twice); `due_s` says when a goal should be done
+    [s from now].
     """
 
     ready_s: Mapping[str, float] = field(default_factory=dict)
@@ -114,7 +115,9 @@ class Allocator(ABC):
             found = self._scheduled(problem, chosen)
         return found
 
-    def _scheduled(self, problem: AllocationProblem, chosen: Assignment) -> Allocated | NotAllocated:
+    def _scheduled(
+        self, problem: AllocationProblem, chosen: Assignment
+    ) -> Allocated | NotAllocated:
         plan, world, allocation = problem.plan, problem.world, chosen.allocation
         ready_s = problem.circumstances.ready_s
         if chosen.sequence is None:
@@ -132,9 +135,7 @@ class Allocator(ABC):
         return Allocated(allocation, order, chosen.lower_bound_s, chosen.notes)
 
     @abstractmethod
-    def _assign(
-        self, problem: AllocationProblem
-    ) -> Mapping[str, str] | Assignment | NotAllocated:
+    def _assign(self, problem: AllocationProblem) -> Mapping[str, str] | Assignment | NotAllocated:
         """A robot for every actor, among those able; or why there is none."""
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
 from fleet.allocators.makespan.plan_shop import plan_shop
 from fleet.allocators.makespan.portfolio import solve
@@ -14,9 +16,9 @@ DEADLINE_S = 1.0
 class MakespanAllocator(Allocator):
     """Least makespan, with durations from skill models, travel and the order of actors.
 
-    List scheduling and dispatch rules at once; then annealing until the deadline, with CP-SAT beside
-    it where OR-Tools is installed (extra `cp-sat`) and the plan is small enough. The answer says how
-    far from optimal it is at most.
+    List scheduling and dispatch rules at once; then annealing until the deadline, with CP-SAT
+    beside it where OR-Tools is installed (extra `cp-sat`) and the plan is small enough. The answer
+    says how far from optimal it is at most.
     """
 
     name = "makespan"
@@ -45,8 +47,6 @@ class MakespanAllocator(Allocator):
         )
 
 
-def _by_load(chosen: object) -> Assignment:
-    if isinstance(chosen, Assignment):
-        return chosen
-    assert isinstance(chosen, dict)
-    return Assignment(chosen, notes=("load balanced: no rule found an order",))
+def _by_load(chosen: Mapping[str, str] | Assignment) -> Assignment:
+    allocation = chosen.allocation if isinstance(chosen, Assignment) else chosen
+    return Assignment(allocation, notes=("load balanced: no rule found an order",))

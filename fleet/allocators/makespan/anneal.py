@@ -191,7 +191,7 @@ class _Search:
         return True
 
     def _trace(self) -> None:
-        """The blocks on one critical path: from the last end back along what each step waited for."""
+        """The blocks on one critical path, from the last end back along what steps waited for."""
         shop, ends = self.shop, self.ends
         self.critical = []
         if not ends:

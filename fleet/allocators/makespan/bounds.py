@@ -5,27 +5,34 @@
   block has a head, after it a tail (Carlier 1982; for several machines Carlier 1987).
 - Pigeonhole: of the m + 1 longest blocks for m machines two share one.
 - Weighted load for machines of different speed: for prices `y` with `sum(y) = 1`, no machine ends
-  before `sum over blocks of min over machines (y · duration)` (the dual of the fractional assignment,
-  Lenstra, Shmoys, Tardos 1990). The prices come from a few subgradient steps; any prices are a proof.
+  before `sum over blocks of min over machines (y * duration)` (the dual of the fractional
+  assignment, Lenstra, Shmoys, Tardos 1990). Any prices are a proof; ours come from a few
+  subgradient steps.
+- Ways: each block comes after another one, or after a machine's start, and each of those once; the
+  cheapest assignment is what machines travel at least (the assignment relaxation of routing).
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from math import inf
 
 from fleet.allocators.makespan.compiled import Compiled
+from fleet.allocators.makespan.problem import Place
 
 STEPS = 60
 """Subgradient steps for the prices."""
 CUTS = 24
 """Heads, and tails, that are tried as thresholds."""
+MAX_ASSIGNED = 600
+"""Blocks up to which the assignment of ways is solved; 0.1 s there."""
 MAX_SETS = 200
 """Sets of machines that are looked at; those with the most blocks come first."""
 
 
-def lower_bound(shop: Compiled) -> float:
-    """Seconds that no schedule is shorter than."""
+def lower_bound(shop: Compiled, met_s: float = inf) -> float:
+    """Seconds that no schedule is shorter than; no better one is looked for once it is `met_s`."""
     if not shop.befores:
         return 0.0
     way = [_least_way_s(shop, block) for block in range(len(shop.steps_of))]
@@ -40,11 +47,17 @@ def lower_bound(shop: Compiled) -> float:
         sets[machines] += 1
     chosen = sorted(sets, key=lambda machines: -sets[machines])[:MAX_SETS]
     union = tuple(sorted(set().union(*chosen)))
-    for machines in dict.fromkeys([*chosen, union]):
-        inside = set(machines)
-        mine = [row for row in rows if row[0] == machines or inside.issuperset(row[0])]
-        best = max(best, _load(shop, machines, mine))
-    return max(best, _priced(shop, rows))
+    within = {
+        machines: [row for row in rows if row[0] == machines or inside.issuperset(row[0])]
+        for machines in dict.fromkeys([*chosen, union])
+        if (inside := set(machines))
+    }
+    best = max(best, *(_load(shop, machines, mine) for machines, mine in within.items()))
+    best = max(best, _priced(shop, rows))
+    for machines, mine in within.items() if shop.travels else ():
+        if best < met_s and len(mine) <= MAX_ASSIGNED:
+            best = max(best, _with_ways(shop, machines, mine, way))
+    return min(best, met_s)
 
 
 _Block = tuple[tuple[int, ...], float, float, float, int]
@@ -102,6 +115,41 @@ def _load(shop: Compiled, machines: Sequence[int], rows: Sequence[_Block]) -> fl
             if total > 0:
                 best = max(best, head + total / count + tail)
     return best
+
+
+def _with_ways(
+    shop: Compiled, machines: Sequence[int], rows: Sequence[_Block], way: Sequence[float]
+) -> float:
+    """The load with the least total way instead of each block's own least way."""
+    from scipy.optimize import linear_sum_assignment
+
+    inside = set(machines)
+    blocks = shop.shop.blocks
+    near = [b for b, block in enumerate(blocks) if not inside.isdisjoint(block.machines)]
+    if any(shop.exit_of[b] < 0 for b in near):
+        return 0.0  # a block that leaves its machine where it was hands on the one before it
+    entering = [row[4] for row in rows if shop.entry[row[4]] >= 0]
+    if not entering:
+        return 0.0
+    kinds = sorted({shop.kinds[m] for m in machines})
+    ahead = [b for b in near if shop.places[b] != Place.LAST]
+    sites = [shop.exit_of[b] for b in ahead] + [shop.shop.machines[m].site for m in machines]
+    least = {
+        (origin, target): min(shop.shop.travel_s[kind][origin][target] for kind in kinds)
+        for origin in set(sites)
+        for target in {shop.entry[b] for b in entering}
+    }
+    costs = [[least[site, shop.entry[b]] for site in sites] for b in entering]
+    column = {b: j for j, b in enumerate(ahead)}
+    never = 1.0 + sum(max(row) for row in costs)
+    for row, b in zip(costs, entering, strict=True):
+        if b in column:
+            row[column[b]] = never
+    taken = linear_sum_assignment(costs)
+    total = sum(costs[i][j] for i, j in zip(*taken, strict=True))
+    work = sum(row[1] for row in rows) - sum(way[b] for b in entering)
+    ready = sum(shop.shop.machines[m].ready_s for m in machines)
+    return (work + min(total, never) + ready) / len(machines) + min(row[3] for row in rows)
 
 
 def _cuts(values: Iterable[float]) -> list[float]:

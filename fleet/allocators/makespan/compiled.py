@@ -1,8 +1,8 @@
 """A shop made ready for the inner loops: legs inside blocks folded in, chains merged, knots found.
 
 A *knot* is a set of blocks that depend on each other both ways, as the blocks of two robots that
-meet do. Machines take whole knots in one order, which is what keeps them from waiting for each other
-in a circle: everything that a knot waits for stands before it.
+meet do. Machines take whole knots in one order, which keeps them from waiting for each other in a
+circle: everything that a knot waits for stands before it.
 """
 
 from __future__ import annotations
@@ -131,8 +131,8 @@ class Compiled:
             )
         self.knot_rank = [max(self.ranks[step.number] for step in flow) for flow in self.flow]
         self.knot_place = [max(self.places[b] for b in mine) for mine in self.knot_blocks]
-        for mine in self.knot_blocks:
-            mine.sort(key=lambda block: place[first[block]])
+        for together in self.knot_blocks:
+            together.sort(key=lambda block: place[first[block]])
         self.entry = [
             next((rows[s][2] for s in steps if rows[s][0][0] == b and rows[s][2] >= 0), -1)
             for b, steps in enumerate(self.steps_of)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib.util import find_spec
 from math import floor
 from pathlib import Path
@@ -57,20 +58,9 @@ class CpSat:
             text=True,
         )
         assert self._process.stdin is not None
-        try:
-            self._process.stdin.write(json.dumps(request))
-            self._process.stdin.flush()
-        except BrokenPipeError:
-            pass  # it ended at once; what it says, or does not, is read as usual
-        # `communicate` closes the pipe, also one that is closed already.
-        self._close_input()
-
-    def _close_input(self) -> None:
-        assert self._process.stdin is not None
-        try:
-            self._process.stdin.close()
-        except BrokenPipeError:
-            pass
+        # It may end at once; what it says, or does not, is read as usual.
+        with suppress(BrokenPipeError), self._process.stdin as pipe:
+            pipe.write(json.dumps(request))
         self._process.stdin = None
 
     @property
@@ -210,7 +200,7 @@ def helps(shop: Compiled) -> bool:
         if any(exit_ < 0 for exit_ in shop.exit_of):
             return False  # where a machine is then depends on more than the block before
         return sum(len(b.machines) for b in blocks) * len(blocks) <= MAX_ARCS
-    group_of = {m: g for g, group in enumerate(_groups(shop)) for m in group}
+    group_of = {machine: g for g, group in enumerate(_groups(shop)) for machine in group}
     return sum(len({group_of[m] for m in block.machines}) for block in blocks) <= MAX_CHOICES
 
 
@@ -221,8 +211,8 @@ def _groups(shop: Compiled) -> list[list[int]]:
         return [[m] for m in range(len(machines))]
     masks = [0] * len(machines)
     for number, block in enumerate(shop.shop.blocks):
-        for machine in block.machines:
-            masks[machine] |= 1 << number
+        for m in block.machines:
+            masks[m] |= 1 << number
     found: dict[tuple[int, float, int], list[int]] = {}
     for m, machine in enumerate(machines):
         found.setdefault((machine.kind, machine.ready_s, masks[m]), []).append(m)

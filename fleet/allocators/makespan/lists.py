@@ -1,7 +1,7 @@
 """Schedules at once: list scheduling by upward rank, and dispatch rules between rank and nearness.
 
 Upward rank and earliest finish are HEFT (Topcuoglu, Hariri, Wu 2002). The dispatch rule takes, of
-what is ready, the knot with the least `start + travel − alpha · rank`: 0 is "what can start first",
+what is ready, the knot with the least `start + travel - alpha · rank`: 0 is "what can start first",
 a large alpha is list scheduling.
 """
 

@@ -115,7 +115,8 @@ class _Numbers:
         """Where the action's robot drives first, and where it is afterwards, if that is said."""
         travel_to = action.skill.travel_to
         target = None if travel_to is None else self._sites.get(action.args[travel_to])
-        moved = [value for variable, value in action.after if variable == Variable("at", action.actor)]
+        place = Variable("at", action.actor)
+        moved = [value for variable, value in action.after if variable == place]
         return target, self.site(moved[-1]) if moved else None
 
     def durations(self, action: Action) -> tuple[float, ...]:
@@ -140,9 +141,7 @@ class _Numbers:
         )
 
 
-def _apart(
-    problem: AllocationProblem, block_of: Mapping[str, int]
-) -> dict[int, frozenset[int]]:
+def _apart(problem: AllocationProblem, block_of: Mapping[str, int]) -> dict[int, frozenset[int]]:
     found: dict[int, set[int]] = {}
     for one, other in problem.apart:
         if one in block_of and other in block_of:
@@ -190,6 +189,6 @@ def _wishes(problem: AllocationProblem) -> tuple[dict[str, float], dict[str, flo
             continue
         priority = told.priority.get(goal, 0) if goal else 0
         weights[task] = 2.0 ** max(-MOST_PRIORITY, min(priority, MOST_PRIORITY))
-        if goal in told.due_s:
+        if goal is not None and goal in told.due_s:
             dues[task] = told.due_s[goal]
     return weights, dues

@@ -120,7 +120,7 @@ class Timed:
 
     @property
     def gap(self) -> float:
-        """How far from optimal at most: (makespan − bound) ÷ makespan; 0 is proven optimal."""
+        """How far from optimal at most: `(makespan - bound) / makespan`; 0 is proven optimal."""
         makespan_s = self.makespan_s
         if makespan_s <= 0:
             return 0.0

@@ -49,7 +49,8 @@ def rate(
                     return None
                 flow = ordered
         for (
-            number, block, befores, opens, closes, duration_s, target, arrives, tail_s, weight, due_s,
+            number, block, befores, opens, closes,
+            duration_s, target, arrives, tail_s, weight, due_s,
         ) in flow:  # fmt: skip
             time = 0.0
             for before in befores:

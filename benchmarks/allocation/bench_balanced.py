@@ -3,10 +3,11 @@
 `python -m benchmarks.allocation.bench_balanced` from the top folder. Each row is a process of its
 own, which builds the problem from what tasks need and robots have (`alike`, `types`, `different`:
 a robot's capabilities) or from the list of robots that can do each task (`random`: about half of
-them; `sparse`: two or three; `weighted`: as random, actors of 1 to 7 tasks; `apart`: as random,
-every two actors different robots), solves it, and gives every task its robot. The time is for all
-of that, the memory what the process' peak grew by over its input. Wall times, one run
-each; numbers are of this machine and of whatever else it was doing.
+them; `sparse`: two or three; `skewed`: up to three, the n-th robot with weight 1/n; `weighted`: as
+random, actors of 1 to 7 tasks; `apart`: as random, every two actors different robots), solves it,
+and gives every task its robot. The time is for all of that, the memory what the peak of the process
+grew by over its input. Wall times, one run each; numbers are of this machine and of whatever else
+it was doing.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from fleet.allocators.balancing.bits import bits, mask_of
 from fleet.allocators.min_max_load import Bound, min_max_load
 
 SIZES = ((100, 20), (1_000, 100), (10_000, 1_000))
-KINDS = ("alike", "types", "different", "random", "sparse", "weighted", "apart")
+KINDS = ("alike", "types", "different", "random", "sparse", "skewed", "weighted", "apart")
 CAPABILITIES = 12
 MILP_LIMIT_S = 20.0
 MILP_TASKS = 100
@@ -161,13 +162,13 @@ def _capabilities(
 
 
 def _able(kind: str, tasks: int, robots: int, chance: random.Random) -> list[list[int]]:
-    """The robots that can do each task: half of all by chance, or for `sparse` two or three."""
-    return [
-        chance.sample(range(robots), chance.randint(2, 3))
-        if kind == "sparse"
-        else list(bits(chance.getrandbits(robots) or 1))
-        for _ in range(tasks)
-    ]
+    """The robots that can do each task."""
+    if kind == "sparse":
+        return [chance.sample(range(robots), chance.randint(2, 3)) for _ in range(tasks)]
+    if kind == "skewed":
+        weights = [1 / n for n in range(1, robots + 1)]
+        return [sorted(set(chance.choices(range(robots), weights, k=3))) for _ in range(tasks)]
+    return [list(bits(chance.getrandbits(robots) or 1)) for _ in range(tasks)]
 
 
 def _milp(problem: LoadProblem) -> str:

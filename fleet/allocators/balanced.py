@@ -2,39 +2,35 @@
 
 from __future__ import annotations
 
-import logging
-
 from fleet.allocators.balancing import LoadProblem, Unbalanced, balance
 from fleet.allocators.balancing.bits import mask_of
-from fleet.allocators.base import AllocationProblem, Allocator, NotAllocated
+from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
 from fleet.allocators.reasons import not_apart
-
-log = logging.getLogger(__name__)
 
 
 class BalancedAllocator(Allocator):
     """Least maximum number of tasks on a robot, then least next one, and so on.
 
     Exact for actors of equal load that need not be apart; else exact for small problems and
-    wherever the bound is met. What is not proven is logged, with the bound.
+    wherever the bound is met. What is not proven is noted, with the bound.
     """
 
     name = "balanced"
 
-    def _assign(self, problem: AllocationProblem) -> dict[str, str] | NotAllocated:
+    def _assign(self, problem: AllocationProblem) -> dict[str, str] | Assignment | NotAllocated:
         made = balance(load_problem(problem))
         actors = tuple(problem.able)
         if isinstance(made, Unbalanced):
             return not_apart(problem, [actors[a] for a in made.actors], made.proven)
-        if not made.proven:
-            log.info(
-                "the busiest robot has %d tasks, and at least %d it must have; "
-                "whether the loads are the evenest possible is not proven",
-                max(made.loads),
-                made.least_top,
-            )
         team = problem.world.team
-        return {actor: team[robot] for actor, robot in zip(actors, made.robot, strict=True)}
+        chosen = {actor: team[robot] for actor, robot in zip(actors, made.robot, strict=True)}
+        if made.proven:
+            return chosen
+        note = (
+            f"the busiest robot has {max(made.loads)} tasks, and one must have {made.least_top} at "
+            "least; that no loads are more even is not proven"
+        )
+        return Assignment(chosen, notes=(note,))
 
 
 def load_problem(problem: AllocationProblem) -> LoadProblem:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from fleet.allocators.balanced import load_problem
 from fleet.allocators.balancing import Unbalanced, balance
-from fleet.allocators.base import AllocationProblem, Allocator, NotAllocated
+from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
 from fleet.allocators.reasons import not_apart
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.world import Value
-
-log = logging.getLogger(__name__)
 
 NEVER_S = 1e9
 """Cost of a robot that cannot be the actor, s: more than any travel, and safe to add up."""
@@ -35,12 +32,12 @@ class CostBasedAllocator(Allocator):
     robots are by then is minimised (linear assignment: Jonker and Volgenant 1987, in the variant
     of Crouse 2016 that scipy has). It looks at no load: a robot that is near all the time does
     more than its share. Where actors that must be apart leave no robot, loads decide instead, and a
-    warning says so.
+    note says so.
     """
 
     name = "cost-based"
 
-    def _assign(self, problem: AllocationProblem) -> dict[str, str] | NotAllocated:
+    def _assign(self, problem: AllocationProblem) -> dict[str, str] | Assignment | NotAllocated:
         trips = _trips(problem)
         waits = _waits(problem)
         near: dict[str, set[str]] = {actor: set() for actor in problem.able}
@@ -127,16 +124,16 @@ def _waits(problem: AllocationProblem) -> dict[str, set[str]]:
     return waits
 
 
-def _otherwise(problem: AllocationProblem, actor: str) -> dict[str, str] | NotAllocated:
+def _otherwise(problem: AllocationProblem, actor: str) -> Assignment | NotAllocated:
     """By load, where the rounds have left an actor without a robot; or why there is no way."""
     made = balance(load_problem(problem))
     actors = tuple(problem.able)
     if isinstance(made, Unbalanced):
         return not_apart(problem, [actors[a] for a in made.actors], made.proven)
-    log.warning(
-        "allocated by load and not by travel: after some rounds, every robot that can be actor %s "
-        "is one that it must be apart from",
-        actor,
+    note = (
+        "allocated by load and not by travel: after some rounds, every robot that can be actor "
+        f"{actor} was one that it must be apart from"
     )
     team = problem.world.team
-    return {name: team[robot] for name, robot in zip(actors, made.robot, strict=True)}
+    chosen = {name: team[robot] for name, robot in zip(actors, made.robot, strict=True)}
+    return Assignment(chosen, notes=(note,))

@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import logging
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from string import Template
 from typing import Any, Protocol
 
 import msgspec
 
-from fleet.allocators.base import AllocationProblem, Allocator, NotAllocated
+from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
 from fleet.core.checker import check_plan
 from fleet.core.schedule import best_schedule
 from keyexpr_schema.plans import Violation
@@ -59,7 +60,7 @@ class Answer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class LlmAllocator(Allocator):
     """A language model chooses among the able robots; what it says is checked before it is taken.
 
-    If it says nothing right, or cannot be asked, `fallback` allocates, and a warning says so.
+    If it says nothing right, or cannot be asked, `fallback` allocates, and a note says so.
     """
 
     name = "llm"
@@ -72,7 +73,7 @@ class LlmAllocator(Allocator):
             for name in ("system", "question", "repair")
         )
 
-    def _assign(self, problem: AllocationProblem) -> dict[str, str] | NotAllocated:
+    def _assign(self, problem: AllocationProblem) -> Mapping[str, str] | Assignment | NotAllocated:
         if not problem.able:
             return {}
 
@@ -89,8 +90,14 @@ class LlmAllocator(Allocator):
             made = f"asking the language model failed: {error or type(error).__name__}"
         if isinstance(made, dict):
             return made
-        log.warning("allocated by %s and not by language model: %s", self._fallback.name, made)
-        return self._fallback._assign(problem)
+        note = f"allocated by {self._fallback.name} and not by language model: {made}"
+        log.warning(note)
+        instead = self._fallback._assign(problem)
+        if isinstance(instead, NotAllocated):
+            return instead
+        if not isinstance(instead, Assignment):
+            instead = Assignment(instead)
+        return replace(instead, notes=(note, *instead.notes))
 
 
 def problem_text(problem: AllocationProblem) -> str:

@@ -6,7 +6,7 @@ import logging
 
 from fleet.allocators.balanced import load_problem
 from fleet.allocators.balancing import Unbalanced, balance
-from fleet.allocators.base import AllocationProblem, Allocator, NotAllocated
+from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
 from fleet.allocators.min_max_load import Bound, min_max_load
 from fleet.allocators.reasons import not_apart
 from fleet.allocators.round_robin import in_turn
@@ -16,6 +16,8 @@ log = logging.getLogger(__name__)
 
 TIME_LIMIT_S = 20.0
 """Wall time given to the solver, s; the best answer so far is taken: every answer is checked."""
+MOST_VARIABLES = 200_000
+"""Pairs of an actor and a robot that are put to the solver; 100,000 take PuLP a second to write."""
 
 
 class MilpAllocator(Allocator):
@@ -26,7 +28,7 @@ class MilpAllocator(Allocator):
     finds and with its bound: identical robots would keep it busy for ever otherwise.
 
     With `fallback_round_robin` the paper's round-robin takes over where the solver finds nothing,
-    and a warning says so. It still gives no robot what it cannot do.
+    and a note in the answer says so. It still gives no robot what it cannot do.
     """
 
     name = "milp"
@@ -41,7 +43,7 @@ class MilpAllocator(Allocator):
         self._time_limit_s = time_limit_s
         self._solver = solver
 
-    def _assign(self, problem: AllocationProblem) -> dict[str, str] | NotAllocated:
+    def _assign(self, problem: AllocationProblem) -> dict[str, str] | Assignment | NotAllocated:
         made = balance(load_problem(problem))
         if isinstance(made, Unbalanced):
             if made.proven:
@@ -54,35 +56,35 @@ class MilpAllocator(Allocator):
             team = problem.world.team
             robots = (team[robot] for robot in made.robot)
             bound = Bound(made.least_top, dict(zip(problem.able, robots, strict=True)))
-        travel_s = {
-            (actor, robot): approach_s(problem, actor, robot)
-            for actor, robots in problem.able.items()
-            for robot in robots
-        }
+        if bound.robot and sum(map(len, problem.able.values())) > MOST_VARIABLES:
+            note = (
+                f"more than {MOST_VARIABLES} choices are too many for the solver: loads are "
+                "balanced without it, and travel is not looked at"
+            )
+            return Assignment(bound.robot, notes=(note,))
         solved = min_max_load(
             problem.able,
             problem.load,
             problem.apart,
             bound,
             self._time_limit_s,
-            travel_s,
+            approaches_s(problem),
             self._solver,
         )
         if solved.robot is None:
             told = not_apart(problem, (), solved.proven)
             return self._otherwise(problem, told)
-        if not solved.proven:
-            log.info(
-                "the solver's time of %g s is over: the busiest robot has %d tasks, "
-                "and whether it could have fewer is not proven",
-                self._time_limit_s,
-                solved.top,
-            )
-        return solved.robot
+        if solved.proven:
+            return solved.robot
+        note = (
+            f"the busiest robot has {solved.top} tasks, and the solver has not proven in its time "
+            "that it cannot have fewer"
+        )
+        return Assignment(solved.robot, notes=(note,))
 
     def _otherwise(
         self, problem: AllocationProblem, refused: NotAllocated
-    ) -> dict[str, str] | NotAllocated:
+    ) -> Assignment | NotAllocated:
         if not self._fallback:
             return refused
         why = refused.violations[0].sentence
@@ -90,15 +92,22 @@ class MilpAllocator(Allocator):
         if isinstance(made, NotAllocated):
             told = f"round-robin instead of the MILP finds none either: {why}"
             return NotAllocated((Violation(code="no-allocation", sentence=told),))
-        log.warning("allocated by round-robin and not by the MILP: %s", why)
-        return made
+        note = f"allocated by round-robin and not by the MILP: {why}"
+        log.warning(note)
+        return Assignment(made, notes=(note,))
 
 
-def approach_s(problem: AllocationProblem, actor: str, robot: str) -> float:
-    """Seconds for `robot` to get to where the actor starts to work."""
+def approaches_s(problem: AllocationProblem) -> dict[tuple[str, str], float]:
+    """By actor and able robot: its way from where it is to where the actor starts to work, s."""
+    world = problem.world
+    to: dict[str, str] = {}
     for task in problem.plan.tasks:
         action = problem.checked.actions[task.task]
-        if task.actor == actor and action.skill.travel_to is not None:
-            where = problem.world.value("at", robot)
-            return problem.world.travel_s(robot, where, action.args[action.skill.travel_to])
-    return 0.0
+        if action.skill.travel_to is not None:
+            to.setdefault(task.actor, action.args[action.skill.travel_to])
+    where = {robot: world.value("at", robot) for robot in world.team} if to else {}
+    return {
+        (actor, robot): world.travel_s(robot, where[robot], to[actor]) if actor in to else 0.0
+        for actor, robots in problem.able.items()
+        for robot in robots
+    }

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
-import logging
+from collections import Counter
 from collections.abc import Callable, Iterator
+from dataclasses import replace as changed
 from typing import Any
 
 import pytest
 
 from fleet.allocators.balanced import BalancedAllocator
 from fleet.allocators.balancing import Balance, LoadProblem, balance
-from fleet.allocators.base import Allocated, AllocationProblem, Allocator, NotAllocated
+from fleet.allocators.base import Allocated, AllocationProblem, Allocator, Assignment, NotAllocated
 from fleet.allocators.cost_based import CostBasedAllocator
 from fleet.allocators.llm import Choice, LlmAllocator
 from fleet.allocators.milp import MilpAllocator
@@ -164,25 +165,56 @@ def test_the_milp_breaks_ties_by_travel() -> None:
     assert made.allocation == {"a0": "r2"}
 
 
+def test_cost_based_says_so_where_its_rounds_leave_no_robot() -> None:
+    """a0 takes the near r1 in the first round, which a1 must be and must not be with a0."""
+    world = home(TEAM[:2], facts=(fact("r1", "at", "kitchen"), fact("r2", "at", "hallway")))
+    plan = drives("", "r1", after={1: ("t0",)})
+    problem = AllocationProblem(
+        plan=plan,
+        world=world,
+        checked=check_plan(plan, world),
+        able={"a0": ("r1", "r2"), "a1": ("r1",)},
+        load={"a0": 1, "a1": 1},
+        apart=frozenset({("a0", "a1")}),
+    )
+    made = CostBasedAllocator()._assign(problem)
+    assert isinstance(made, Assignment)
+    assert made.allocation == {"a0": "r2", "a1": "r1"}
+    assert made.notes[0].startswith("allocated by load and not by travel")
+    together = CostBasedAllocator()._assign(changed(problem, apart=frozenset()))
+    assert together == {"a0": "r1", "a1": "r1"}
+
+
+def test_what_is_not_proven_is_noted() -> None:
+    """Weights without a pattern, so many that no search gets through."""
+    names = tuple(f"r{n}" for n in range(9))
+    world = home(tuple(manipulator(name) for name in names))
+    plan = drives(*[""] * 33)
+    able = {f"a{n}": names for n in range(33)}
+    load = {f"a{n}": 61 + n * n % 37 for n in range(33)}
+    problem = AllocationProblem(plan, world, check_plan(plan, world), able, load, frozenset())
+    made = BalancedAllocator()._assign(problem)
+    assert isinstance(made, Assignment)
+    assert "is not proven" in made.notes[0]
+
+
 class Undecided(MilpAllocator):
     """The program of a solver that never gets anywhere."""
 
-    def _assign(self, problem: AllocationProblem) -> dict[str, str] | NotAllocated:
+    def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
         told = Violation(code="no-allocation", sentence="the solver found nothing in time")
         return self._otherwise(problem, NotAllocated((told,)))
 
 
-def test_the_papers_fallback_is_off_unless_asked_for_and_says_so(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_the_papers_fallback_is_off_unless_asked_for_and_says_so() -> None:
     plan, world = drives("", ""), home(TEAM[:2])
     refused = Undecided().allocate(plan, world)
     assert isinstance(refused, NotAllocated)
-    with caplog.at_level(logging.WARNING):
-        made = Undecided(fallback_round_robin=True).allocate(plan, world)
+    made = Undecided(fallback_round_robin=True).allocate(plan, world)
     assert isinstance(made, Allocated)
     assert made.allocation == {"a0": "r1", "a1": "r2"}
-    assert "by round-robin and not by the MILP: the solver found nothing in time" in caplog.text
+    (note,) = made.notes
+    assert note.endswith("by round-robin and not by the MILP: the solver found nothing in time")
 
 
 def test_tasks_that_nobody_can_do_are_named_with_what_is_lacking() -> None:
@@ -287,22 +319,35 @@ def test_a_language_model_is_told_what_is_wrong_and_mends_it(caller: ModelCaller
 
 
 def test_a_language_model_that_is_never_right_is_replaced_and_that_is_said(
-    caller: ModelCaller, caplog: pytest.LogCaptureFixture
+    caller: ModelCaller,
 ) -> None:
     world, plan = home(TEAM[:2]), drives("", "")
-    with LlmServer(answer(a0="r1")) as server, caplog.at_level(logging.WARNING):
+    with LlmServer(answer(a0="r1")) as server:
         made = by_model(server, caller).allocate(plan, world)
     assert isinstance(made, Allocated)
     assert set(made.allocation.values()) == {"r1", "r2"}
-    assert "allocated by balanced and not by language model" in caplog.text
-    assert "actor a1 is given no robot" in caplog.text
+    (note,) = made.notes
+    assert note.startswith("allocated by balanced and not by language model")
+    assert "actor a1 is given no robot" in note
 
 
-def test_a_language_model_that_fails_stops_nothing(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_language_model_that_fails_stops_nothing() -> None:
     def ask(*_: object, **__: object) -> Choice | str:
         raise OSError("no network")
 
-    with caplog.at_level(logging.WARNING):
-        made = LlmAllocator(ask, RoundRobinAllocator()).allocate(drives(""), home(TEAM[:2]))
+    made = LlmAllocator(ask, RoundRobinAllocator()).allocate(drives(""), home(TEAM[:2]))
     assert isinstance(made, Allocated)
-    assert "asking the language model failed: no network" in caplog.text
+    assert made.notes[0].endswith("asking the language model failed: no network")
+
+
+def test_what_is_too_large_for_the_solver_is_balanced_without_it() -> None:
+    names = tuple(f"r{n}" for n in range(250))
+    world = home(tuple(manipulator(name) for name in names))
+    plan = drives(*[""] * 1000)
+    able = {f"a{n}": names for n in range(1000)}
+    load = dict.fromkeys(able, 1)
+    problem = AllocationProblem(plan, world, check_plan(plan, world), able, load, frozenset())
+    made = MilpAllocator()._assign(problem)
+    assert isinstance(made, Assignment)
+    assert "too many for the solver" in made.notes[0]
+    assert set(Counter(made.allocation.values()).values()) == {4}

@@ -16,8 +16,8 @@ log = logging.getLogger(__name__)
 
 TIME_LIMIT_S = 20.0
 """Wall time given to the solver, s; the best answer so far is taken: every answer is checked."""
-MOST_VARIABLES = 200_000
-"""Pairs of an actor and a robot that are put to the solver; 100,000 take PuLP a second to write."""
+MOST_VARIABLES = 100_000
+"""Pairs of an actor and a robot that are put to the solver: so many take 7 s, travel included."""
 
 
 class MilpAllocator(Allocator):

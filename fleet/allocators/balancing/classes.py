@@ -64,15 +64,17 @@ def _alike(rows: dict[int, list[int]], robots: int) -> list[list[int]]:
     Stops as soon as every robot stands alone.
     """
     parts = [(1 << robots) - 1] if robots else []
+    alone: list[int] = []
     for row in rows:
-        if len(parts) == robots:
-            break
         refined = []
         for part in parts:
             inside = part & row
-            if inside and inside != part:
-                refined += [inside, part ^ inside]
-            else:
-                refined.append(part)
+            for some in (inside, part ^ inside):
+                if some & (some - 1):
+                    refined.append(some)
+                elif some:
+                    alone.append(some)
         parts = refined
-    return [list(bits(part)) for part in parts]
+        if not parts:
+            break
+    return sorted(list(bits(part)) for part in (*parts, *alone))

@@ -56,6 +56,8 @@ class _Loads:
     def __init__(self, members: Sequence[int]) -> None:
         self.members = members
         self.total = [0] * len(members)
+        self.tops = [0] * len(members)
+        """The loads of the busiest robots of the classes."""
         self.shares: Shares = [{} for _ in members]
         self._at: dict[int, int] = {0: (1 << len(members)) - 1}
         self._levels = [0]
@@ -63,10 +65,6 @@ class _Loads:
     def floor(self, j: int) -> int:
         """The load of the idlest robot of class `j`."""
         return self.total[j] // self.members[j]
-
-    def ceil(self, j: int) -> int:
-        """The load of the busiest robot of class `j`."""
-        return -(-self.total[j] // self.members[j])
 
     def up_to(self, level: int) -> int:
         """The classes with a robot whose load is at most `level`."""
@@ -98,6 +96,7 @@ class _Loads:
             del share[i]
         before = self.floor(j)
         self.total[j] += some
+        self.tops[j] = -(-self.total[j] // self.members[j])
         after = self.floor(j)
         if before == after:
             return
@@ -122,8 +121,8 @@ def _reduce(state: _Loads, able: Sequence[int]) -> None:
     open_classes = set(range(len(state.members)))
     settled = 0
     while open_classes:
-        source = max(open_classes, key=state.ceil)
-        top = state.ceil(source)
+        source = max(open_classes, key=state.tops.__getitem__)
+        top = state.tops[source]
         if top <= 1:
             return
         path, seen = _path(source, handed, state.up_to(top - 2), settled)

@@ -21,7 +21,8 @@ from math import gcd
 
 from fleet.allocators.balancing.apart import why_not_apart
 from fleet.allocators.balancing.classes import Classes, classes_of
-from fleet.allocators.balancing.search import Sharing, branch_and_bound, improve, longest_first
+from fleet.allocators.balancing.exact import branch_and_bound
+from fleet.allocators.balancing.search import Sharing, improve, longest_first
 from fleet.allocators.balancing.semimatching import Shares, loads_of, semi_matching
 
 

@@ -26,7 +26,7 @@ from tests.language_house import WORDS
         ("Pick it up", "'it' refers to nothing before it: name what you mean"),
         (
             "clean up the hallway",
-            'nothing has a home in hallway: give it one with the field "home" of the object',
+            "nothing that belongs elsewhere is believed to be in hallway: have it searched first",
         ),
         ("The cup should be in the hallway", "'The cup' could be cup_1 or cup_2: say which object"),
         (
@@ -221,6 +221,34 @@ from tests.language_house import WORDS
             "Hand the first cup home to the locobot",
             "'Hand the first cup home to the locobot' names a place and says",
         ),
+        ("HSR, patrol", "it does not say where to look around: name a place"),
+        ("HSR, patrol the kitchen or the hallway", "it does not say which place"),
+        (
+            "HSR, patrol the kitchen for the book",
+            "'for the book' is not understood after 'HSR, patrol the kitchen'",
+        ),
+        (
+            "HSR and locobot, patrol the kitchen and the hallway",
+            "does not say which robot goes where: say it of one robot at a time",
+        ),
+        ("HSR, search the kitchen", "hsr cannot be told to do it"),
+        ("have a look round", "it does not say where to look around"),
+        ("The book belongs to the locobot", "does not say in which place it belongs"),
+        ("The book does not belong in the kitchen", "'not' says what must not be"),
+        ("The fridge belongs in the hallway", "'The fridge': fridge cannot be moved"),
+        ("The kitchen belongs in the hallway", "'The kitchen belongs': places stay where they are"),
+        ("The book belongs", "'The book belongs' does not say where to"),
+        (
+            "Clear the coffee table.",
+            "'Clear the coffee table': name the things and where to bring them, or say "
+            '"tidy up living_room"; it is known in which place things are, not on which surface',
+        ),
+        ("Tidy up the coffee table", "'Tidy up the coffee table': name the things"),
+        (
+            "I have a headache. Bring the book to the kitchen.",
+            "'I' is not understood as a goal",
+        ),
+        ("Bring the book to the kitchen. I have a headache.", "'I' is not understood as a goal"),
     ],
 )
 def test_what_is_not_understood_is_refused_with_the_reason(text: str, says: str) -> None:
@@ -239,6 +267,21 @@ def test_the_choices_are_listed() -> None:
 def test_where_nothing_is_known_everything_is_refused(text: str) -> None:
     with pytest.raises(NotUnderstood):
         read_goal(text, Vocabulary({}, {}, {}))
+
+
+@pytest.mark.parametrize(
+    ("text", "tidy"),
+    [
+        ("Tidy up the kitchen", "kitchen"),
+        ("Tidy up the kitchen and the living room", "kitchen"),
+        ("Tidy up the hallway and the kitchen", "hallway or kitchen"),
+    ],
+)
+def test_a_place_is_tidied_of_what_is_believed_to_be_there(text: str, tidy: str) -> None:
+    beliefs = {"cup_1": "kitchen", "cup_2": "living_room", "book": "living_room"}
+    words = Vocabulary(WORDS.places, WORDS.objects, WORDS.robots, beliefs)
+    with pytest.raises(NotUnderstood, match=f"is believed to be in {tidy}: have it searched"):
+        read_goal(text, words)
 
 
 def test_tidying_needs_homes() -> None:

@@ -64,6 +64,9 @@ class Sentences(Clauses):
         self.elliptic = "move" if doing & {Doing.MOVE, Doing.GO, Doing.GIVE} else ""
         if Doing.GO in doing and (Doing.MOVE not in doing or self._whereto_next()):
             return self.go(who)
+        if Doing.PATROL in doing and any(not self._any_robot(s) for s in who or ()):
+            self._check_robots(who or ())
+            return self.patrol(who or ())
         if who is not None:
             self._check_who(who)
         if Doing.MOVE in doing:
@@ -84,13 +87,19 @@ class Sentences(Clauses):
         cursor.at = start
         return found or bool(cursor.next_of(HOME))
 
+    @staticmethod
+    def _any_robot(subject: Subject) -> bool:
+        return isinstance(subject, Noun) and subject.generic and subject.count is None
+
+    def _check_robots(self, who: Sequence[Subject]) -> None:
+        if any(subject.sort != "robot" for subject in who):
+            raise NotUnderstood(f"{self.cursor.said(self.began)!r}: only robots do something")
+
     def _check_who(self, who: Sequence[Subject]) -> None:
+        self._check_robots(who)
         for subject in who:
             names = subject.names if isinstance(subject, Noun) else subject.subjects
-            generic = isinstance(subject, Noun) and subject.generic and subject.count is None
-            if subject.sort != "robot":
-                raise NotUnderstood(f"{self.cursor.said(self.began)!r}: only robots do something")
-            if not generic and len(self.words.robots) > 1:
+            if not self._any_robot(subject) and len(self.words.robots) > 1:
                 raise NotUnderstood(
                     f"{' and '.join(names)} cannot be told to do it: a goal says what must hold, "
                     "and the allocator finds who does it; leave the name out"
@@ -135,6 +144,8 @@ class Sentences(Clauses):
             cursor.take("been")
         elif cursor.take("have", "been") or cursor.take("has", "been"):
             modal = True
+        elif cursor.take_word(("belongs", "belong")):
+            return self._belongs(who)
         elif robots and (verb := longest(cursor, FINITE)):
             cursor.at += len(verb)
             self.told = [s for s in who if not (isinstance(s, Noun) and s.generic)]
@@ -170,6 +181,20 @@ class Sentences(Clauses):
             )
         parts, home = self.parts()
         return self.to_target(who, self.where(parts), home or Doing.TIDY in done)
+
+    def _belongs(self, who: Sequence[Subject]) -> None:
+        """`NP belongs in PLACE`, after the verb."""
+        cursor = self.cursor
+        self.elliptic = "be"
+        if any(s.sort in PLACES for s in who):
+            raise NotUnderstood(f"{cursor.said(self.began)!r}: places stay where they are")
+        parts, home = self.parts()
+        where = self.where(parts)
+        if where.target_sort == "robot" or where.source is not None:
+            raise NotUnderstood(
+                f"{cursor.said(self.began)!r} does not say in which place it belongs: {EXAMPLE}"
+            )
+        return self.to_target(who, where, home)
 
     def _done(self) -> frozenset[Doing]:
         """The participle that comes next, past words such as "located" and "now"."""
@@ -216,6 +241,8 @@ class Sentences(Clauses):
             return NotUnderstood(
                 f"{self.cursor.line!r} is a question; a goal says what should hold: {EXAMPLE}"
             )
+        if cursor.take_word(("clear", "empty")) and self.nouns.starts(PLACES):
+            return self.by_surface(shown, self.nouns.noun("a place", PLACES).names)
         hint = suggestion(shown.split()[0], BASE_VERBS) if shown and start is None else ""
         if str(special):
             return special

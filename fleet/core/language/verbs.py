@@ -9,6 +9,7 @@ from fleet.core.language.cursor import Cursor
 from fleet.core.language.lexicon import Sort
 from fleet.core.language.morphology import gerund, participles, third_person
 from fleet.core.language.tokens import tokens_of
+from fleet.core.language.wordlists import MODALS, STANDING
 
 Phrase = tuple[str, ...]
 
@@ -24,6 +25,7 @@ class Doing(Enum):
     PICK = "pick"
     GIVE = "give"
     TIDY = "tidy"
+    PATROL = "patrol"  # SEARCH, or going from place to place if a robot is named
 
 
 _VERBS: dict[Doing, tuple[str, tuple[str, ...]]] = {
@@ -41,6 +43,8 @@ _VERBS: dict[Doing, tuple[str, tuple[str, ...]]] = {
             "look around",
             "look around in",
             "look around inside",
+            "look round",
+            "look round in",
             "look in",
             "look into",
             "look inside",
@@ -48,9 +52,11 @@ _VERBS: dict[Doing, tuple[str, tuple[str, ...]]] = {
             "look at",
             "have a look",
             "have a look around",
+            "have a look round",
             "have a look in",
             "take a look",
             "take a look around",
+            "take a look round",
             "take a look in",
             "check out",
             "search in",
@@ -58,6 +64,7 @@ _VERBS: dict[Doing, tuple[str, tuple[str, ...]]] = {
             "patrol through",
         ),
     ),
+    Doing.PATROL: ("patrol", ("patrol through",)),
     Doing.PICK: (
         "grab grasp lift hold pick",
         ("pick up", "lift up", "take hold of", "get hold of", "grab hold of"),
@@ -104,6 +111,7 @@ PARTICIPLES = _forms_of("participle")
 PARTICLES = frozenset({"back", "away", "up", "over", "down", "off"})
 """What may stand behind the thing that a verb is about: "pick it up", "put it back"."""
 EXAMPLE = 'say it like "bring the first cup to the hallway" or "send a robot to the kitchen"'
+_BEHIND_SUBJECTS = STANDING | {",", "and", "or", "to", "has", "have", "belongs"}
 _ALL_SORTS: tuple[Sort, ...] = ("object", "robot", "place", "surface")
 
 
@@ -122,7 +130,25 @@ def verb_next(cursor: Cursor) -> bool:
     if verb is None:
         return False
     end, named = cursor.lexicon.exact(cursor.tokens, cursor.at, _ALL_SORTS)
-    return not named or end <= cursor.at + len(verb)
+    if not named:
+        return True
+    as_long = end == cursor.at + len(verb)
+    if as_long and any(e.sort == "robot" for e in named):
+        return not _subject_ends(cursor, len(verb))
+    return end <= cursor.at + len(verb)
+
+
+def _subject_ends(cursor: Cursor, ahead: int) -> bool:
+    """Whether what stands so many words ahead can follow who does it: "Scout should …"."""
+    start = cursor.at
+    cursor.at += ahead
+    found = (
+        cursor.word() in _BEHIND_SUBJECTS
+        or cursor.next_of(MODALS) is not None
+        or longest(cursor, FINITE) is not None
+    )
+    cursor.at = start
+    return found
 
 
 BASE_VERBS = frozenset(

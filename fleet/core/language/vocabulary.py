@@ -14,7 +14,8 @@ class Vocabulary:
     """Places, objects and robots that exist, by id.
 
     `whereabouts` may say at which place (or robot) an object is believed to be; phrases such as
-    "the cup in the kitchen" or "all cups from the kitchen" are told apart by it, nothing else is.
+    "the cup in the kitchen" or "all cups from the kitchen" are told apart by it, and "tidy up the
+    kitchen" is said of what is believed to be there; nothing else depends on it.
     """
 
     places: Mapping[str, Place]

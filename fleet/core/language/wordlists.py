@@ -30,7 +30,7 @@ ANYWHERE = phrases("somewhere|anywhere|wherever it is|wherever they are")
 WHOLE_HOUSE = phrases(
     "the house|the whole house|the entire house|the apartment|the whole apartment|the home|"
     "the whole home|the flat|the whole flat|the building|the whole building|everywhere|house|"
-    "everything"
+    "everything|the entire apartment|the entire home|the entire flat|the entire building"
 )
 BASKETS = frozenset({"basket", "tray"})
 

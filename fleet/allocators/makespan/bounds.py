@@ -16,13 +16,14 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from math import inf
 
 from fleet.allocators.makespan.compiled import Compiled
 from fleet.allocators.makespan.problem import Place
 
-STEPS = 60
-"""Subgradient steps for the prices."""
+STEPS = 300
+"""Subgradient steps for the prices, fewer where there is much to add up."""
+ADDED_UP = 300_000
+"""Options looked at in all those steps together."""
 CUTS = 24
 """Heads, and tails, that are tried as thresholds."""
 MAX_ASSIGNED = 600
@@ -31,8 +32,8 @@ MAX_SETS = 200
 """Sets of machines that are looked at; those with the most blocks come first."""
 
 
-def lower_bound(shop: Compiled, met_s: float = inf) -> float:
-    """Seconds that no schedule is shorter than; no better one is looked for once it is `met_s`."""
+def lower_bound(shop: Compiled) -> float:
+    """Seconds that no schedule is shorter than: all but the assignment of ways, which is dear."""
     if not shop.befores:
         return 0.0
     way = [_least_way_s(shop, block) for block in range(len(shop.steps_of))]
@@ -42,22 +43,33 @@ def lower_bound(shop: Compiled, met_s: float = inf) -> float:
         for head, least, tail in zip(heads, shop.least_ended(way), shop.tails, strict=True)
     )
     rows = _rows(shop, way, heads)
+    within = _within(rows)
+    best = max(best, *(_load(shop, machines, mine) for machines, mine in within.items()))
+    return max(best, *(_priced(shop, mine) for mine in within.values()))
+
+
+def bound_with_ways(shop: Compiled) -> float:
+    """The load together with the least total way, s."""
+    way = [_least_way_s(shop, block) for block in range(len(shop.steps_of))]
+    within = _within(_rows(shop, way, _heads(shop, way)))
+    return max(
+        _with_ways(shop, machines, mine, way) if len(mine) <= MAX_ASSIGNED else 0.0
+        for machines, mine in within.items()
+    )
+
+
+def _within(rows: Sequence[_Block]) -> dict[tuple[int, ...], list[_Block]]:
+    """For sets of machines: the blocks that only they can do."""
     sets: dict[tuple[int, ...], int] = defaultdict(int)
     for machines, *_ in rows:
         sets[machines] += 1
     chosen = sorted(sets, key=lambda machines: -sets[machines])[:MAX_SETS]
-    union = tuple(sorted(set().union(*chosen)))
-    within = {
-        machines: [row for row in rows if row[0] == machines or inside.issuperset(row[0])]
-        for machines in dict.fromkeys([*chosen, union])
-        if (inside := set(machines))
-    }
-    best = max(best, *(_load(shop, machines, mine) for machines, mine in within.items()))
-    best = max(best, _priced(shop, rows))
-    for machines, mine in within.items() if shop.travels else ():
-        if best < met_s and len(mine) <= MAX_ASSIGNED:
-            best = max(best, _with_ways(shop, machines, mine, way))
-    return min(best, met_s)
+    found: dict[tuple[int, ...], list[_Block]] = {}
+    for machines in dict.fromkeys([*chosen, tuple(sorted(set().union(*chosen)))]):
+        inside = set(machines)
+        inner = {other for other in sets if inside.issuperset(other)}
+        found[machines] = [row for row in rows if row[0] in inner]
+    return found
 
 
 _Block = tuple[tuple[int, ...], float, float, float, int]
@@ -160,7 +172,8 @@ def _cuts(values: Iterable[float]) -> list[float]:
 
 
 def _priced(shop: Compiled, rows: Sequence[_Block]) -> float:
-    """The weighted load over kinds of machines that are alike in all blocks' eyes."""
+    """The weighted load over kinds of machines that are alike in these blocks' eyes, after the
+    least head and before the least tail."""
     alike: dict[tuple[int, int], int] = {}
     masks: dict[int, int] = defaultdict(int)
     sets = {machines: i for i, machines in enumerate(dict.fromkeys(row[0] for row in rows))}
@@ -186,7 +199,8 @@ def _priced(shop: Compiled, rows: Sequence[_Block]) -> float:
         work[tuple((g, own[kind_of[g]] if own else 0.0) for g in groups)] += 1
     if len(sizes) < 2 or len(work) > 2000:
         return 0.0
-    return _subgradient(list(work.items()), sizes)
+    around = min(row[2] for row in rows) + min(row[3] for row in rows)
+    return around + _subgradient(list(work.items()), sizes)
 
 
 def _subgradient(
@@ -195,7 +209,8 @@ def _subgradient(
     count = len(sizes)
     prices = [1.0 / sum(sizes)] * count
     best = 0.0
-    for step in range(STEPS):
+    options_count = sum(len(options) for options, _ in work)
+    for step in range(min(STEPS, 10 + ADDED_UP // options_count)):
         total = 0.0
         load = [0.0] * count
         for options, times in work:
@@ -207,7 +222,7 @@ def _subgradient(
         if top <= total * (1 + 1e-9):
             break
         # Groups that are asked for too much become dearer, multiplicatively (Plotkin et al. 1995).
-        rate = 0.5 / (1 + step * 0.2)
+        rate = 0.5 / (1 + step * 0.1)
         prices = [
             max(price * (1 + rate * (load[g] / sizes[g] - total) / top), 1e-12)
             for g, price in enumerate(prices)

@@ -31,12 +31,28 @@ class Answer(NamedTuple):
     rated: Rated
 
 
-def construct(shop: Compiled, alpha: float | None = None) -> Answer | None:
+class Habit(NamedTuple):
+    """A schedule that is to be kept to: knots in its order, each block at `home` unless it ends
+    more than `slack_s` earlier elsewhere."""
+
+    order: Sequence[int]
+    home: Sequence[int]
+    slack_s: float
+
+
+def construct(
+    shop: Compiled, alpha: float | None = None, habit: Habit | None = None
+) -> Answer | None:
     """Place one ready knot after the other; without `alpha` the one of highest rank (HEFT).
 
     Deterministic. `None` if it leads to where some block finds no machine.
     """
-    board = _Board(shop)
+    board = _Board(shop, habit)
+    if habit is not None:
+        if any(board.place(knot) is None for knot in habit.order):
+            return None
+        rated = rate(shop, habit.order, board.machine_of)
+        return None if rated is None else Answer(list(habit.order), board.machine_of, rated)
     order: list[int] = []
     missing = [len(befores) for befores in shop.knot_befores]
     ready: list[tuple[int, float, int]] = []
@@ -73,8 +89,8 @@ class _Guess(NamedTuple):
 class _Board:
     """What is placed so far."""
 
-    def __init__(self, shop: Compiled) -> None:
-        self.shop = shop
+    def __init__(self, shop: Compiled, habit: Habit | None = None) -> None:
+        self.shop, self.habit = shop, habit
         machines = shop.shop.machines
         self.free = [machine.ready_s for machine in machines]
         self.site = [machine.site for machine in machines]
@@ -117,7 +133,16 @@ class _Board:
                 key = (found.finish_s, -free[machine])
                 if key < least:
                     best, least = found, key
+        if self.habit is not None and best is not None:
+            home = self.habit.home[block]
+            if home in self.eligible[block] and self._open(home, place) and home not in others:
+                found = guess(block, home, ready_s)
+                if found.finish_s <= best.finish_s + self.habit.slack_s:
+                    return found
         return best
+
+    def _open(self, machine: int, place: int) -> bool:
+        return self.taken[machine] != LAST and self.taken[machine] <= place
 
     def choose(
         self, ready: Sequence[tuple[int, float, int]], guesses: dict[int, _Guess], alpha: float

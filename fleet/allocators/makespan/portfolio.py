@@ -6,7 +6,7 @@ import time
 from math import ceil
 
 from fleet.allocators.makespan.anneal import anneal
-from fleet.allocators.makespan.bounds import lower_bound
+from fleet.allocators.makespan.bounds import bound_with_ways, lower_bound
 from fleet.allocators.makespan.compiled import Compiled
 from fleet.allocators.makespan.cpsat import CpSat, helps, installed
 from fleet.allocators.makespan.lists import ALPHAS, Answer, construct
@@ -19,6 +19,8 @@ ALWAYS = 200
 """Steps up to which every rule is tried whatever the time: a few milliseconds each."""
 START_UP_S = 0.8
 """What starting a process and importing OR-Tools takes, s; CP-SAT gets so much more time."""
+NEAR = 1e-4
+"""Relative gap from which on nothing more is done to close it."""
 MET = 1e-6
 """Relative difference between makespan and bound that counts as none."""
 
@@ -40,7 +42,7 @@ def solve(shop: Shop, deadline_s: float = 1.0, exact: bool = True, seed: int = 0
     best = rules(ready, listed, began_s + RULES_SHARE * deadline_s)
     if best is None:
         return None
-    bound_s = lower_bound(ready, best.rated.makespan_s)
+    bound_s = lower_bound(ready)
     if ready.whole:
         bound_s = float(ceil(bound_s - MET))
     notes = ["list schedule" if best is listed else "dispatch rule"]
@@ -49,6 +51,8 @@ def solve(shop: Shop, deadline_s: float = 1.0, exact: bool = True, seed: int = 0
     if not _met(best, bound_s):
         answer, bound_s, how = _search(shop, ready, best, answer, bound_s, until_s, exact, seed)
         notes.append(how)
+        if ready.travels and answer.makespan_s > bound_s * (1 + NEAR):
+            bound_s = max(bound_s, bound_with_ways(ready))
     return Timed(
         answer.machine_of,
         answer.order,

@@ -1,8 +1,10 @@
 """A schedule mended after a machine is lost or late, with few blocks changing hands.
 
-Four candidates: the orphans put where there is time; that, annealed with a price on every move; the
-same without a price; and a schedule from scratch. Of all that are within `WITHIN` of the shortest,
-the one with the fewest moves is taken, and moves that it can do without are taken back.
+Candidates: the orphans put where there is time; the old order gone through again, each block where
+it was unless it ends so many seconds earlier elsewhere, for a range of seconds; the best of those
+annealed with a price on every move, and without; and a schedule from scratch. Of all that are
+within `WITHIN` of the shortest, the one with the fewest moves is taken, and moves that it can do
+without are taken back.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from math import inf
 
 from fleet.allocators.makespan.anneal import anneal
 from fleet.allocators.makespan.compiled import Compiled
-from fleet.allocators.makespan.lists import Answer, construct
+from fleet.allocators.makespan.lists import Answer, Habit, construct
 from fleet.allocators.makespan.portfolio import blocks_in_order
 from fleet.allocators.makespan.problem import BadShop, Place, Shop, Timed
 from fleet.allocators.makespan.timing import rate, timed
@@ -23,6 +25,8 @@ WITHIN = 0.02
 """Share of the best makespan that fewer moves may cost."""
 PRICE = 0.002
 """Share of the makespan that one move costs while annealing: ten moves for `WITHIN`."""
+SLACKS = (0.2, 0.03, 0.08, 0.015, 0.05, 0.005)
+"""Shares of the makespan by which a block must end earlier elsewhere to be moved."""
 TRIED = 4
 """Machines that are tried for an orphan: those that are done first."""
 
@@ -75,19 +79,32 @@ def reschedule(
     until_s = time.perf_counter() + deadline_s
     shop = _pinned(shop, home, frozen)
     ready = Compiled(shop)
-    repaired = _repair(ready, home, order)
+    knots = _knots_in_order(ready, order)
+    repaired = _repair(ready, home, knots)
     scratch = construct(ready)
-    start = repaired or scratch
-    if start is None:
+    first = [a for a in (repaired, scratch) if a is not None]
+    if not first:
         return None
+    scale_s = min(a.rated.makespan_s for a in first)
+    for share in SLACKS:
+        if time.perf_counter() > until_s - 0.6 * deadline_s:
+            break
+        made = construct(ready, habit=Habit(knots, home, share * scale_s))
+        if made is not None:
+            first.append(made)
+    scale_s = min(a.rated.makespan_s for a in first)
+
+    def priced_s(a: Answer) -> float:
+        return a.rated.makespan_s + PRICE * scale_s * len(_moved(a.machine_of, home))
+
     length_s = until_s - time.perf_counter()
-    price_s = PRICE * start.rated.makespan_s
-    priced = anneal(ready, start, until_s - 0.45 * length_s, 0.0, seed, price_s, home, frozen)
-    shortest = min(
-        (a for a in (priced, scratch) if a is not None), key=lambda a: a.rated.makespan_s
+    start = min(first, key=priced_s)
+    priced = anneal(
+        ready, start, until_s - 0.6 * length_s, 0.0, seed, PRICE * scale_s, home, frozen
     )
-    free = anneal(ready, shortest, until_s - 0.2 * length_s, 0.0, seed + 1, frozen=frozen)
-    found = [a for a in (repaired, priced, free, scratch) if a is not None]
+    shortest = min([*first, priced], key=lambda a: a.rated.makespan_s)
+    free = anneal(ready, shortest, until_s - 0.35 * length_s, 0.0, seed + 1, frozen=frozen)
+    found = [*first, priced, free]
     best_s = min(a.rated.makespan_s for a in found)
     good = [a for a in found if a.rated.makespan_s <= best_s * (1 + WITHIN)]
     chosen = min(good, key=lambda a: (len(_moved(a.machine_of, home)), a.rated.makespan_s))
@@ -114,9 +131,8 @@ def _moved(machine_of: Sequence[int], home: Sequence[int]) -> list[int]:
     return [b for b, (now, was) in enumerate(zip(machine_of, home, strict=True)) if now != was]
 
 
-def _repair(shop: Compiled, home: Sequence[int], order: Sequence[int]) -> Answer | None:
+def _repair(shop: Compiled, home: Sequence[int], knots: list[int]) -> Answer | None:
     """Everything stays but the orphans, the one of highest rank first."""
-    knots = _knots_in_order(shop, order)
     blocks = shop.shop.blocks
     machine_of = list(home)
     orphans = [b for b, block in enumerate(blocks) if home[b] not in block.machines]

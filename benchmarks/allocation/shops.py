@@ -1,0 +1,91 @@
+"""Random shops of a fleet's kind: goals that are chains of blocks, arms and carts, rooms, meetings."""
+
+from __future__ import annotations
+
+from random import Random
+
+from fleet.allocators.makespan.problem import Block, Machine, Operation, Shop
+
+ROOMS = 12
+ROOM_M = 4.0
+SPEEDS_M_S = (0.4, 0.6)
+"""Of the two kinds, arms and carts."""
+SLOWER = 1.25
+"""How much longer an arm of the third kind takes."""
+
+
+def random_shop(
+    tasks: int, machines: int, travel: bool = True, meetings: float = 0.2, seed: int = 0
+) -> Shop:
+    """A shop with so many operations and machines; the same for the same arguments.
+
+    Goals are chains of two to five blocks; a block is one operation, or a way, a grasp, a way and a
+    putting down. A share of `meetings` of the goals has a hand-over: an arm's operation that needs
+    a cart at the same time, which drives there before and away afterwards. Half of the machines are
+    arms, a third of those slower; the rest are carts. A third of the operations any machine can do.
+    """
+    random = Random(f"{tasks} {machines} {travel} {meetings} {seed}")
+    kinds = [(0 if m % 3 else 2) if m % 2 == 0 else 1 for m in range(machines)]
+    arms = tuple(m for m in range(machines) if kinds[m] != 1)
+    carts = tuple(m for m in range(machines) if kinds[m] == 1)
+    operations: list[Operation] = []
+    members: list[list[int]] = []
+    able: list[tuple[int, ...]] = []
+
+    def operation(blocks: list[int], seconds: float, after: list[int], room: int | None) -> int:
+        number = len(operations)
+        for block in blocks:
+            members[block].append(number)
+        where = room if travel else None
+        operations.append(
+            Operation(
+                tuple(blocks),
+                (seconds, seconds, seconds * SLOWER),
+                tuple(after),
+                target=where,
+                arrives=where,
+            )
+        )
+        return number
+
+    def block(machines_able: tuple[int, ...]) -> int:
+        members.append([])
+        able.append(machines_able)
+        return len(members) - 1
+
+    while len(operations) < tasks:
+        before: list[int] = []
+        left = tasks - len(operations)
+        if left >= 4 and random.random() < meetings:
+            room, to = random.randrange(ROOMS), random.randrange(ROOMS)
+            arm, cart = block(arms), block(carts)
+            one = operation([arm], random.randint(20, 40), [], room)
+            other = operation([cart], random.randint(2, 6), [], room)
+            over = operation([arm, cart], random.randint(10, 20), [one, other], None)
+            operation([cart], random.randint(2, 6), [over], to)
+            continue
+        for _ in range(min(random.randint(2, 5), left)):
+            able_here = arms if random.random() < 0.5 else tuple(range(machines))
+            if random.random() < 0.2:
+                able_here = carts or able_here
+            mine = block(able_here)
+            done = operation([mine], random.randint(5, 60), before, random.randrange(ROOMS))
+            before = [done]
+    finals = set(range(len(operations))) - {b for o in operations for b in o.after}
+    weighted = tuple(
+        Operation(o.blocks, o.duration_s, o.after, o.target, o.arrives, float(i in finals))
+        for i, o in enumerate(operations)
+    )
+    ways = tuple(
+        tuple(tuple(abs(a - b) * ROOM_M / speed for b in range(ROOMS)) for a in range(ROOMS))
+        for speed in (*SPEEDS_M_S, SPEEDS_M_S[0])
+    )
+    return Shop(
+        weighted,
+        tuple(
+            Block(tuple(ops), machines_able)
+            for ops, machines_able in zip(members, able, strict=True)
+        ),
+        tuple(Machine(kinds[m], random.randrange(ROOMS)) for m in range(machines)),
+        ways if travel else (),
+    )

@@ -1,0 +1,192 @@
+"""Laws of makespan scheduling on small random shops, against brute force over all schedules."""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from fleet.allocators.makespan.bounds import bound_with_ways, lower_bound
+from fleet.allocators.makespan.compiled import Compiled
+from fleet.allocators.makespan.lists import construct
+from fleet.allocators.makespan.portfolio import solve
+from fleet.allocators.makespan.problem import BadShop, Block, Machine, Operation, Place, Shop, Timed
+from fleet.allocators.makespan.reschedule import WITHIN, reschedule, without_machines
+from fleet.allocators.makespan.timing import timed
+
+NEAR = 1e-6
+SITES = 3
+
+
+@st.composite
+def shops(draw: st.DrawFn, most_blocks: int = 4) -> Shop:
+    """Chains, meetings, travel, kinds, machines that are late, blocks to be first or last."""
+    kinds = draw(st.integers(1, 2))
+    machines = tuple(
+        Machine(
+            draw(st.integers(0, kinds - 1)),
+            draw(st.integers(0, SITES - 1)),
+            draw(st.sampled_from([0.0, 0.0, 3.0])),
+        )
+        for _ in range(draw(st.integers(1, 3)))
+    )
+    travel = draw(st.booleans())
+    seconds = st.integers(1, 9).map(float)
+    numbers = st.sampled_from(range(len(machines)))
+    members: list[list[int]] = []
+    able: list[tuple[int, ...]] = []
+    operations: list[Operation] = []
+    for block in range(draw(st.integers(1, most_blocks))):
+        members.append([])
+        able.append(tuple(sorted(draw(st.sets(numbers, min_size=1)))))
+        for _ in range(draw(st.integers(1, 2))):
+            here = len(operations)
+            meets = block > 0 and draw(st.integers(0, 4)) == 0
+            with_ = (block, draw(st.integers(0, block - 1))) if meets else (block,)
+            after = draw(st.sets(st.sampled_from(range(here)), max_size=1)) if here else set()
+            site = draw(st.sampled_from([None, *range(SITES)])) if travel else None
+            operations.append(
+                Operation(
+                    with_,
+                    tuple(draw(seconds) for _ in range(kinds)),
+                    tuple(after),
+                    target=site,
+                    arrives=site if draw(st.booleans()) else None,
+                    weight=1.0,
+                )
+            )
+            for one in with_:
+                members[one].append(here)
+    places = st.sampled_from([Place.ANYWHERE] * 5 + [Place.FIRST, Place.LAST])
+    blocks = tuple(
+        Block(tuple(ops), rows, draw(places)) for ops, rows in zip(members, able, strict=True)
+    )
+    ways = tuple(
+        tuple(tuple(float(abs(a - b) * (2 + kind)) for b in range(SITES)) for a in range(SITES))
+        for kind in range(kinds)
+    )
+    return Shop(tuple(operations), blocks, machines, ways)
+
+
+def wrong(shop: Shop, found: Timed) -> str | None:
+    """What is not right about a schedule, told without the code that made it."""
+    for number, block in enumerate(shop.blocks):
+        if found.machine_of[number] not in block.machines:
+            return f"block {number} is on a machine that cannot do it"
+        if any(found.machine_of[o] == found.machine_of[number] for o in block.apart):
+            return f"block {number} is not apart"
+        for one, other in zip(block.operations, block.operations[1:], strict=False):
+            if found.start_s[other] < found.end_s[one] - NEAR:
+                return f"operations {one}, {other} of a block overlap"
+    for number, operation in enumerate(shop.operations):
+        if any(found.start_s[number] < found.end_s[b] - NEAR for b in operation.after):
+            return f"operation {number} starts too early"
+    for machine, row in enumerate(shop.machines):
+        mine = [b for b in found.order if found.machine_of[b] == machine]
+        free_s, site, place = row.ready_s, row.site, Place.FIRST
+        for block in mine:
+            operations = shop.blocks[block].operations
+            if place == Place.LAST or shop.blocks[block].place < place:
+                return f"block {block} stands in the wrong place"
+            place = shop.blocks[block].place
+            if found.start_s[operations[0]] < free_s - NEAR:
+                return f"machine {machine} is in two places"
+            for number in operations:
+                operation = shop.operations[number]
+                if operation.blocks[0] != block:
+                    continue
+                lasts = operation.duration_s[row.kind]
+                if operation.target is not None:
+                    lasts += shop.travel_s[row.kind][site][operation.target]
+                if abs(found.end_s[number] - found.start_s[number] - lasts) > NEAR:
+                    return f"operation {number} does not take what it takes"
+                site = site if operation.arrives is None else operation.arrives
+            free_s = found.end_s[operations[-1]]
+    return None
+
+
+def every_schedule(shop: Shop) -> list[Timed]:
+    """All that are right, machine by machine and order by order."""
+    tried = (
+        timed(shop, order, machine_of)
+        for machine_of in product(*(block.machines for block in shop.blocks))
+        for order in permutations(range(len(shop.blocks)))
+    )
+    return [found for found in tried if found is not None and wrong(shop, found) is None]
+
+
+def sound(shop: Shop) -> bool:
+    """Whether operations do not wait for each other in a circle."""
+    try:
+        Compiled(shop)
+    except BadShop:
+        return False
+    return True
+
+
+@settings(max_examples=150, deadline=None)
+@given(shops())
+def test_schedules_are_right_and_bounds_hold(shop: Shop) -> None:
+    assume(sound(shop))
+    ready = Compiled(shop)
+    found = solve(shop, deadline_s=0.02, exact=False)
+    everything = every_schedule(shop)
+    if found is None:
+        return
+    assert wrong(shop, found) is None
+    least_s = min(one.makespan_s for one in everything)
+    assert lower_bound(ready) <= least_s + NEAR
+    assert bound_with_ways(ready) <= least_s + NEAR
+    assert found.lower_bound_s <= least_s + NEAR
+    assert least_s <= found.makespan_s + NEAR
+    listed = construct(ready)
+    assert listed is None or found.makespan_s <= listed.rated.makespan_s + NEAR
+
+
+@settings(max_examples=100, deadline=None)
+@given(shops())
+def test_where_blocks_are_free_and_alone_there_is_always_an_answer(shop: Shop) -> None:
+    assume(sound(shop) and all(len(o.blocks) == 1 for o in shop.operations))
+    assume(all(block.place == Place.ANYWHERE for block in shop.blocks))
+    ready = Compiled(shop)
+    assume(all(len(together) == 1 for together in ready.knot_blocks))
+    assert solve(shop, deadline_s=0.0, exact=False) is not None
+
+
+@settings(max_examples=12, deadline=None)
+@given(shops(most_blocks=3))
+def test_cp_sat_agrees_with_brute_force(shop: Shop) -> None:
+    assume(sound(shop))
+    found = solve(shop, deadline_s=0.05)
+    if found is None:
+        return
+    assert wrong(shop, found) is None
+    least_s = min(one.makespan_s for one in every_schedule(shop))
+    assert found.lower_bound_s <= least_s + NEAR
+    if any("proven" in note for note in found.notes):
+        assert found.makespan_s <= least_s + NEAR
+
+
+@settings(max_examples=60, deadline=None)
+@given(shops(), st.data())
+def test_a_mended_schedule_is_right_and_moves_little(shop: Shop, data: st.DataObject) -> None:
+    assume(sound(shop) and len(shop.machines) > 1)
+    planned = solve(shop, deadline_s=0.0, exact=False)
+    assume(planned is not None)
+    assert planned is not None
+    lost = data.draw(st.sampled_from(range(len(shop.machines))))
+    try:
+        left = without_machines(shop, frozenset({lost}))
+    except BadShop:
+        return
+    found = reschedule(left, planned.machine_of, planned.order, deadline_s=0.03)
+    if found is None:
+        return
+    assert wrong(left, found.timed) is None
+    orphans = {b for b, machine in enumerate(planned.machine_of) if machine == lost}
+    assert orphans <= set(found.moved)
+    assert found.timed.makespan_s <= found.best_makespan_s * (1 + WITHIN) + NEAR
+    assert set(found.moved) == {
+        b for b, m in enumerate(found.timed.machine_of) if m != planned.machine_of[b]
+    }

@@ -125,6 +125,10 @@ class PlanStatus(Payload, frozen=True, kw_only=True):
     made_by: str = ""
     allocator: str = ""
     predicted_makespan_s: float | None = None
+    lower_bound_s: float | None = None
+    """No allocation of this plan has a shorter schedule; where the allocator proved it."""
+    notes: tuple[str, ...] = ()
+    """What the allocator says of how it came to its answer."""
     planning_time_s: float | None = None
     making: Making = Making()
     change: PlanChange | None = None

@@ -27,8 +27,8 @@ class RobotSpec(Payload, frozen=True, kw_only=True):
     """What a robot is and can do; declared once by whoever registers it.
 
     `skills` names the skills its worker carries out; `capabilities` what its body offers, with a
-    parameter each (`grip: 1.2` is a payload in kg, `reach: 1.0` a height in m, `basket: 2` a number of objects,
-    `drive: 0.5` a speed in m/s, `see: 4.0` a range in m).
+    parameter each (`grip: 1.2` is a payload in kg, `reach: 1.0` a height in m, `basket: 2` a
+    number of objects, `drive: 0.5` a speed in m/s, `see: 4.0` a range in m).
     """
 
     robot: Id

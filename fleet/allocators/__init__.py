@@ -1,1 +1,1 @@
-"""Allocators: one file a variant."""
+"""Allocators: one file or package a variant."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from fleet.core.binding import able_robots, actors_apart, task_counts
 from fleet.core.checker import CheckedPlan, check_plan
-from fleet.core.schedule import Schedule, best_schedule, schedule
+from fleet.core.schedule import Schedule, schedule, valid_schedule
 from fleet.core.world_model import WorldModel
 from keyexpr_schema.plans import Plan, Violation
 
@@ -119,20 +119,20 @@ class Allocator(ABC):
         self, problem: AllocationProblem, chosen: Assignment
     ) -> Allocated | NotAllocated:
         plan, world, allocation = problem.plan, problem.world, chosen.allocation
-        ready_s = problem.circumstances.ready_s
         if chosen.sequence is None:
-            order = best_schedule(plan, problem.checked, allocation, world)
-        else:
-            groups = [(actor,) for actor in chosen.sequence]
-            order = schedule(plan, problem.checked, allocation, world, groups, ready_s)
-        if order is None:
-            return _refused(
-                f"{self.name}: with this allocation robots wait for each other for ever"
-            )
-        final = check_plan(plan, world, allocation, order.extra_after)
+            order = valid_schedule(plan, problem.checked, allocation, world)
+            if isinstance(order, tuple):
+                return NotAllocated(order)
+            return Allocated(allocation, order, chosen.lower_bound_s, chosen.notes)
+        groups = [(actor,) for actor in chosen.sequence]
+        ready_s = problem.circumstances.ready_s
+        given = schedule(plan, problem.checked, allocation, world, groups, ready_s)
+        if given is None:
+            return _refused(f"{self.name}: in this order robots wait for each other for ever")
+        final = check_plan(plan, world, allocation, given.extra_after)
         if not final.valid:
             return NotAllocated(final.violations)
-        return Allocated(allocation, order, chosen.lower_bound_s, chosen.notes)
+        return Allocated(allocation, given, chosen.lower_bound_s, chosen.notes)
 
     @abstractmethod
     def _assign(self, problem: AllocationProblem) -> Mapping[str, str] | Assignment | NotAllocated:

@@ -160,6 +160,8 @@ def status_of(book: PlanBook) -> PlanStatus:
         made_by=book.plan.made_by,
         allocator=book.plan.allocator,
         predicted_makespan_s=book.makespan_s,
+        lower_bound_s=book.lower_bound_s,
+        notes=book.notes,
         planning_time_s=book.planning_time_s,
         making=book.plan.making,
         change=book.change,

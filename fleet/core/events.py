@@ -159,6 +159,8 @@ class PlanMade(Event, frozen=True, kw_only=True):
     durations_s: dict[str, float]
     makespan_s: float
     planning_time_s: float
+    lower_bound_s: float | None = None
+    notes: tuple[str, ...] = ()
 
 
 class PlanNotMade(Event, frozen=True, kw_only=True):

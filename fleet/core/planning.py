@@ -106,6 +106,8 @@ def plan_made(state: State, event: events.PlanMade, skills: Skills) -> State:
         reason=None,
         violations=(),
         makespan_s=event.makespan_s,
+        lower_bound_s=event.lower_bound_s,
+        notes=event.notes,
         planning_time_s=event.planning_time_s,
     )
     state = set_book(state, book)
@@ -144,6 +146,8 @@ def _show(state: State, job: Job, event: events.PlanMade) -> State:
             made_by=event.plan.made_by,
             allocator=event.plan.allocator,
             predicted_makespan_s=event.makespan_s,
+            lower_bound_s=event.lower_bound_s,
+            notes=event.notes,
             planning_time_s=event.planning_time_s,
             making=event.plan.making,
         ),

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import islice, permutations
 from math import inf
 from typing import TypeVar
 
-from fleet.core.checker import CheckedPlan
+from fleet.core.checker import CheckedPlan, check_plan
 from fleet.core.graph import Cycle, TaskGraph
 from fleet.core.skills import Action, Variable
 from fleet.core.timetable import Timetable
 from fleet.core.world_model import WorldModel
 from keyexpr_schema.ids import ACTOR_PREFIX
-from keyexpr_schema.plans import Plan
+from keyexpr_schema.plans import Plan, Violation
 from keyexpr_schema.world import Value
 
 T = TypeVar("T")
 
+MAX_ORDERS_CHECKED = 24
+"""Orders put to the checker before an allocation is given up, the shortest first."""
 EXHAUSTIVE_GROUPS = 5
 """Up to this many groups every order is tried (120); beyond, neighbours are swapped."""
 
@@ -91,21 +93,47 @@ def actor_groups(plan: Plan) -> tuple[tuple[str, ...], ...]:
 def best_schedule(
     plan: Plan, checked: CheckedPlan, allocation: Mapping[str, str], world: WorldModel
 ) -> Schedule | None:
-    """The shortest schedule over orders of groups of actors, or `None` if every order deadlocks.
+    """The shortest schedule over orders of groups of actors, or `None` if every order deadlocks."""
+    return next(good_schedules(plan, checked, allocation, world), None)
+
+
+def good_schedules(
+    plan: Plan, checked: CheckedPlan, allocation: Mapping[str, str], world: WorldModel
+) -> Iterator[Schedule]:
+    """Schedules over orders of groups of actors, the shortest first; none if all deadlock.
 
     One robot does its actors one after the other. Robots take groups in the same order, so they
     never wait for each other in a circle.
     """
     if checked.graph is None:
-        return None
+        return
     timetable = Timetable(checked.graph, checked.actions, allocation, world)
     groups = [sorted(group, key=timetable.first.__getitem__) for group in actor_groups(plan)]
+    orders: Iterable[Sequence[Sequence[str]]]
     if len(groups) <= EXHAUSTIVE_GROUPS:
-        rated = ((_quality(timetable.ends_s(order)), order) for order in permutations(groups))
-        order: Sequence[Sequence[str]] = min(rated, key=lambda pair: pair[0])[1]
+        orders = sorted(permutations(groups), key=lambda o: _quality(timetable.ends_s(o)))
     else:
-        order = _swap_neighbours(timetable, groups, allocation)
-    return schedule(plan, checked, allocation, world, order)
+        orders = (_swap_neighbours(timetable, groups, allocation), groups)
+    for order in orders:
+        found = schedule(plan, checked, allocation, world, order)
+        if found is not None:
+            yield found
+
+
+def valid_schedule(
+    plan: Plan, checked: CheckedPlan, allocation: Mapping[str, str], world: WorldModel
+) -> Schedule | tuple[Violation, ...]:
+    """The shortest schedule that passes the checker with robots for actors, or what is wrong.
+
+    Another order than the shortest may be the one that leaves every goal reached.
+    """
+    violations: tuple[Violation, ...] = ()
+    for found in islice(good_schedules(plan, checked, allocation, world), MAX_ORDERS_CHECKED):
+        violations = check_plan(plan, world, allocation, found.extra_after).violations
+        if not violations:
+            return found
+    sentence = "with this allocation robots wait for each other for ever"
+    return violations or (Violation(code="no-allocation", sentence=sentence),)
 
 
 def _quality(ends_s: Sequence[float] | None) -> tuple[float, float]:

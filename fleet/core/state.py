@@ -86,6 +86,8 @@ class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
     reason: str | None = None
     violations: tuple[Violation, ...] = ()
     makespan_s: float | None = None
+    lower_bound_s: float | None = None
+    notes: tuple[str, ...] = ()
     planning_time_s: float | None = None
     changed_s: float = 0.0
 

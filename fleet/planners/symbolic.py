@@ -20,7 +20,7 @@ from itertools import product
 from fleet.core.binding import carried_at_end, least_loaded
 from fleet.core.checker import check_plan
 from fleet.core.lifting import Strand, tasks_from
-from fleet.core.schedule import best_schedule
+from fleet.core.schedule import valid_schedule
 from fleet.core.skills import Variable
 from fleet.core.world_model import WorldModel
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
@@ -183,12 +183,9 @@ def _evaluate(plan: Plan, world: WorldModel) -> tuple[float, float] | NoPlan:
     allocation = least_loaded(plan, checked, world)
     if allocation is None:
         return NoPlan("there are fewer robots than the plan needs at the same time")
-    found = best_schedule(plan, checked, allocation, world)
-    if found is None:
-        return NoPlan("robots would wait for each other for ever")
-    final = check_plan(plan, world, allocation, found.extra_after)
-    if not final.valid:
-        return NoPlan(final.violations[0].sentence, final.violations)
+    found = valid_schedule(plan, checked, allocation, world)
+    if isinstance(found, tuple):
+        return NoPlan(found[0].sentence, found)
     unloading_s = UNLOADING_S * len(carried_at_end(checked))
     return round(found.makespan_s + unloading_s, 3), found.work_s
 

@@ -14,13 +14,18 @@ from typing import Any
 
 import yaml
 
+from fleet.allocators.balanced import BalancedAllocator
 from fleet.allocators.base import Allocator
+from fleet.allocators.cost_based import CostBasedAllocator
+from fleet.allocators.llm import LlmAllocator
 from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.core.skills import SkillModel, skills_from_data
 from fleet.errors import BadSkillFile, FleetError
 from fleet.planners.base import Planner
-from fleet.planners.llm import LlmPlanner, load_llm_config
+from fleet.planners.llm import LlmPlanner, ModelCaller, load_llm_config
 from fleet.planners.symbolic import SymbolicPlanner
+from fleet.service.allocation_asker import AllocationAsker
 
 SKILL_MODELS = "robotfleet.skill_models"
 """Entry points to mappings such as the YAML of a skill file holds: `{"skills": {name: model}}`."""
@@ -53,9 +58,17 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
         FleetError: an installed package offers something that is not a planner or an allocator.
     """
     symbolic = SymbolicPlanner()
-    llm = LlmPlanner(load_llm_config(llm_file), symbolic)
+    config, caller = load_llm_config(llm_file), ModelCaller()
+    llm = LlmPlanner(config, symbolic, caller)
     planners: dict[str, Planner] = {symbolic.name: symbolic, llm.name: llm}
-    allocators: dict[str, Allocator] = {MilpAllocator.name: MilpAllocator()}
+    own: tuple[Allocator, ...] = (
+        MilpAllocator(),
+        BalancedAllocator(),
+        CostBasedAllocator(),
+        RoundRobinAllocator(),
+        LlmAllocator(AllocationAsker(config, caller), BalancedAllocator()),
+    )
+    allocators = {allocator.name: allocator for allocator in own}
     for found in _from_packages("robotfleet.planners"):
         if not isinstance(found, Planner):
             raise FleetError(f"{type(found).__name__}, installed as a planner, is not a Planner")

@@ -77,6 +77,8 @@ def _allocate(
         extra_after=dict(schedule.extra_after),
         durations_s=durations_s,
         makespan_s=schedule.makespan_s,
+        lower_bound_s=made.lower_bound_s,
+        notes=made.notes,
         planning_time_s=time.perf_counter() - started,
     )
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace as changed
-from typing import Any
 
 import pytest
 
@@ -24,9 +23,8 @@ from fleet.core.checker import check_plan
 from fleet.core.world_model import WorldModel
 from fleet.planners.base import PlanningProblem
 from fleet.planners.llm import LlmConfig, ModelCaller
-from fleet.planners.llm.conversation import Conversation, GivenUp, Ledger, Rejected
-from fleet.planners.llm.prompts import Prompts
 from fleet.planners.symbolic import SymbolicPlanner
+from fleet.service.allocation_asker import AllocationAsker
 from keyexpr_schema.plans import Plan, Task, Violation
 from tests.household import bring, carrier, fact, home, manipulator
 from tests.llm_server import LlmServer, Reply
@@ -283,23 +281,7 @@ def by_model(server: LlmServer, caller: ModelCaller) -> LlmAllocator:
         model="openai/scripted", api_base=server.api_base, timeout_s=20.0, retry_wait_s=0.01
     )
 
-    def ask(
-        system: str,
-        question: str,
-        repair: str,
-        schema: dict[str, Any],
-        read: Callable[[str], Choice | tuple[Violation, ...]],
-    ) -> Choice | str:
-        def taken(text: str) -> Choice | Rejected:
-            made = read(text)
-            return made if isinstance(made, dict) else Rejected(made)
-
-        prompts = Prompts("allocation", {"repair": repair, "house-rules": ""})
-        asked = Conversation(config, prompts, caller)
-        made = asked.ask(system, question, "repair", schema, taken, Ledger(config))
-        return made.reason if isinstance(made, GivenUp) else made
-
-    return LlmAllocator(ask, BalancedAllocator())
+    return LlmAllocator(AllocationAsker(config, caller), BalancedAllocator())
 
 
 def answer(**robots: str) -> Reply:

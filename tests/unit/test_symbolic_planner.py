@@ -10,7 +10,7 @@ import pytest
 from fleet.allocators.base import Allocated, NotAllocated
 from fleet.allocators.milp import MilpAllocator
 from fleet.core.checker import check_plan
-from fleet.core.skills import skills_from_data
+from fleet.core.skills import Variable, skills_from_data
 from fleet.core.world_model import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic import SymbolicPlanner
@@ -251,3 +251,12 @@ def test_goals_that_want_the_same_helper_are_still_planned_one_by_one() -> None:
     goals = [bring(n, "living_room") for n in range(1, 5)]
     plan = solve(world, *goals, strategy="per-goal")
     assert allocate(plan, world)
+
+
+def test_the_order_of_work_that_reaches_every_goal_is_taken_even_if_it_is_longer() -> None:
+    world = home((manipulator(),), facts=(fact("hsr", "at", "kitchen"),))
+    stay = Goal(goal="s", text="", conditions=(at("hsr", "kitchen"),), ordinal=2)
+    world = world.with_facts({Variable("at", "hsr"): "hallway"})
+    plan = solve(world, bring(1, "living_room"), stay)
+    made = allocate(plan, world)
+    assert check_plan(plan, world, made.allocation, made.schedule.extra_after).valid

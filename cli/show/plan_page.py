@@ -64,7 +64,11 @@ def making_lines(making: Making, status: PlanStatus | None) -> list[str]:
         if status.planning_time_s is not None:
             lines.append(f"planning    {status.planning_time_s:.2f} s")
         if status.predicted_makespan_s is not None:
-            lines.append(f"makespan    {seconds(status.predicted_makespan_s)} predicted")
+            makespan = f"makespan    {seconds(status.predicted_makespan_s)} predicted"
+            if status.lower_bound_s is not None:
+                makespan += f", {seconds(status.lower_bound_s)} at the least"
+            lines.append(makespan)
+        lines += [f"allocation  {note}" for note in status.notes]
         if status.change is not None:
             change = status.change
             lines.append(

@@ -49,7 +49,7 @@ lock: $(VENV)/development ## renew the pinned versions of everything
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 		--no-emit-index-url --no-header pyproject.toml build-requirements.in -o requirements.lock
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
-		--no-emit-index-url --no-header pyproject.toml build-requirements.in --group dev \
+		--no-emit-index-url --no-header pyproject.toml build-requirements.in --group dev --group bench \
 		-o requirements-dev.lock
 
 clean: ## remove everything that is made

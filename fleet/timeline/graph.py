@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
+import networkx
 import rerun as rr
 
 from fleet.timeline.lanes import call_text
@@ -184,23 +185,19 @@ def _natural(name: str) -> list[tuple[int, str]]:
 
 
 def _ranks(after: dict[str, tuple[str, ...]]) -> dict[str, int]:
-    """Longest path to each task, counted in tasks before it; Kahn's algorithm, cycles come last."""
-    waits = {task: {t for t in first if t in after and t != task} for task, first in after.items()}
-    next_of: dict[str, list[str]] = {task: [] for task in after}
-    for task, first in waits.items():
-        for before in first:
-            next_of[before].append(task)
-    rank = dict.fromkeys(after, 0)
-    missing = {task: len(first) for task, first in waits.items()}
-    ready = [task for task, count in missing.items() if count == 0]
-    while ready:
-        task = ready.pop()
-        for following in next_of[task]:
-            rank[following] = max(rank[following], rank[task] + 1)
-            missing[following] -= 1
-            if missing[following] == 0:
-                ready.append(following)
-    return rank
+    """Longest path to each task, counted in tasks before it; those of a cycle count as one."""
+    waits = networkx.DiGraph()
+    waits.add_nodes_from(after)
+    waits.add_edges_from(
+        (before, task) for task, befores in after.items() for before in befores if before in after
+    )
+    whole = networkx.condensation(waits)
+    return {
+        task: rank
+        for rank, generation in enumerate(networkx.topological_generations(whole))
+        for component in generation
+        for task in whole.nodes[component]["members"]
+    }
 
 
 def _node(

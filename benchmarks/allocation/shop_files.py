@@ -1,10 +1,10 @@
 """Public job-shop and flexible job-shop instances, in the usual text formats, as shops.
 
 Job shop (`.txt`, Beasley's OR-Library): `jobs machines`, then for each job a line of pairs
-`machine duration` with machines from 0. Flexible job shop (`.fjs`, Brandimarte): `jobs machines` (and
-perhaps a mean flexibility), then for each job the number of operations, and for each of them the
-number of machines and pairs `machine duration` with machines from 1. Lines with `#` are remarks; the
-remark `# optimum N` gives the least makespan known to be optimal.
+`machine duration` with machines from 0. Flexible job shop (`.fjs`, Brandimarte): `jobs machines`
+(and perhaps a mean flexibility), then for each job the number of operations, and for each of them
+the number of machines and pairs `machine duration` with machines from 1. Lines with `#` are
+remarks; the remark `# optimum N` gives the least makespan known to be optimal.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Random shops of a fleet's kind: goals that are chains of blocks, arms and carts, rooms, meetings."""
+"""Random shops of a fleet's kind: goals as chains of blocks, arms and carts, rooms, meetings."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ def random_shop(
 ) -> Shop:
     """A shop with so many operations and machines; the same for the same arguments.
 
-    Goals are chains of two to five blocks; a block is one operation, or a way, a grasp, a way and a
-    putting down. A share of `meetings` of the goals has a hand-over: an arm's operation that needs
-    a cart at the same time, which drives there before and away afterwards. Half of the machines are
-    arms, a third of those slower; the rest are carts. A third of the operations any machine can do.
+    Goals are chains of two to five blocks of one operation each, every one in another room. A share
+    of `meetings` of them is a hand-over instead: an arm and a cart drive to a room, the arm gives
+    the cart something, which takes both, and the cart drives away with it. Half of the machines are
+    arms, a third of those slower; the rest are carts. Of the operations, 20% are for carts, 40% for
+    arms, and 40% for any.
     """
     random = Random(f"{tasks} {machines} {travel} {meetings} {seed}")
     kinds = [(0 if m % 3 else 2) if m % 2 == 0 else 1 for m in range(machines)]

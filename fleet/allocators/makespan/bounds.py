@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from math import inf
 
 from fleet.allocators.makespan.compiled import Compiled
 from fleet.allocators.makespan.problem import Place
@@ -36,13 +37,12 @@ def lower_bound(shop: Compiled) -> float:
     """Seconds that no schedule is shorter than: all but the assignment of ways, which is dear."""
     if not shop.befores:
         return 0.0
-    way = [_least_way_s(shop, block) for block in range(len(shop.steps_of))]
-    heads = _heads(shop, way)
+    least = _least(shop)
+    heads = _heads(shop, least)
     best = max(
-        head + least + tail
-        for head, least, tail in zip(heads, shop.least_ended(way), shop.tails, strict=True)
+        head + length + tail for head, length, tail in zip(heads, least, shop.tails, strict=True)
     )
-    rows = _rows(shop, way, heads)
+    rows = _rows(shop, least, heads)
     within = _within(rows)
     best = max(best, *(_load(shop, machines, mine) for machines, mine in within.items()))
     return max(best, *(_priced(shop, mine) for mine in within.values()))
@@ -50,10 +50,10 @@ def lower_bound(shop: Compiled) -> float:
 
 def bound_with_ways(shop: Compiled) -> float:
     """The load together with the least total way, s."""
-    way = [_least_way_s(shop, block) for block in range(len(shop.steps_of))]
-    within = _within(_rows(shop, way, _heads(shop, way)))
+    least = _least(shop)
+    within = _within(_rows(shop, least, _heads(shop, least)))
     return max(
-        _with_ways(shop, machines, mine, way) if len(mine) <= MAX_ASSIGNED else 0.0
+        _with_ways(shop, machines, mine) if len(mine) <= MAX_ASSIGNED else 0.0
         for machines, mine in within.items()
     )
 
@@ -76,18 +76,13 @@ _Block = tuple[tuple[int, ...], float, float, float, int]
 """Machines, least time on one [s], head [s], tail [s], block."""
 
 
-def _least_way_s(shop: Compiled, block: int) -> float:
-    """The shortest way to the block's first target: from where a machine starts, or from where any
-    block that could come before it leaves a machine."""
-    target = shop.entry[block]
-    if target < 0:
-        return 0.0
-    return shop.shortest_way_s(block, target)
+def _least(shop: Compiled) -> list[float]:
+    """Seconds that no machine does a step faster than, its way included."""
+    return [a + b for a, b in zip(shop.least, shop.least_ways_s(), strict=True)]
 
 
-def _heads(shop: Compiled, way: Sequence[float]) -> list[float]:
+def _heads(shop: Compiled, least: Sequence[float]) -> list[float]:
     """Seconds before which no step can start."""
-    least = shop.least_ended(way)
     heads = [0.0] * len(shop.befores)
     first = {steps[0]: block for block, steps in enumerate(shop.steps_of)}
     machines = shop.shop.machines
@@ -100,8 +95,7 @@ def _heads(shop: Compiled, way: Sequence[float]) -> list[float]:
     return heads
 
 
-def _rows(shop: Compiled, way: Sequence[float], heads: Sequence[float]) -> list[_Block]:
-    least = shop.least_ended(way)
+def _rows(shop: Compiled, least: Sequence[float], heads: Sequence[float]) -> list[_Block]:
     rows: list[_Block] = []
     for block, steps in enumerate(shop.steps_of):
         inside = sum(least[s] for s in steps)
@@ -113,13 +107,13 @@ def _rows(shop: Compiled, way: Sequence[float], heads: Sequence[float]) -> list[
 def _load(shop: Compiled, machines: Sequence[int], rows: Sequence[_Block]) -> float:
     count = len(machines)
     ready = sorted(shop.shop.machines[m].ready_s for m in machines)
-    work = sum(row[1] for row in rows)
-    best = (work + sum(ready)) / count + min(row[3] for row in rows)
+    best = _filled(sum(row[1] for row in rows), ready) + min(row[3] for row in rows)
     longest = sorted((row[1] for row in rows), reverse=True)
     if len(longest) > count:
         best = max(best, longest[count - 1] + longest[count] + ready[0])
-    heads = _cuts(row[2] for row in rows)
-    tails = _cuts(row[3] for row in rows)
+    cuts = min(CUTS, 4 + ADDED_UP // (len(rows) * CUTS))
+    heads = _cuts((row[2] for row in rows), cuts)
+    tails = _cuts((row[3] for row in rows), cuts)
     for tail in tails:
         late = [row for row in rows if row[3] >= tail]
         for head in heads:
@@ -129,9 +123,7 @@ def _load(shop: Compiled, machines: Sequence[int], rows: Sequence[_Block]) -> fl
     return best
 
 
-def _with_ways(
-    shop: Compiled, machines: Sequence[int], rows: Sequence[_Block], way: Sequence[float]
-) -> float:
+def _with_ways(shop: Compiled, machines: Sequence[int], rows: Sequence[_Block]) -> float:
     """The load with the least total way instead of each block's own least way."""
     from scipy.optimize import linear_sum_assignment
 
@@ -159,16 +151,31 @@ def _with_ways(
             row[column[b]] = never
     taken = linear_sum_assignment(costs)
     total = sum(costs[i][j] for i, j in zip(*taken, strict=True))
-    work = sum(row[1] for row in rows) - sum(way[b] for b in entering)
-    ready = sum(shop.shop.machines[m].ready_s for m in machines)
-    return (work + min(total, never) + ready) / len(machines) + min(row[3] for row in rows)
+    ways = shop.least_ways_s()
+    first = [
+        next(s for s in shop.steps_of[b] if shop.block_of[s] == b and shop.targets[s] >= 0)
+        for b in entering
+    ]
+    work = sum(row[1] for row in rows) - sum(ways[step] for step in first)
+    ready = sorted(shop.shop.machines[m].ready_s for m in machines)
+    return _filled(work + min(total, never), ready) + min(row[3] for row in rows)
 
 
-def _cuts(values: Iterable[float]) -> list[float]:
+def _filled(work_s: float, ready_s: Sequence[float]) -> float:
+    """When so much work can be done at the earliest on machines that are free from `ready_s`
+    (ascending): a machine that is free too late does nothing."""
+    best, begun_s = inf, 0.0
+    for count, ready in enumerate(ready_s, start=1):
+        begun_s += ready
+        best = min(best, (work_s + begun_s) / count)
+    return best
+
+
+def _cuts(values: Iterable[float], cuts: int) -> list[float]:
     distinct = sorted(set(values))
-    if len(distinct) <= CUTS:
+    if len(distinct) <= cuts:
         return distinct
-    return [distinct[i * (len(distinct) - 1) // (CUTS - 1)] for i in range(CUTS)]
+    return [distinct[i * (len(distinct) - 1) // (cuts - 1)] for i in range(cuts)]
 
 
 def _priced(shop: Compiled, rows: Sequence[_Block]) -> float:

@@ -11,7 +11,9 @@ from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
-from fleet.allocators.makespan.problem import BadShop, Place, Shop, topological
+from fleet.allocators.makespan.graphs import strong_components
+from fleet.allocators.makespan.merging import Row, merged, single, with_chains
+from fleet.allocators.makespan.problem import Place, Shop, topological
 
 
 class Step(NamedTuple):
@@ -45,9 +47,9 @@ class Compiled:
         self.shop = shop
         self.kinds = [machine.kind for machine in shop.machines]
         self.places = [int(block.place) for block in shop.blocks]
-        befores = _with_chains(shop)
+        befores = with_chains(shop)
         order = topological(befores)
-        owner, befores, rows = _merged(shop, befores, order) if merge else _single(shop, befores)
+        owner, befores, rows = merged(shop, befores, order) if merge else single(shop, befores)
         self.owner = owner
         """Step of each operation."""
         self.befores = befores
@@ -84,7 +86,7 @@ class Compiled:
             self.ranks[step] = mean[step] + max((self.ranks[n] for n in rest), default=0.0)
         self._knots(rows)
 
-    def _knots(self, rows: Sequence[_Row]) -> None:
+    def _knots(self, rows: Sequence[Row]) -> None:
         blocks = len(self.shop.blocks)
         before_blocks: list[set[int]] = [set() for _ in range(blocks)]
         for step, before in enumerate(self.befores):
@@ -169,27 +171,28 @@ class Compiled:
         self.travels = any(target >= 0 for target in self.targets)
         self.has_places = any(p != Place.ANYWHERE for p in self.places)
 
-    def least_ended(self, way_s: Sequence[float]) -> list[float]:
-        """The least time of every step, with the least way of its block where it drives first."""
-        return [
-            least + (way_s[self.block_of[step]] if self.targets[step] >= 0 else 0.0)
-            for step, least in enumerate(self.least)
-        ]
-
-    def shortest_way_s(self, block: int, target: int) -> float:
-        """The least way to a site for a block: from where one of its machines starts, or from where
-        some block, other than itself, can leave one of them."""
-        machines = self.shop.blocks[block].machines
-        best = inf
-        for machine in machines:
-            kind, site = self.kinds[machine], self.shop.machines[machine].site
-            best = min(best, self.shop.travel_s[kind][site][target])
-        for site in self.exits:
-            for kind in self.eligible_kinds[block]:
-                best = min(best, self.shop.travel_s[kind][site][target])
-            if best <= 0:
-                break
-        return best
+    def least_ways_s(self) -> list[float]:
+        """Of every step the least way to its target: from where one of its machines starts, or from
+        where some step can leave one of them."""
+        from_exits: dict[tuple[int, tuple[int, ...]], float] = {}
+        ways = [0.0] * len(self.targets)
+        for step, target in enumerate(self.targets):
+            if target < 0:
+                continue
+            block = self.block_of[step]
+            key = (target, self.eligible_kinds[block])
+            if key not in from_exits:
+                from_exits[key] = min(
+                    (self.shop.travel_s[k][site][target] for k in key[1] for site in self.exits),
+                    default=inf,
+                )
+            ways[step] = from_exits[key]
+            if ways[step] > 0:
+                starts = {(self.kinds[m], self.shop.machines[m].site)
+                          for m in self.shop.blocks[block].machines}  # fmt: skip
+                least = min(self.shop.travel_s[kind][site][target] for kind, site in starts)
+                ways[step] = min(ways[step], least)
+        return ways
 
     def _not_ahead(self, block: int) -> frozenset[int]:
         """Those of which some step comes after some step of the block."""
@@ -203,120 +206,3 @@ class Compiled:
                 reached.add(step.number)
                 found.update(self.blocks_of[step.number])
         return frozenset(found - {block})
-
-
-_Row = tuple[tuple[int, ...], tuple[float, ...], int, int, float, float]
-"""Blocks, durations by kind, target, arrives, weight, due."""
-
-
-def _with_chains(shop: Shop) -> list[list[int]]:
-    """What each operation waits for, with the one before it in each of its blocks."""
-    befores = [set(operation.after) for operation in shop.operations]
-    for block in shop.blocks:
-        for one, other in zip(block.operations, block.operations[1:], strict=False):
-            befores[other].add(one)
-    for number, rows in enumerate(befores):
-        if not all(0 <= before < len(befores) for before in rows) or number in rows:
-            raise BadShop(f"operation {number} waits for itself or for what does not exist")
-    return [sorted(rows) for rows in befores]
-
-
-def _single(shop: Shop, befores: list[list[int]]) -> tuple[list[int], list[list[int]], list[_Row]]:
-    return list(range(len(befores))), befores, _rows(shop)
-
-
-def _rows(shop: Shop) -> list[_Row]:
-    """Of each operation; the way between two operations of a block is part of the duration."""
-    rows: list[_Row] = [
-        (o.blocks, o.duration_s, -1 if o.target is None else o.target,
-         -1 if o.arrives is None else o.arrives, o.weight, o.due_s)
-        for o in shop.operations
-    ]  # fmt: skip
-    for number, block in enumerate(shop.blocks):
-        where = -1
-        for op in block.operations:
-            mine, duration, target, arrives, weight, due = rows[op]
-            if mine[0] != number:
-                continue
-            if target >= 0 and where >= 0:
-                duration = tuple(
-                    d + shop.travel_s[kind][where][target] for kind, d in enumerate(duration)
-                )
-                rows[op] = (mine, duration, -1, arrives, weight, due)
-            where = arrives if arrives >= 0 else where
-    return rows
-
-
-def _merged(
-    shop: Shop, befores: list[list[int]], order: Sequence[int]
-) -> tuple[list[int], list[list[int]], list[_Row]]:
-    """Merge operations that always follow each other directly on the same machines."""
-    rows = _rows(shop)
-    laters = [0] * len(rows)
-    for before in befores:
-        for b in before:
-            laters[b] += 1
-    owner = [-1] * len(rows)
-    steps: list[_Row] = []
-    step_befores: list[list[int]] = []
-    for op in order:
-        row = rows[op]
-        before = befores[op]
-        if len(before) == 1 and laters[before[0]] == 1 and rows[before[0]][0] == row[0]:
-            step = owner[before[0]]
-            head = steps[step]
-            free = head[4] == 0 and head[5] == inf and (row[2] < 0 or head[2] < 0)
-            if free:
-                owner[op] = step
-                steps[step] = (
-                    row[0],
-                    tuple(a + b for a, b in zip(head[1], row[1], strict=True)),
-                    max(head[2], row[2]),
-                    row[3] if row[3] >= 0 else head[3],
-                    row[4],
-                    row[5],
-                )
-                continue
-        owner[op] = len(steps)
-        steps.append(row)
-        step_befores.append(sorted({owner[b] for b in before}))
-    return owner, step_befores, steps
-
-
-def strong_components(befores: Sequence[set[int]]) -> list[int]:
-    """The strongly connected component of each node (Kosaraju, Sharir 1981), without recursion."""
-    laters: list[list[int]] = [[] for _ in befores]
-    for node, rows in enumerate(befores):
-        for before in rows:
-            laters[before].append(node)
-    finished: list[int] = []
-    seen = [False] * len(befores)
-    for root in range(len(befores)):
-        if seen[root]:
-            continue
-        seen[root] = True
-        stack = [(root, iter(laters[root]))]
-        while stack:
-            node, rest = stack[-1]
-            for after in rest:
-                if not seen[after]:
-                    seen[after] = True
-                    stack.append((after, iter(laters[after])))
-                    break
-            else:
-                finished.append(node)
-                stack.pop()
-    component = [-1] * len(befores)
-    count = 0
-    for root in reversed(finished):
-        if component[root] >= 0:
-            continue
-        component[root] = count
-        todo = [root]
-        while todo:
-            for before in befores[todo.pop()]:
-                if component[before] < 0:
-                    component[before] = count
-                    todo.append(before)
-        count += 1
-    return component

@@ -7,16 +7,18 @@ a large alpha is list scheduling.
 
 from __future__ import annotations
 
+import time
 from bisect import insort
 from collections.abc import Sequence
 from math import inf
+from random import Random
 from typing import NamedTuple
 
 from fleet.allocators.makespan.compiled import Compiled
 from fleet.allocators.makespan.problem import Place
 from fleet.allocators.makespan.timing import Rated, rate
 
-ALPHAS = (0.1, 0.3, 1.0, 0.03, 0.2, 0.5, 0.0, 0.05, 0.15, 0.4, 0.7, 2.0)
+ALPHAS = (0.1, 0.5, 1.0, 2.0, 0.2, 0.0, 0.3, 0.03, 0.7, 0.05, 0.4, 5.0)
 """Tried one after the other while there is time; spread around those that won most often."""
 CANDIDATES = 48
 """Ready knots that a dispatch rule looks at, those of highest rank."""
@@ -41,13 +43,19 @@ class Habit(NamedTuple):
 
 
 def construct(
-    shop: Compiled, alpha: float | None = None, habit: Habit | None = None
+    shop: Compiled,
+    alpha: float | None = None,
+    habit: Habit | None = None,
+    at_random: Random | None = None,
+    until_s: float = inf,
 ) -> Answer | None:
     """Place one ready knot after the other; without `alpha` the one of highest rank (HEFT).
 
-    Deterministic. `None` if it leads to where some block finds no machine.
+    `at_random` takes any machine that will do, instead of the one where a block ends first.
+    Deterministic. `None` if it leads to where some block finds no machine, or if it is not done at
+    `until_s` (on `time.perf_counter`).
     """
-    board = _Board(shop, habit)
+    board = _Board(shop, habit, at_random)
     if habit is not None:
         if any(board.place(knot) is None for knot in habit.order):
             return None
@@ -61,6 +69,8 @@ def construct(
         if count == 0:
             insort(ready, (shop.knot_place[knot], -shop.knot_rank[knot], knot))
     while ready:
+        if len(order) % 256 == 255 and time.perf_counter() > until_s:
+            return None
         at = 0 if alpha is None else board.choose(ready, guesses, alpha)
         knot = ready.pop(at)[2]
         guesses.pop(knot, None)
@@ -89,8 +99,8 @@ class _Guess(NamedTuple):
 class _Board:
     """What is placed so far."""
 
-    def __init__(self, shop: Compiled, habit: Habit | None = None) -> None:
-        self.shop, self.habit = shop, habit
+    def __init__(self, shop: Compiled, habit: Habit | None, at_random: Random | None) -> None:
+        self.shop, self.habit, self.random = shop, habit, at_random
         machines = shop.shop.machines
         self.free = [machine.ready_s for machine in machines]
         self.site = [machine.site for machine in machines]
@@ -108,8 +118,8 @@ class _Board:
         """The block on this machine."""
         shop = self.shop
         kind = shop.kinds[machine]
-        start_s = self.free[machine]
-        start_s = max(start_s, ready_s)
+        free_s = self.free[machine]
+        start_s = free_s if free_s > ready_s else ready_s
         target = shop.entry[block]
         if target >= 0:
             start_s += shop.shop.travel_s[kind][self.site[machine]][target]
@@ -118,27 +128,45 @@ class _Board:
 
     def best(self, block: int) -> _Guess | None:
         """The machine on which the block ends first; of equals the one that idles least before."""
+        shop = self.shop
+        others = {self.machine_of[other] for other in shop.shop.blocks[block].apart}
+        others |= {self.machine_of[other] for other in shop.not_ahead[block]}
+        machines: Sequence[int] = shop.shop.blocks[block].machines
+        if others or shop.has_places:
+            place = shop.places[block]
+            machines = [m for m in machines if m not in others and self._open(m, place)]
+        if not machines:
+            return None
         ready_s = self.ready_s(block)
-        place = self.shop.places[block]
-        others = [self.machine_of[other] for other in self.shop.shop.blocks[block].apart]
-        others += [self.machine_of[other] for other in self.shop.not_ahead[block]]
-        best: _Guess | None = None
-        least = (inf, inf)
-        taken, free, guess = self.taken, self.free, self.guess
-        for machine in self.shop.shop.blocks[block].machines:
-            if taken[machine] == LAST or taken[machine] > place or machine in others:
-                continue
-            found = guess(block, machine, ready_s)
-            if found.finish_s <= least[0]:
-                key = (found.finish_s, -free[machine])
-                if key < least:
-                    best, least = found, key
-        if self.habit is not None and best is not None:
+        if self.random is not None:
+            return self.guess(block, self.random.choice(machines), ready_s)
+        machine = self._first_done(block, machines, ready_s)
+        found = self.guess(block, machine, ready_s)
+        if self.habit is not None:
             home = self.habit.home[block]
-            if home in self.eligible[block] and self._open(home, place) and home not in others:
-                found = guess(block, home, ready_s)
-                if found.finish_s <= best.finish_s + self.habit.slack_s:
-                    return found
+            if home != machine and home in machines:
+                there = self.guess(block, home, ready_s)
+                if there.finish_s <= found.finish_s + self.habit.slack_s:
+                    return there
+        return found
+
+    def _first_done(self, block: int, machines: Sequence[int], ready_s: float) -> int:
+        """`guess` for all machines, of which the least is taken: the innermost loop of all."""
+        shop = self.shop
+        kinds, free, site = shop.kinds, self.free, self.site
+        own = shop.own_s[block] or (0.0,) * (max(kinds) + 1)
+        target, travel_s = shop.entry[block], shop.shop.travel_s
+        best, least_s, latest_s = -1, inf, -inf
+        for machine in machines:
+            free_s = free[machine]
+            if free_s > least_s:
+                continue
+            kind = kinds[machine]
+            finish_s = (free_s if free_s > ready_s else ready_s) + own[kind]
+            if target >= 0:
+                finish_s += travel_s[kind][site[machine]][target]
+            if finish_s < least_s or (finish_s == least_s and free_s > latest_s):
+                best, least_s, latest_s = machine, finish_s, free_s
         return best
 
     def _open(self, machine: int, place: int) -> bool:

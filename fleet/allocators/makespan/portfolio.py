@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from math import ceil
+from math import ceil, inf
+from random import Random
 
 from fleet.allocators.makespan.anneal import anneal
 from fleet.allocators.makespan.bounds import bound_with_ways, lower_bound
@@ -17,6 +18,8 @@ RULES_SHARE = 0.3
 """Of the time, how much dispatch rules may take before the search begins."""
 ALWAYS = 200
 """Steps up to which every rule is tried whatever the time: a few milliseconds each."""
+AT_LEAST = 50
+"""Tries at random, where rules find nothing, whatever the time."""
 START_UP_S = 0.8
 """What starting a process and importing OR-Tools takes, s; CP-SAT gets so much more time."""
 NEAR = 1e-4
@@ -40,6 +43,8 @@ def solve(shop: Shop, deadline_s: float = 1.0, exact: bool = True, seed: int = 0
     ready = Compiled(shop)
     listed = construct(ready)
     best = rules(ready, listed, began_s + RULES_SHARE * deadline_s)
+    if best is None:
+        best = persist(ready, until_s, seed)
     if best is None:
         return None
     bound_s = lower_bound(ready)
@@ -72,10 +77,25 @@ def rules(shop: Compiled, best: Answer | None, until_s: float) -> Answer | None:
         small = len(shop.befores) <= ALWAYS
         if best is not None and not small and time.perf_counter() > until_s:
             break
-        found = construct(shop, alpha)
+        found = construct(shop, alpha, until_s=inf if small or best is None else until_s)
         if found is not None and (best is None or found.rated.cost < best.rated.cost):
             best = found
     return best
+
+
+def persist(shop: Compiled, until_s: float, seed: int) -> Answer | None:
+    """Some schedule where rules run into dead ends: blocks of a knot in other orders, machines at
+    random for a knot after the other."""
+    random = Random(seed)
+    tries = 0
+    while tries < AT_LEAST or time.perf_counter() < until_s:
+        tries += 1
+        for together in shop.knot_blocks:
+            random.shuffle(together)
+        found = construct(shop, random.choice((None, *ALPHAS)), at_random=random)
+        if found is not None:
+            return found
+    return None
 
 
 def blocks_in_order(shop: Compiled, answer: Answer) -> list[int]:

@@ -100,10 +100,10 @@ def reschedule(
     length_s = until_s - time.perf_counter()
     start = min(first, key=priced_s)
     priced = anneal(
-        ready, start, until_s - 0.6 * length_s, 0.0, seed, PRICE * scale_s, home, frozen
+        ready, start, until_s - 0.35 * length_s, 0.0, seed, PRICE * scale_s, home, frozen
     )
     shortest = min([*first, priced], key=lambda a: a.rated.makespan_s)
-    free = anneal(ready, shortest, until_s - 0.35 * length_s, 0.0, seed + 1, frozen=frozen)
+    free = anneal(ready, shortest, until_s - 0.2 * length_s, 0.0, seed + 1, frozen=frozen)
     found = [*first, priced, free]
     best_s = min(a.rated.makespan_s for a in found)
     good = [a for a in found if a.rated.makespan_s <= best_s * (1 + WITHIN)]

@@ -47,6 +47,7 @@ class Kept(Enum):
     STORED = "stored"
     LATEST = "stored, latest matters"
     STREAM = "not stored"
+    SEQUENCE = "not stored, every one counts"
     TOKEN = "liveliness token"
     QUERY = "query and reply"
 

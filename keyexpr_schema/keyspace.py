@@ -194,11 +194,11 @@ SIM_CLOCK = Key(
     "sim", "planner, workers, recorder, robotctl", Kept.STREAM,
     "Simulated time.",
 )
-SIM_FRAME = Key(
-    "sim_frame", "sim/frame",
-    simulation.SimAddress, simulation.Frame,
-    "sim", "recorder", Kept.STREAM,
-    "Where every movable body is.",
+SIM_FRAMES = Key(
+    "sim_frames", "sim/frames",
+    simulation.SimAddress, simulation.Frames,
+    "sim", "recorder", Kept.SEQUENCE,
+    "Where every movable body was, ten times in a simulated second.",
 )
 SIM_SCENE = Key(
     "sim_scene", "sim/scene",

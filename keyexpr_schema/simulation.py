@@ -118,6 +118,12 @@ class Frame(Payload, frozen=True, kw_only=True):
     poses: dict[str, tuple[PointM, QuaternionWxyz]]
 
 
+class Frames(Payload, frozen=True, kw_only=True):
+    """Frames in a row, oldest first: a fast simulation makes more than there are messages for."""
+
+    frames: tuple[Frame, ...]
+
+
 class ContactCount(Payload, frozen=True, kw_only=True):
     """Robots that ran into each other or into walls since the start; each touch counted once."""
 

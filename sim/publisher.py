@@ -9,19 +9,29 @@ from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.keyspace import (
     SIM_CLOCK,
     SIM_CONTACTS,
-    SIM_FRAME,
+    SIM_FRAMES,
     SIM_SCENE,
     SIM_SENSES,
     SIM_TRUTH,
 )
 from keyexpr_schema.session import Session
-from keyexpr_schema.simulation import SimAddress, SimClock, SimRobotAddress, TruthAddress
+from keyexpr_schema.simulation import (
+    Frame,
+    Frames,
+    SimAddress,
+    SimClock,
+    SimRobotAddress,
+    TruthAddress,
+)
 from sim.backend import Backend
 
 CLOCK_WALL_S = 0.05
 SENSES_S, SENSES_WALL_S = 0.2, 0.05
-FRAME_S, FRAME_WALL_S = 0.1, 0.01
-"""Frames and senses: no more often than this in simulated time, and in wall time."""
+TRUTH_S, TRUTH_WALL_S = 0.1, 0.01
+"""Senses and truths: no more often than this in simulated time, and in wall time."""
+FRAME_S, FRAMES_WALL_S, FRAMES = 0.1, 0.05, 100
+"""A frame is kept this often in simulated time; they go out together this often in wall time, or
+as soon as there are so many."""
 REPEAT_WALL_S = 1.0
 """Everything is told again after this: a put is lost without a word while a router is away."""
 
@@ -31,14 +41,22 @@ class Publisher:
 
     def __init__(self, session: Session, backend: Backend, speed: float | None) -> None:
         self._session, self._backend, self._speed = session, backend, speed
-        self._clock_wall_s = self._senses_wall_s = self._frame_wall_s = -1.0
-        self._senses_s = self._frame_s = -1.0
+        self._clock_wall_s = self._senses_wall_s = self._truth_wall_s = -1.0
+        self._senses_s = self._truth_s = self._frame_s = -1.0
+        self._frames: list[Frame] = []
+        self._frames_wall_s = -1.0
         self._repeat_wall_s = 0.0
         self._truths: dict[str, tuple[object, ...]] = {}
         self._contacts = (-1, -1)
 
+    def _keep_frame(self) -> None:
+        if self._backend.time_s - self._frame_s >= FRAME_S - 1e-9:
+            self._frame_s = self._backend.time_s
+            self._frames.append(self._backend.frame())
+
     def publish(self, robots: tuple[str, ...] = ()) -> None:
         """Whatever is due; of `robots`, whose motion just ended, the senses in any case."""
+        self._keep_frame()
         now_s, wall_s = self._backend.time_s, time.monotonic()
         repeat = wall_s - self._repeat_wall_s >= REPEAT_WALL_S
         if repeat:
@@ -58,13 +76,19 @@ class Publisher:
         for robot in robots:
             self._session.put(SIM_SENSES, SimRobotAddress(robot), self._backend.senses(robot))
         if repeat or (
-            now_s - self._frame_s >= FRAME_S and wall_s - self._frame_wall_s >= FRAME_WALL_S
+            now_s - self._truth_s >= TRUTH_S and wall_s - self._truth_wall_s >= TRUTH_WALL_S
         ):
-            self._frame_s, self._frame_wall_s = now_s, wall_s
-            self._session.put(SIM_FRAME, SimAddress(), self._backend.frame())
+            self._truth_s, self._truth_wall_s = now_s, wall_s
             self._judge(repeat)
         elif robots:
             self._judge(False)
+        if repeat:
+            self._frames.append(self._backend.frame())
+        if self._frames and (
+            repeat or len(self._frames) >= FRAMES or wall_s - self._frames_wall_s >= FRAMES_WALL_S
+        ):
+            self._session.put(SIM_FRAMES, SimAddress(), Frames(frames=tuple(self._frames)))
+            self._frames, self._frames_wall_s = [], wall_s
 
     def _judge(self, repeat: bool) -> None:
         for truth in self._backend.truths():

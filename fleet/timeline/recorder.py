@@ -36,7 +36,7 @@ from keyexpr_schema.keyspace import (
     ROBOT_SPEC,
     ROBOT_STATE,
     SIM_CLOCK,
-    SIM_FRAME,
+    SIM_FRAMES,
     SIM_SCENE,
     SIM_TRUTH,
     TASK_RECORD,
@@ -45,7 +45,7 @@ from keyexpr_schema.tasks import OrderAddress, Report, TaskRecord, TaskState
 
 RECORDED: tuple[Key[Any, Any], ...] = (
     SIM_SCENE,
-    SIM_FRAME,
+    SIM_FRAMES,
     SIM_CLOCK,
     SIM_TRUTH,
     PLACE,
@@ -143,8 +143,9 @@ class Recorder:
         """Record one change; a value that is already known changes nothing."""
         key, value = change.key.name, change.value
         wall_s = wall_of(change.timestamp) or time.time()
-        if key == SIM_FRAME.name and value is not None:
-            self._world.frame(value, wall_s)
+        if key == SIM_FRAMES.name and value is not None:
+            for frame in value.frames:
+                self._world.frame(frame, wall_s)
             return
         if key == SIM_CLOCK.name and value is not None:
             self._clock.tick(value.wall_time_s, value.time_s)

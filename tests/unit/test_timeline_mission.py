@@ -17,7 +17,7 @@ from keyexpr_schema import keyspace as keys
 from keyexpr_schema.plans import PlanAddress
 from keyexpr_schema.robots import RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.service import Reject, RejectAddress
-from keyexpr_schema.simulation import Frame, SimAddress, SimClock
+from keyexpr_schema.simulation import Frame, Frames, SimAddress, SimClock
 from keyexpr_schema.tasks import Report, ReportAddress, ReportState, TaskAddress, TaskState
 from keyexpr_schema.world import Fact, FactAddress
 
@@ -89,9 +89,10 @@ def test_bars_are_coloured_by_skill_and_labelled_with_the_call(recording: Path) 
 def test_every_body_is_where_its_frames_said(recording: Path) -> None:
     truth: dict[str, dict[float, Any]] = {}
     for change in mission():
-        if change.key is keys.SIM_FRAME:
-            for body, (point, _) in change.value.poses.items():
-                truth.setdefault(body, {})[round(change.value.time_s, 3)] = point
+        if change.key is keys.SIM_FRAMES:
+            (frame,) = change.value.frames
+            for body, (point, _) in frame.poses.items():
+                truth.setdefault(body, {})[round(frame.time_s, 3)] = point
     for body, owner in (("hsr/base", "hsr"), ("locobot/base", "locobot"), ("cup_1", "cup_1")):
         path = f"/world/bodies/{owner}/{body.replace('/', chr(92) + '/')}"
         logged = rows(recording, path, "translation")
@@ -239,7 +240,12 @@ def test_odd_orders_are_drawn_as_far_as_they_can_be(tmp_path: Path) -> None:
         put(keys.TASK_RECORD, task, None, 31.5),
         put(keys.PLAN_SPEC, PlanAddress(plan="p2"), looped, 32.0),
         put(keys.PLAN_STATUS, PlanAddress(plan="p1"), None, 33.0),
-        put(keys.SIM_FRAME, SimAddress(), Frame(time_s=34.0, poses={"x/y": stray}), 34.0),
+        put(
+            keys.SIM_FRAMES,
+            SimAddress(),
+            Frames(frames=(Frame(time_s=34.0, poses={"x/y": stray}),)),
+            34.0,
+        ),
         put(
             keys.ROBOT_STATE,
             RobotAddress(robot="real"),

@@ -22,6 +22,7 @@ from keyexpr_schema.robots import RobotActivity, RobotAddress, RobotSpec, RobotS
 from keyexpr_schema.simulation import (
     Body,
     Frame,
+    Frames,
     Scene,
     Shape,
     ShapeKind,
@@ -499,7 +500,9 @@ def frames(step_s: float = 0.1) -> Iterator[Put]:
             poses[cup] = (point, UPRIGHT)
         clock = SimClock(time_s=now, wall_time_s=WALL_S + now, speed=1.0)
         yield put(keys.SIM_CLOCK, SimAddress(), clock, now)
-        yield put(keys.SIM_FRAME, SimAddress(), Frame(time_s=now, poses=poses), now)
+        yield put(
+            keys.SIM_FRAMES, SimAddress(), Frames(frames=(Frame(time_s=now, poses=poses),)), now
+        )
 
 
 def mission(step_s: float = 0.1) -> list[Put]:

@@ -18,9 +18,9 @@ from fleet.timeline import viewer
 from fleet.timeline.errors import UnreadableRecording
 from fleet.timeline.read import Row, rows, summary
 from keyexpr_schema.goals import Goal, GoalAddress
-from keyexpr_schema.keyspace import GOAL_SPEC, SIM_CLOCK, SIM_FRAME, TASK_RECORD
+from keyexpr_schema.keyspace import GOAL_SPEC, SIM_CLOCK, SIM_FRAMES, TASK_RECORD
 from keyexpr_schema.session import Session, open_session
-from keyexpr_schema.simulation import Frame, SimAddress, SimClock
+from keyexpr_schema.simulation import Frame, Frames, SimAddress, SimClock
 from keyexpr_schema.tasks import TaskAddress, TaskRecord, TaskState
 
 DEADLINE_S = 30.0
@@ -96,7 +96,8 @@ def move(session: Session, time_s: float) -> None:
     clock = SimClock(time_s=time_s, wall_time_s=time.time(), speed=1.0)
     session.put(SIM_CLOCK, SimAddress(), clock)
     pose = ((time_s, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
-    session.put(SIM_FRAME, SimAddress(), Frame(time_s=time_s, poses={"r1/base": pose}))
+    frame = Frame(time_s=time_s, poses={"r1/base": pose})
+    session.put(SIM_FRAMES, SimAddress(), Frames(frames=(frame,)))
 
 
 @pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])

@@ -26,7 +26,15 @@ def actors_apart(plan: Plan, checked: CheckedPlan) -> frozenset[Pair]:
         actors = sorted(name.removeprefix(ACTOR_PREFIX) for name in action.participants)
         apart.update((a, b) for i, a in enumerate(actors) for b in actors[i + 1 :])
     loaded = sorted(set(carried_at_end(checked).values()))
-    apart.update((a, b) for i, a in enumerate(loaded) for b in loaded[i + 1 :])
+    pins = plan.pins
+    apart.update(
+        (a, b)
+        for i, a in enumerate(loaded)
+        for b in loaded[i + 1 :]
+        # Two that must be the same robot cannot be kept apart; the checker of the allocated plan
+        # sees whether one load is carried off with the other.
+        if a not in pins or pins[a] != pins.get(b)
+    )
     return frozenset(apart)
 
 

@@ -13,7 +13,7 @@ from fleet.core.skills import Action, Variable
 from fleet.core.telling import SEARCHED
 from fleet.core.world_model import HELD, WorldModel
 from fleet.planners.base import PlanningProblem
-from fleet.planners.search import DERIVED_FROM, Facts, Found, cheapest, ground_actions
+from fleet.planners.search import Facts, Found, cheapest, ground_actions, within_reach
 from keyexpr_schema.goals import Condition
 from keyexpr_schema.world import NOTHING, Value
 
@@ -156,22 +156,26 @@ def _cheapest_few(
     facts: Facts,
     world: WorldModel,
 ) -> list[Found]:
-    actions = ground_actions(world, robots, objects, condition)
-    if (
-        not any(
-            literal.variable == (condition.relation, condition.subject)
-            for action in actions
-            for literal in action.after
-        )
-        and condition.relation not in DERIVED_FROM
-    ):
+    grounded = ground_actions(world, robots, objects, condition)
+    actions = within_reach(grounded, start, condition, world)
+    if not actions:
         return []  # nothing that these objects are good for makes it true
     used: dict[tuple[str, tuple[str, ...]], int] = {}
 
+    seconds: dict[tuple[int, Value], float] = {}
+    """By number of the action and where its robot comes from; charges change between searches."""
+    numbers = {id(action): number for number, action in enumerate(actions)}
+    stands = [Variable("at", action.actor) for action in actions]
+
     def cost_s(action: Action, now: Mapping[Variable, Value]) -> float:
-        where = now.get(Variable("at", action.actor)) or facts.get(Variable("at", action.actor))
-        seconds = predicted_duration_s(action, where, action.actor, world)
-        return seconds + REUSE_CHARGE_S * used.get(_signature(action), 0)
+        number = numbers[id(action)]
+        where = now.get(stands[number]) or facts.get(stands[number])
+        cost = seconds.get((number, where))
+        if cost is None:
+            cost = predicted_duration_s(action, where, action.actor, world)
+            cost += REUSE_CHARGE_S * used.get(_signature(action), 0)
+            seconds[number, where] = cost
+        return cost
 
     results: list[Found] = []
     for _ in range(ALTERNATIVES):
@@ -181,6 +185,7 @@ def _cheapest_few(
         results.append(_with_true_cost(found, world, facts))
         for action in found.actions:
             used[_signature(action)] = used.get(_signature(action), 0) + 1
+        seconds.clear()
     return results
 
 

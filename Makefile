@@ -39,10 +39,13 @@ bench-allocation: $(VENV)/development ## allocators and schedulers, beside each 
 docs: $(VENV)/development ## write the generated pages under docs/
 	$(BIN)/python -m keyexpr_schema.document
 
-screenshots: $(VENV)/runtime ## run the demo and make the pictures of the README from its recording
-	rm -rf runs/screenshots
-	$(BIN)/robotctl demo two-cups --out runs/screenshots
-	$(BIN)/python -m fleet.timeline.screenshot runs/screenshots/recording.rrd docs/screenshots/two-cups.png --at 50
+screenshots: $(VENV)/runtime ## run the demonstrations and make the pictures of the README from them
+	for shot in two-cups:52 find-cup:34; do \
+		mission=$${shot%:*}; rm -rf runs/screenshots-$$mission; \
+		$(BIN)/robotctl demo $$mission --out runs/screenshots-$$mission && \
+		$(BIN)/python -m fleet.timeline.screenshot runs/screenshots-$$mission/recording.rrd \
+			docs/screenshots/$$mission.png --at $${shot#*:} || exit 1; \
+	done
 
 lock: $(VENV)/development ## renew the pinned versions of everything
 	$(BIN)/python -m pip install --quiet uv

@@ -6,9 +6,11 @@ from itertools import permutations, product
 
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from scipy.optimize import linear_sum_assignment
 
 from fleet.allocators.makespan.bounds import bound_with_ways, lower_bound
 from fleet.allocators.makespan.compiled import Compiled
+from fleet.allocators.makespan.graphs import cheapest_assignment
 from fleet.allocators.makespan.lists import construct
 from fleet.allocators.makespan.portfolio import solve
 from fleet.allocators.makespan.problem import BadShop, Block, Machine, Operation, Place, Shop, Timed
@@ -190,3 +192,21 @@ def test_a_mended_schedule_is_right_and_moves_little(shop: Shop, data: st.DataOb
     assert set(found.moved) == {
         b for b, m in enumerate(found.timed.machine_of) if m != planned.machine_of[b]
     }
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.integers(1, 7).flatmap(
+        lambda rows: st.integers(rows, 8).flatmap(
+            lambda columns: st.lists(
+                st.lists(st.integers(0, 9).map(float), min_size=columns, max_size=columns),
+                min_size=rows,
+                max_size=rows,
+            )
+        )
+    )
+)
+def test_the_cheapest_assignment_is_scipys(costs: list[list[float]]) -> None:
+    rows, columns = linear_sum_assignment(costs)
+    cheapest = sum(costs[i][j] for i, j in zip(rows, columns, strict=True))
+    assert abs(cheapest_assignment(costs) - cheapest) < NEAR

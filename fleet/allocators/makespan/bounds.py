@@ -19,6 +19,7 @@ from collections.abc import Iterable, Sequence
 from math import inf
 
 from fleet.allocators.makespan.compiled import Compiled
+from fleet.allocators.makespan.graphs import cheapest_assignment
 from fleet.allocators.makespan.problem import Place
 
 STEPS = 300
@@ -27,7 +28,7 @@ ADDED_UP = 300_000
 """Options looked at in all those steps together."""
 CUTS = 24
 """Heads, and tails, that are tried as thresholds."""
-MAX_ASSIGNED = 600
+MAX_ASSIGNED = 100
 """Blocks up to which the assignment of ways is solved; 0.1 s there."""
 MAX_SETS = 200
 """Sets of machines that are looked at; those with the most blocks come first."""
@@ -125,8 +126,6 @@ def _load(shop: Compiled, machines: Sequence[int], rows: Sequence[_Block]) -> fl
 
 def _with_ways(shop: Compiled, machines: Sequence[int], rows: Sequence[_Block]) -> float:
     """The load with the least total way instead of each block's own least way."""
-    from scipy.optimize import linear_sum_assignment
-
     inside = set(machines)
     blocks = shop.shop.blocks
     near = [b for b, block in enumerate(blocks) if not inside.isdisjoint(block.machines)]
@@ -149,8 +148,7 @@ def _with_ways(shop: Compiled, machines: Sequence[int], rows: Sequence[_Block]) 
     for row, b in zip(costs, entering, strict=True):
         if b in column:
             row[column[b]] = never
-    taken = linear_sum_assignment(costs)
-    total = sum(costs[i][j] for i, j in zip(*taken, strict=True))
+    total = cheapest_assignment(costs)
     ways = shop.least_ways_s()
     first = [
         next(s for s in shop.steps_of[b] if shop.block_of[s] == b and shop.targets[s] >= 0)

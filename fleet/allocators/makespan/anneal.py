@@ -17,6 +17,11 @@ from fleet.allocators.makespan.timing import rate
 
 HOT, COLD = 0.02, 0.0002
 """Temperatures at the beginning and the end, as shares of the makespan."""
+FIRST_COOLING, LATER_COOLING = 0.25, 0.25
+"""Shares of the time that is left for the first cooling, and for each one after it, which begins
+from the best so far."""
+SHORTEST_S = 0.1
+"""No cooling is shorter than this, s."""
 REASSIGN, SWAP = 0.45, 0.6
 """Of all moves so many (and then up to so many) give a block another machine (swap two machines);
 the rest change the order."""
@@ -41,8 +46,15 @@ def anneal(
     With `home` machines, every block away from home costs `move_price_s`. Blocks in `frozen` keep
     their machine. It ends as soon as `stopped` says so. The answer is never worse than `begin`.
     """
-    search = _Search(shop, begin, Random(seed), move_price_s, home, frozen)
-    search.run(deadline_s, bound_s, stopped)
+    random = Random(seed)
+    search = _Search(shop, begin, random, move_price_s, home, frozen)
+    share = FIRST_COOLING
+    while (now_s := time.perf_counter()) < deadline_s:
+        end_s = now_s + max(share * (deadline_s - now_s), SHORTEST_S)
+        if search.run(min(end_s, deadline_s), bound_s, stopped):
+            break
+        search = _Search(shop, search.best, random, move_price_s, home, frozen)
+        share = LATER_COOLING
     return search.best
 
 
@@ -69,8 +81,8 @@ class _Search:
         self._index(0, len(self.order))
         self._trace()
 
-    def run(self, deadline_s: float, bound_s: float, stopped: Callable[[], bool]) -> None:
-        """Search; every block that can move and every knot gets its chance."""
+    def run(self, deadline_s: float, bound_s: float, stopped: Callable[[], bool]) -> bool:
+        """One cooling, until `deadline_s`; whether there is nothing more to look for."""
         random, began_s = self.random, time.perf_counter()
         length_s = deadline_s - began_s
         scale = self.makespan or 1.0
@@ -78,16 +90,16 @@ class _Search:
         temperature = HOT * scale
         exact = self.price_s == 0.0 and not self.shop.has_due and len(self.order) > 0
         if len(self.order) == 0:
-            return
+            return True
         while True:
             if tries % 16 == 0:
                 spent = (time.perf_counter() - began_s) / length_s if length_s > 0 else 1.0
                 if spent >= 1.0:
-                    return
+                    return False
                 if exact and self.best.rated.makespan_s <= bound_s * (1 + NEAR) + NEAR:
-                    return
+                    return True
                 if tries % 512 == 0 and stopped():
-                    return
+                    return True
                 temperature = scale * HOT * (COLD / HOT) ** spent
             tries += 1
             limit = self.cost - temperature * log(1.0 - random.random())

@@ -18,6 +18,7 @@ from fleet.allocators.balanced import BalancedAllocator
 from fleet.allocators.base import Allocator
 from fleet.allocators.cost_based import CostBasedAllocator
 from fleet.allocators.llm import LlmAllocator
+from fleet.allocators.makespan import MakespanAllocator
 from fleet.allocators.milp import MilpAllocator
 from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.core.skills import SkillModel, skills_from_data
@@ -63,6 +64,7 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
     planners: dict[str, Planner] = {symbolic.name: symbolic, llm.name: llm}
     own: tuple[Allocator, ...] = (
         MilpAllocator(),
+        MakespanAllocator(),
         BalancedAllocator(),
         CostBasedAllocator(),
         RoundRobinAllocator(),

@@ -75,10 +75,19 @@ def _begin_stage(state: State, goal: str) -> State:
 
 
 def next_stage(state: State, goal: str) -> State:
-    """A goal goes on with what it wants next."""
+    """A goal goes on with what it wants next; what was brought somewhere before stays there."""
     status = state.goal_states[goal]
     number = status.stage + 1
-    status = replace(status, stage=number, conditions=status.stages[number], time_s=state.time_s)
+    wanted = status.stages[number]
+    about = {subject for condition in wanted for subject in condition.subjects}
+    kept = tuple(
+        condition
+        for condition in status.conditions
+        if condition.relation == "at"
+        and about.isdisjoint(condition.subjects)
+        and not state.robots.keys() & set(condition.subjects)
+    )
+    status = replace(status, stage=number, conditions=(*wanted, *kept), time_s=state.time_s)
     return _begin_stage(set_goal(state, status), goal)
 
 

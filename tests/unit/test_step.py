@@ -432,6 +432,19 @@ def test_a_goal_in_steps_takes_one_after_the_other() -> None:
     assert places == ["hallway", "living_room"]
 
 
+def test_what_an_earlier_step_brought_somewhere_stays_there() -> None:
+    model = FleetModel((manipulator(), manipulator("r2"), carrier()), cups=2)
+    text = "Bring both cups to the living room, then send the locobot to the kitchen."
+    model.plan(Goal(goal="g", text=text))
+    model.finish()
+    assert goal_state(model, "g") is GoalState.REACHED
+    assert {str(c) for c in model.state.goal_states["g"].conditions} == {
+        "at(locobot) = kitchen",
+        "at(cup_1) = living_room",
+        "at(cup_2) = living_room",
+    }
+
+
 def test_a_sentence_that_no_model_understands_is_refused() -> None:
     model = fleet()
     model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(interpreter=True))

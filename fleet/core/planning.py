@@ -7,11 +7,12 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.books import answer, give_up, next_task, set_book
 from fleet.core.calls import Skills
+from fleet.core.effects import status_of
 from fleet.core.revising import revise
 from fleet.core.state import OUTSTANDING, Job, PlanBook, State, put, without
 from fleet.core.telling import mark_goals
 from keyexpr_schema.goals import GoalState
-from keyexpr_schema.plans import Plan, PlanState, PlanStatus
+from keyexpr_schema.plans import Plan, PlanState
 from keyexpr_schema.requests import Answer
 from keyexpr_schema.tasks import ENDED_TASKS, TaskState
 
@@ -88,14 +89,12 @@ def plan_made(state: State, event: events.PlanMade, skills: Skills) -> State:
     if to is PlanState.READY and book.start:
         to = PlanState.RUNNING
     book = replace(
-        book,
+        _with_outcome(book, event),
         plan=revision.plan,
         state=to,
         records=revision.records,
         dropping=tuple(dict.fromkeys([*book.dropping, *revision.dropping])),
         change=None if first else revision.change,
-        allocation=event.allocation,
-        sequence=event.sequence,
         job=None,
         # What came up while the plan was being made is a reason to make it again.
         replan_reason=None if book.replan_reason == job.reason else book.replan_reason,
@@ -105,15 +104,25 @@ def plan_made(state: State, event: events.PlanMade, skills: Skills) -> State:
         replans=book.replans + (not first),
         reason=None,
         violations=(),
-        makespan_s=event.makespan_s,
-        lower_bound_s=event.lower_bound_s,
-        notes=event.notes,
-        planning_time_s=event.planning_time_s,
     )
     state = set_book(state, book)
     goal_state = GoalState.RUNNING if to is PlanState.RUNNING else GoalState.PLANNED
     state = mark_goals(state, book.plan.goals, goal_state, book.plan.plan)
     return answer(state, job.request, True, _made_sentence(event), book.plan.plan)
+
+
+def _with_outcome(book: PlanBook, event: events.PlanMade) -> PlanBook:
+    """The book with what a job came to: the plan, its allocation, and what is predicted of it."""
+    return replace(
+        book,
+        plan=event.plan,
+        allocation=event.allocation,
+        sequence=event.sequence,
+        makespan_s=event.makespan_s,
+        lower_bound_s=event.lower_bound_s,
+        notes=event.notes,
+        planning_time_s=event.planning_time_s,
+    )
 
 
 def _made_sentence(event: events.PlanMade) -> str:
@@ -131,26 +140,13 @@ def _preview_of(state: State, job: int) -> Job | None:
 
 def _show(state: State, job: Job, event: events.PlanMade) -> State:
     assert job.request is not None
+    book = _with_outcome(PlanBook(plan=event.plan, state=PlanState.READY), event)
     reply = Answer(
         request=job.request,
         accepted=True,
         sentence=f"a dry run: {_made_sentence(event)}",
         preview=event.plan,
-        preview_status=PlanStatus(
-            plan=event.plan.plan,
-            revision=event.plan.revision,
-            state=PlanState.READY,
-            goals=event.plan.goals,
-            allocation=event.allocation,
-            sequence=event.sequence,
-            made_by=event.plan.made_by,
-            allocator=event.plan.allocator,
-            predicted_makespan_s=event.makespan_s,
-            lower_bound_s=event.lower_bound_s,
-            notes=event.notes,
-            planning_time_s=event.planning_time_s,
-            making=event.plan.making,
-        ),
+        preview_status=status_of(book),
     )
     return replace(
         state,

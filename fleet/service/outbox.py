@@ -29,8 +29,6 @@ class Outbox:
         self._session = session
         self._wanted: dict[str, Publish | Retract] = {}
         self._busy: set[str] = set()
-        self._idle = asyncio.Event()
-        self._idle.set()
         self._room = asyncio.Semaphore(IN_FLIGHT)
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -49,16 +47,11 @@ class Outbox:
         for effect in effects:
             keyexpr = effect.key.build(effect.address)
             self._wanted[keyexpr] = effect
-            self._idle.clear()
             if keyexpr not in self._busy:
                 self._busy.add(keyexpr)
                 task = asyncio.create_task(self._write(keyexpr))
                 self._tasks.add(task)
                 task.add_done_callback(self._tasks.discard)
-
-    async def drained(self) -> None:
-        """Wait until everything wanted is confirmed."""
-        await self._idle.wait()
 
     async def _write(self, keyexpr: str) -> None:
         async with self._room:
@@ -75,5 +68,3 @@ class Outbox:
                     self._wanted.setdefault(keyexpr, effect)
                     await asyncio.sleep(_RETRY_S)
         self._busy.discard(keyexpr)
-        if not self._busy:
-            self._idle.set()

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 
 from msgspec.structs import replace
 
-from fleet.allocators.base import Allocator, NotAllocated
+from fleet.allocators.base import Allocated, NotAllocated
 from fleet.core.events import PlanMade, PlanNotMade
 from fleet.core.state import Job, State
 from fleet.core.telling import SEARCHED
@@ -28,59 +28,53 @@ def carry_out(
     `at` has the event's `time_s` and `wall_time_s`.
     """
     started = time.perf_counter()
-    world = state.world(parts.skills)
-    allocator = parts.allocators.get(job.allocator)
-    plan = _plan(job, state, world, parts) if allocator is not None else _no_allocator(job, parts)
-    if isinstance(plan, NoPlan) or allocator is None:
-        assert isinstance(plan, NoPlan)
+    made = _plan_and_allocate(job, state, parts)
+    took_s = time.perf_counter() - started
+    if isinstance(made, NoPlan):
         return PlanNotMade(
             **at,
             job=job.job,
-            reason=plan.reason,
-            violations=plan.violations,
-            planning_time_s=time.perf_counter() - started,
+            reason=made.reason,
+            violations=made.violations,
+            planning_time_s=took_s,
         )
-    return _allocate(job, plan, allocator, state, world, at, started)
+    plan, allocated = made
+    schedule = allocated.schedule
+    durations_s = {task: end_s - schedule.start_s[task] for task, end_s in schedule.end_s.items()}
+    timed = [replace(task, duration_s=durations_s[task.task]) for task in plan.tasks]
+    return PlanMade(
+        **at,
+        job=job.job,
+        plan=replace(plan, tasks=tuple(timed)),
+        allocation=dict(allocated.allocation),
+        sequence=dict(schedule.sequence),
+        extra_after=dict(schedule.extra_after),
+        durations_s=durations_s,
+        makespan_s=schedule.makespan_s,
+        lower_bound_s=allocated.lower_bound_s,
+        notes=allocated.notes,
+        planning_time_s=took_s,
+    )
 
 
-def _allocate(
-    job: Job,
-    plan: Plan,
-    allocator: Allocator,
-    state: State,
-    world: WorldModel,
-    at: Mapping[str, float],
-    started: float,
-) -> PlanMade | PlanNotMade:
+def _plan_and_allocate(
+    job: Job, state: State, parts: Composition
+) -> tuple[Plan, Allocated] | NoPlan:
+    world = state.world(parts.skills)
+    allocator = parts.allocators.get(job.allocator)
+    if allocator is None:
+        choices = ", ".join(sorted(parts.allocators))
+        return NoPlan(f"there is no allocator {job.allocator}: choose one of {choices}")
+    plan = _plan(job, state, world, parts)
+    if isinstance(plan, NoPlan):
+        return plan
     kept = replace(plan, pins={**_busy_robots(job, plan, state), **plan.pins})
     made = allocator.allocate(kept, world)
     if isinstance(made, NotAllocated) and kept.pins != plan.pins:
         made = allocator.allocate(plan, world)
     if isinstance(made, NotAllocated):
-        return PlanNotMade(
-            **at,
-            job=job.job,
-            reason=made.violations[0].sentence,
-            violations=made.violations,
-            planning_time_s=time.perf_counter() - started,
-        )
-    schedule = made.schedule
-    durations_s = {task: end_s - schedule.start_s[task] for task, end_s in schedule.end_s.items()}
-    timed = [replace(task, duration_s=durations_s[task.task]) for task in plan.tasks]
-    plan = replace(plan, tasks=tuple(timed))
-    return PlanMade(
-        **at,
-        job=job.job,
-        plan=plan,
-        allocation=dict(made.allocation),
-        sequence=dict(schedule.sequence),
-        extra_after=dict(schedule.extra_after),
-        durations_s=durations_s,
-        makespan_s=schedule.makespan_s,
-        lower_bound_s=made.lower_bound_s,
-        notes=made.notes,
-        planning_time_s=time.perf_counter() - started,
-    )
+        return NoPlan(made.violations[0].sentence, made.violations)
+    return plan, made
 
 
 def _wanted(status: GoalStatus, world: WorldModel) -> tuple[Condition, ...]:
@@ -114,11 +108,6 @@ def _work(skill: str, args: Mapping[str, str], robots: Iterable[str | None]) -> 
         for name, value in args.items()
         if value not in others and not value.startswith(ACTOR_PREFIX)
     )
-
-
-def _no_allocator(job: Job, parts: Composition) -> NoPlan:
-    choices = ", ".join(sorted(parts.allocators))
-    return NoPlan(f"there is no allocator {job.allocator}: choose one of {choices}")
 
 
 def _plan(job: Job, state: State, world: WorldModel, parts: Composition) -> Plan | NoPlan:

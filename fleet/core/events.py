@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from fleet.core.state import Policy
+from keyexpr_schema.durations import Durations
 from keyexpr_schema.goals import Condition, Goal, GoalStatus
 from keyexpr_schema.plans import Plan, Violation
 from keyexpr_schema.requests import Answer, ControlRequest, PlanRequest, ReplanRequest
@@ -186,6 +187,7 @@ class Remembered(Event, frozen=True, kw_only=True):
     answers: tuple[Answer, ...] = ()
     goals: tuple[GoalStatus, ...] = ()
     plans: tuple[str, ...] = ()
+    durations: tuple[Durations, ...] = ()
 
 
 class TimePassed(Event, frozen=True, kw_only=True):

@@ -10,6 +10,7 @@ import msgspec
 from fleet.core.language import Vocabulary
 from fleet.core.skills import SkillModel
 from fleet.core.world_model import WorldModel
+from keyexpr_schema.durations import Durations
 from keyexpr_schema.goals import Goal, GoalStatus
 from keyexpr_schema.plans import ENDED_PLANS, Plan, PlanChange, PlanState, Task, Violation
 from keyexpr_schema.requests import Answer
@@ -120,6 +121,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     objects: dict[str, Object] = {}
     robots: dict[str, RobotSpec] = {}
     facts: dict[str, Fact] = {}
+    durations: dict[str, Durations] = {}
+    """Learned from reports, by type of robot."""
     alive: dict[str, tuple[str, ...]] = {}
     gone_since: dict[str, float] = {}
     """Unix time [s] at which the last worker of a robot went away."""
@@ -151,6 +154,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
             self.robots.values(),
             self.facts.values(),
             available=[robot for robot in self.alive if self.ready(robot)],
+            durations=self.durations,
         )
 
     def ready(self, robot: str) -> bool:

@@ -126,8 +126,19 @@ def _dispatch(state: State, plan: str, record: TaskRecord, skills: Skills) -> St
         state=TaskState.ORDERED,
         attempt=record.attempt + 1,
         ordered_s=state.time_s if record.ordered_s is None else record.ordered_s,
+        way_s=_way_s(state, action, skills),
     )
     return set_record(state, book, ordered)
+
+
+def _way_s(state: State, action: Action, skills: Skills) -> float | None:
+    """The way to the task at its robot's top speed, s; `None` if nobody knows from where."""
+    if action.skill.travel_to is None:
+        return 0.0
+    here = state.fact("at", action.actor)
+    if here is None or here.value not in state.places:
+        return None
+    return state.world(skills).way_s(action.actor, here.value, action.args[action.skill.travel_to])
 
 
 def _touches_what_is_dropped(book: PlanBook, action: Action, skills: Skills) -> bool:

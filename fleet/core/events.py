@@ -150,6 +150,8 @@ class PlanMade(Event, frozen=True, kw_only=True):
     """A planning job ended with a checked and allocated plan.
 
     `durations_s` and `extra_after` are by task, `sequence` lists each robot's actors in order.
+    `mended` says that what was left of the plan got another allocation, `left_out` which goals it
+    does without, and why.
     """
 
     job: int
@@ -162,6 +164,8 @@ class PlanMade(Event, frozen=True, kw_only=True):
     planning_time_s: float
     lower_bound_s: float | None = None
     notes: tuple[str, ...] = ()
+    mended: bool = False
+    left_out: dict[str, str] = {}
 
 
 class PlanNotMade(Event, frozen=True, kw_only=True):

@@ -64,8 +64,8 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
     llm = LlmPlanner(config, symbolic, caller)
     planners: dict[str, Planner] = {symbolic.name: symbolic, llm.name: llm}
     own: tuple[Allocator, ...] = (
-        MilpAllocator(),
         MakespanAllocator(),
+        MilpAllocator(),
         BalancedAllocator(),
         CostBasedAllocator(),
         RoundRobinAllocator(),

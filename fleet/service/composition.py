@@ -69,7 +69,7 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
         BalancedAllocator(),
         CostBasedAllocator(),
         RoundRobinAllocator(),
-        LlmAllocator(AllocationAsker(config, caller), BalancedAllocator()),
+        LlmAllocator(AllocationAsker(config, caller), MakespanAllocator()),
     )
     allocators = {allocator.name: allocator for allocator in own}
     for found in _from_packages("robotfleet.planners"):

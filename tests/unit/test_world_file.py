@@ -154,7 +154,7 @@ def test_a_mission_by_name_and_by_path_is_the_same() -> None:
     assert by_name == load_mission(CONFIGS / "missions" / "two-cups.yaml")
     assert [robot.spec.robot for robot in by_name.robots] == ["hsr", "locobot"]
     assert by_name.robots[1].start_m_rad == pytest.approx((5.0, 1.5, math.pi / 2))
-    assert by_name.plan.allocator == "milp"
+    assert by_name.plan.allocator == "makespan"
     assert len(by_name.goals) == 2 and len(by_name.statements) == 2
 
 

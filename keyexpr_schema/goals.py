@@ -43,7 +43,8 @@ class Condition(Payload, frozen=True, kw_only=True):
 class Goal(Payload, frozen=True, kw_only=True):
     """A sentence, and the facts that must hold when it is done.
 
-    With no `conditions` the planner reads them out of `text`.
+    With no `conditions` the planner reads them out of `text`. `due_s` is when it should be done, on
+    the fleet's clock [s]; plans are made so that goals are as little late as can be.
     """
 
     goal: Id
@@ -52,6 +53,7 @@ class Goal(Payload, frozen=True, kw_only=True):
     priority: int = 0
     ordinal: int = 0
     """Order in which goals were given; ties in priority go to the lower one."""
+    due_s: float | None = None
 
 
 class GoalState(str, Enum):

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from keyexpr_schema import (
+    durations,
     goals,
     motions,
     plans,
@@ -99,6 +100,13 @@ REPORT = Key(
     tasks.ReportAddress, tasks.Report,
     "that robot's worker", "planner, recorder", Kept.STORED,
     "What became of one attempt: every try with its reason, and the facts learned.",
+)
+
+DURATIONS = Key(
+    "durations", "durations/{model}",
+    durations.DurationsAddress, durations.Durations,
+    "planner", "planner, robotctl", Kept.STORED,
+    "How long a type of robot really takes, learned from its reports.",
 )
 
 # --- plans ---------------------------------------------------------------------------------------

@@ -76,6 +76,9 @@ class TaskRecord(Payload, frozen=True, kw_only=True):
     reason: str | None = None
     duration_s: float = 0.0
     """Predicted duration."""
+    way_s: float | None = None
+    """Of that, the way there at the robot's top speed, as known when the task was ordered; `None`
+    where nobody knew where the robot set out from."""
     ordered_s: float | None = None
     started_s: float | None = None
     ended_s: float | None = None

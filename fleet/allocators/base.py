@@ -6,6 +6,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+import msgspec
+
 from fleet.core.binding import able_robots, actors_apart, task_counts
 from fleet.core.checker import CheckedPlan, check_plan
 from fleet.core.schedule import Schedule, schedule, valid_schedule
@@ -55,12 +57,17 @@ class Circumstances:
 
     `ready_s` says from when on a robot is free [s from now]; `priority` of a goal decides between
     equal makespans (each step up counts twice); `due_s` says when a goal should be done
-    [s from now].
+    [s from now]. `home` is the robot of each actor in the plan that this is the rest of, and
+    `sequence` the order in which they were to begin: few actors should change hands. Actors that
+    are `under_way` go on at once.
     """
 
     ready_s: Mapping[str, float] = field(default_factory=dict)
     priority: Mapping[str, int] = field(default_factory=dict)
     due_s: Mapping[str, float] = field(default_factory=dict)
+    home: Mapping[str, str] = field(default_factory=dict)
+    sequence: tuple[str, ...] = ()
+    under_way: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -91,6 +98,8 @@ class Allocator(ABC):
     """Binds actors to robots. Subclasses choose; this class checks what goes in and comes out."""
 
     name: str
+    reschedules = False
+    """Whether it heeds `Circumstances.home` itself; for others, whoever can stays where he is."""
 
     def allocate(
         self, plan: Plan, world: WorldModel, circumstances: Circumstances | None = None
@@ -99,10 +108,24 @@ class Allocator(ABC):
 
         Tasks of one actor go to one robot, in order; a robot does its actors one after the other.
         """
+        told = circumstances or Circumstances()
+        if told.home and not self.reschedules:
+            stay = {a: robot for a, robot in told.home.items() if robot in world.team}
+            actors = task_counts(plan)
+            pins = {a: robot for a, robot in {**stay, **plan.pins}.items() if a in actors}
+            if pins != plan.pins:
+                found = self._allocate(msgspec.structs.replace(plan, pins=pins), world, told)
+                if isinstance(found, Allocated):
+                    return found
+        return self._allocate(plan, world, told)
+
+    def _allocate(
+        self, plan: Plan, world: WorldModel, told: Circumstances
+    ) -> Allocated | NotAllocated:
         checked = check_plan(plan, world)
         if not checked.valid:
             return NotAllocated(checked.violations)
-        problem = _problem(plan, world, checked, circumstances or Circumstances())
+        problem = _problem(plan, world, checked, told)
         chosen = self._assign(problem)
         if isinstance(chosen, NotAllocated):
             return chosen

@@ -12,10 +12,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from fleet.core.state import OUTSTANDING, Job, PlanBook, State
+from keyexpr_schema.durations import DurationsAddress
 from keyexpr_schema.goals import GoalAddress
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
     ANSWER,
+    DURATIONS,
     FACT,
     GOAL_STATUS,
     ORDER,
@@ -105,6 +107,12 @@ def _documents(old: State, new: State) -> Iterator[Effect]:
             ANSWER,
             {RequestAddress(name): answer for name, answer in old.answers.items()},
             {RequestAddress(name): answer for name, answer in new.answers.items()},
+        )
+    if old.durations is not new.durations:
+        yield from _difference(
+            DURATIONS,
+            {DurationsAddress(model): known for model, known in old.durations.items()},
+            {DurationsAddress(model): known for model, known in new.durations.items()},
         )
     for plan in {**old.plans, **new.plans}:
         before, after = old.plans.get(plan), new.plans.get(plan)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from fleet.core.state import Policy
+from keyexpr_schema.durations import Durations
 from keyexpr_schema.goals import Condition, Goal, GoalStatus
 from keyexpr_schema.plans import Plan, Violation
 from keyexpr_schema.requests import Answer, ControlRequest, PlanRequest, ReplanRequest
@@ -149,6 +150,8 @@ class PlanMade(Event, frozen=True, kw_only=True):
     """A planning job ended with a checked and allocated plan.
 
     `durations_s` and `extra_after` are by task, `sequence` lists each robot's actors in order.
+    `mended` says that what was left of the plan got another allocation, `left_out` which goals it
+    does without, and why.
     """
 
     job: int
@@ -161,6 +164,8 @@ class PlanMade(Event, frozen=True, kw_only=True):
     planning_time_s: float
     lower_bound_s: float | None = None
     notes: tuple[str, ...] = ()
+    mended: bool = False
+    left_out: dict[str, str] = {}
 
 
 class PlanNotMade(Event, frozen=True, kw_only=True):
@@ -186,6 +191,7 @@ class Remembered(Event, frozen=True, kw_only=True):
     answers: tuple[Answer, ...] = ()
     goals: tuple[GoalStatus, ...] = ()
     plans: tuple[str, ...] = ()
+    durations: tuple[Durations, ...] = ()
 
 
 class TimePassed(Event, frozen=True, kw_only=True):

@@ -8,18 +8,18 @@ from fleet.core import events
 from fleet.core.books import answer, give_up, next_task, set_book
 from fleet.core.calls import Skills
 from fleet.core.effects import status_of
+from fleet.core.remaining import actors_in_order, begun_actors, remaining_plan
 from fleet.core.revising import revise
-from fleet.core.state import OUTSTANDING, Job, PlanBook, State, put, without
+from fleet.core.state import Job, PlanBook, State, put, without
 from fleet.core.telling import mark_goals
 from keyexpr_schema.goals import GoalState
-from keyexpr_schema.plans import Plan, PlanState
+from keyexpr_schema.plans import PlanState
 from keyexpr_schema.requests import Answer
-from keyexpr_schema.tasks import ENDED_TASKS, TaskState
+from keyexpr_schema.tasks import TaskState
 
 MAX_REPLANS = 12
 """After this many new revisions without a goal reached, a plan is given up: the world does not go
 along with it."""
-HAD_ROBOT = OUTSTANDING | {TaskState.SUCCEEDED}
 
 
 def plan_again(state: State, book: PlanBook) -> State:
@@ -41,35 +41,23 @@ def plan_again(state: State, book: PlanBook) -> State:
         planner=book.planner,
         allocator=book.plan.allocator,
         first_task=next_task(book) + (book.amendment is not None),
-        proposal=_amended(book, revision) if book.amendment is not None else None,
+        partial=True,
         running=tuple(record.task for record in book.outstanding()),
         reason=book.replan_reason,
         request=book.amendment_request,
     )
+    if book.amendment is not None:
+        job = replace(job, proposal=remaining_plan(book, revision, addition=book.amendment))
+    elif book.replan_reason == book.mend_reason:
+        gone = {robot for robot in book.allocation.values() if not state.ready(robot)}
+        job = replace(
+            job,
+            remaining=remaining_plan(book, revision, gone),
+            home=book.allocation,
+            sequence=actors_in_order(book),
+            begun=tuple(begun_actors(book, gone)),
+        )
     return set_book(replace(state, jobs=job.job), replace(book, job=job))
-
-
-def _amended(book: PlanBook, revision: int) -> Plan:
-    """The tasks still to be done and the added one, as a proposal of the next revision."""
-    assert book.amendment is not None
-    rest = [*book.plan.tasks, book.amendment]
-    todo = {
-        task.task
-        for task in rest
-        if task.task not in book.records or book.records[task.task].state not in ENDED_TASKS
-    }
-    tasks = tuple(
-        replace(task, after=tuple(before for before in task.after if before in todo))
-        for task in rest
-        if task.task in todo
-    )
-    actors = {task.actor for task in tasks}
-    pins = {
-        record.actor: record.robot
-        for record in book.records.values()
-        if record.state in HAD_ROBOT and record.actor in actors and record.robot
-    }
-    return replace(book.plan, revision=revision, tasks=tasks, pins={**pins, **book.plan.pins})
 
 
 def plan_made(state: State, event: events.PlanMade, skills: Skills) -> State:
@@ -81,6 +69,11 @@ def plan_made(state: State, event: events.PlanMade, skills: Skills) -> State:
         return state
     job = book.job
     first = event.plan.revision == 1
+    if _as_it_was(book, job, event):
+        book = replace(book, job=None, replan_reason=_new_reason(book, job))
+        return set_book(state, book)
+    for goal, reason in event.left_out.items():
+        state = mark_goals(state, (goal,), GoalState.FAILED, book.plan.plan, reason)
     event = replace(event, plan=replace(event.plan, autostart=book.start))
     revision = revise(book, event, state.world(skills), frozenset(job.running))
     to = book.state
@@ -96,12 +89,11 @@ def plan_made(state: State, event: events.PlanMade, skills: Skills) -> State:
         dropping=tuple(dict.fromkeys([*book.dropping, *revision.dropping])),
         change=None if first else revision.change,
         job=None,
-        # What came up while the plan was being made is a reason to make it again.
-        replan_reason=None if book.replan_reason == job.reason else book.replan_reason,
+        replan_reason=_new_reason(book, job),
         amendment=None,
         amendment_request=None,
         team=tuple(sorted(robot for robot in state.alive if state.ready(robot))),
-        replans=book.replans + (not first),
+        replans=book.replans + (not first and not event.mended),
         reason=None,
         violations=(),
     )
@@ -109,6 +101,20 @@ def plan_made(state: State, event: events.PlanMade, skills: Skills) -> State:
     goal_state = GoalState.RUNNING if to is PlanState.RUNNING else GoalState.PLANNED
     state = mark_goals(state, book.plan.goals, goal_state, book.plan.plan)
     return answer(state, job.request, True, _made_sentence(event), book.plan.plan)
+
+
+def _as_it_was(book: PlanBook, job: Job, event: events.PlanMade) -> bool:
+    """Whether another allocation of what is left has turned out to be the one there is."""
+    return (
+        event.mended
+        and event.allocation.items() <= job.home.items()
+        and not any(r.state in (TaskState.FAILED, TaskState.CANCELLED) for r in book.current())
+    )
+
+
+def _new_reason(book: PlanBook, job: Job) -> str | None:
+    """What came up while the plan was being made is a reason to make it again."""
+    return None if book.replan_reason == job.reason else book.replan_reason
 
 
 def _with_outcome(book: PlanBook, event: events.PlanMade) -> PlanBook:
@@ -127,11 +133,11 @@ def _with_outcome(book: PlanBook, event: events.PlanMade) -> PlanBook:
 
 def _made_sentence(event: events.PlanMade) -> str:
     plan = event.plan
-    making = plan.making.fallback
-    return (
-        f"plan {plan.plan} has {len(plan.tasks)} tasks for {len(plan.goals)} goals"
-        f"{f'; {making}' if making else ''}"
-    )
+    told = [f"plan {plan.plan} has {len(plan.tasks)} tasks for {len(plan.goals)} goals"]
+    if plan.making.fallback:
+        told.append(plan.making.fallback)
+    told += [f"goal {goal} is left out: {reason}" for goal, reason in event.left_out.items()]
+    return "; ".join(told)
 
 
 def _preview_of(state: State, job: int) -> Job | None:

@@ -7,7 +7,9 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.books import set_record
 from fleet.core.calls import Skills, action_of, unmet_before
+from fleet.core.durations import learn
 from fleet.core.effects import PLANNER_SOURCE
+from fleet.core.skills import Action
 from fleet.core.state import OUTSTANDING, PlanBook, State
 from fleet.core.telling import believe, believe_if_newer
 from keyexpr_schema.tasks import Report, ReportState, TaskRecord, TaskState
@@ -76,6 +78,7 @@ def _succeeded(
 ) -> State:
     told = {(fact.relation, fact.subject) for fact in report.facts}
     action = action_of(record, skills)
+    state = _learned(state, record, report, action)
     for literal in action.after if action is not None else ():
         if tuple(literal.variable) not in told:
             state = believe(
@@ -89,6 +92,22 @@ def _succeeded(
                 ),
             )
     return set_record(state, book, _ended(record, report, TaskState.SUCCEEDED))
+
+
+def _learned(state: State, record: TaskRecord, report: Report, action: Action | None) -> State:
+    """Take the attempt's duration into account, all of its tries included."""
+    spec = state.robots.get(report.robot)
+    if (
+        spec is None
+        or action is None
+        or record.way_s is None
+        or report.started_s is None
+        or report.ended_s is None
+    ):
+        return state
+    took_s = report.ended_s - report.started_s
+    known = learn(state.durations, spec.model, action.skill, took_s, record.way_s, report.ended_s)
+    return state if known is state.durations else replace(state, durations=dict(known))
 
 
 def _failed(state: State, book: PlanBook, record: TaskRecord, report: Report) -> State:

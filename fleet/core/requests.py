@@ -13,6 +13,9 @@ from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.plans import Plan, PlanState, Task
 from keyexpr_schema.requests import Control, ControlRequest, PlanRequest
 
+AUTO = "auto-"
+"""How the names of requests begin that nobody made: goals that wait are planned by themselves."""
+
 
 def plan_asked(state: State, event: events.PlanAsked) -> State:
     """Start to plan for the goals asked for, or say why not."""
@@ -45,6 +48,7 @@ def plan_asked(state: State, event: events.PlanAsked) -> State:
         first_task=1,
         request=ask.request,
         dry_run=ask.dry_run,
+        partial=ask.request.startswith(AUTO),
     )
     if ask.dry_run:
         return replace(state, jobs=job.job, previews=put(state.previews, ask.request, job))
@@ -150,7 +154,7 @@ def take_waiting_goals(state: State) -> State:
             reason = f"{', '.join(waiting)} came up"
             book = replace(book, plan=replace(book.plan, goals=goals), replan_reason=reason)
             return set_book(state, book)
-    request = PlanRequest(request=f"auto-{state.jobs + 1}", goals=waiting)
+    request = PlanRequest(request=f"{AUTO}{state.jobs + 1}", goals=waiting)
     asked = events.PlanAsked(request=request, time_s=state.time_s, wall_time_s=state.wall_time_s)
     return plan_asked(state, asked)
 

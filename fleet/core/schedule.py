@@ -57,7 +57,7 @@ def predicted_duration_s(action: Action, origin: Value, robot: str, world: World
         if skill.travel_to is None
         else world.travel_s(robot, origin, action.args[skill.travel_to])
     )
-    return skill.duration_s + travel_s
+    return world.work_s(robot, skill) + travel_s
 
 
 def actors_of(plan: Plan) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import msgspec
 from fleet.core.language import Vocabulary
 from fleet.core.skills import SkillModel
 from fleet.core.world_model import WorldModel
+from keyexpr_schema.durations import Durations
 from keyexpr_schema.goals import Goal, GoalStatus
 from keyexpr_schema.plans import ENDED_PLANS, Plan, PlanChange, PlanState, Task, Violation
 from keyexpr_schema.requests import Answer
@@ -51,6 +52,16 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     proposal: Plan | None = None
     request: str | None = None
     dry_run: bool = False
+    partial: bool = False
+    """Whether goals that cannot be reached are left out, and not the whole plan refused."""
+    remaining: Plan | None = None
+    """What is left of the plan, where another allocation of it may do."""
+    home: dict[str, str] = {}
+    """The robot of each actor until now."""
+    sequence: tuple[str, ...] = ()
+    """The actors in the order in which they were to begin."""
+    begun: tuple[str, ...] = ()
+    """Actors that their robots have begun to be."""
     running: tuple[str, ...] = ()
     """Tasks of the plan that were under way when the job was given."""
     reason: str | None = None
@@ -61,9 +72,10 @@ class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
     """A plan with everything the planner keeps about it.
 
     `records` hold the tasks of every revision; `plan` only those of the current one.
-    `replan_reason` set means: order nothing more, and plan again. `dropping` are tasks that are
-    under way and no longer wanted; their orders are cancelled. `team` are the robots that were
-    there when the plan was made.
+    `replan_reason` set means: order nothing more, and plan again. If it is also `mend_reason`,
+    another allocation of what is left may do. `dropping` are tasks that are under way and no longer
+    wanted; their orders are cancelled. `team` are the robots that were there when the plan was
+    made. `late` are tasks that took far longer than predicted, and were reacted to.
     """
 
     plan: Plan
@@ -75,6 +87,8 @@ class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
     sequence: dict[str, tuple[str, ...]] = {}
     job: Job | None = None
     replan_reason: str | None = None
+    mend_reason: str | None = None
+    late: tuple[str, ...] = ()
     amendment: Task | None = None
     """A task that someone wants added, and the request for it."""
     amendment_request: str | None = None
@@ -120,6 +134,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     objects: dict[str, Object] = {}
     robots: dict[str, RobotSpec] = {}
     facts: dict[str, Fact] = {}
+    durations: dict[str, Durations] = {}
+    """Learned from reports, by type of robot."""
     alive: dict[str, tuple[str, ...]] = {}
     gone_since: dict[str, float] = {}
     """Unix time [s] at which the last worker of a robot went away."""
@@ -151,6 +167,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
             self.robots.values(),
             self.facts.values(),
             available=[robot for robot in self.alive if self.ready(robot)],
+            durations=self.durations,
         )
 
     def ready(self, robot: str) -> bool:

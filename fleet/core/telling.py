@@ -325,6 +325,7 @@ def remembered(state: State, event: events.Remembered) -> State:
     return replace(
         state,
         answers={**answers, **state.answers},
+        durations={**{known.model: known for known in event.durations}, **state.durations},
         goal_states={**goals, **state.goal_states},
         past_plans=(*state.past_plans, *(p for p in event.plans if p not in state.plans)),
     )

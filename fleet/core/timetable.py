@@ -57,7 +57,8 @@ class Timetable:
         )
         moved = [value for variable, value in action.after if variable == Variable("at", name)]
         target = None if skill.travel_to is None else action.args[skill.travel_to]
-        return robot, skill.duration_s, target, bool(moved), moved[-1] if moved else None
+        seconds = self._world.work_s(robot, skill)
+        return robot, seconds, target, bool(moved), moved[-1] if moved else None
 
     def ends_s(self, groups: Iterable[Sequence[str]]) -> list[float] | None:
         """When each task ends [s], in the graph's order, if robots take groups of actors in this

@@ -6,6 +6,7 @@ from msgspec.structs import replace
 
 from fleet.core.books import give_up, set_book, set_record
 from fleet.core.calls import Skills, action_of, unmet_before
+from fleet.core.lateness import late_task, next_lateness
 from fleet.core.planning import plan_again
 from fleet.core.requests import take_waiting_goals
 from fleet.core.skills import Action
@@ -62,6 +63,10 @@ def _run(state: State, book: PlanBook, skills: Skills) -> State:
     reason = why_replan(state, book, skills)
     if reason is not None:
         return advance(set_book(state, replace(book, replan_reason=reason)), skills)
+    if (late := late_task(state, book)) is not None:
+        reason = f"{late.robot} is late with {late.task} ({late.skill})"
+        book = replace(book, replan_reason=reason, mend_reason=reason, late=(*book.late, late.task))
+        return advance(set_book(state, book), skills)
     if all(record.state is TaskState.SUCCEEDED for record in book.current()):
         return set_book(state, replace(book, state=PlanState.SUCCEEDED))
     if any(record.state in (TaskState.FAILED, TaskState.CANCELLED) for record in book.current()):
@@ -126,8 +131,19 @@ def _dispatch(state: State, plan: str, record: TaskRecord, skills: Skills) -> St
         state=TaskState.ORDERED,
         attempt=record.attempt + 1,
         ordered_s=state.time_s if record.ordered_s is None else record.ordered_s,
+        way_s=_way_s(state, action, skills),
     )
     return set_record(state, book, ordered)
+
+
+def _way_s(state: State, action: Action, skills: Skills) -> float | None:
+    """The way to the task at its robot's top speed, s; `None` if nobody knows from where."""
+    if action.skill.travel_to is None:
+        return 0.0
+    here = state.fact("at", action.actor)
+    if here is None or here.value not in state.places:
+        return None
+    return state.world(skills).way_s(action.actor, here.value, action.args[action.skill.travel_to])
 
 
 def _touches_what_is_dropped(book: PlanBook, action: Action, skills: Skills) -> bool:
@@ -199,7 +215,8 @@ def _fail_tasks_of_lost_robots(state: State) -> State:
                 for name, record in book.records.items()
             }
             if records != book.records or book.replan_reason is None:
-                state = set_book(state, replace(book, records=records, replan_reason=reason))
+                lost = replace(book, records=records, replan_reason=reason, mend_reason=reason)
+                state = set_book(state, lost)
     return state
 
 
@@ -211,7 +228,8 @@ def _needs(book: PlanBook, robot: str) -> bool:
 
 
 def next_timer(state: State) -> float | None:
-    """The Unix time [s] at which a robot that is away becomes lost to a plan that counts on it."""
+    """The Unix time [s] at which a robot that is away becomes lost to a plan that counts on it, or
+    a task late."""
     counting = [
         book
         for book in state.plans.values()
@@ -222,4 +240,6 @@ def next_timer(state: State) -> float | None:
         for robot, since in state.gone_since.items()
         if any(_needs(book, robot) for book in counting)
     ]
+    if (late_s := next_lateness(state)) is not None:
+        times.append(late_s)
     return min(times, default=None)

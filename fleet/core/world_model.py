@@ -6,7 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from fleet.core.durations import pace, work_s
 from fleet.core.skills import Action, Literal, SkillModel, Variable
+from keyexpr_schema.durations import Durations
 from keyexpr_schema.goals import Condition
 from keyexpr_schema.robots import RobotSpec
 from keyexpr_schema.world import NOTHING, Fact, Object, Place, Value
@@ -25,7 +27,8 @@ UNKNOWN_TRAVEL_M = 5.0
 class WorldModel:
     """Places, objects and robots that exist, and the facts believed of them.
 
-    `available` names the robots whose workers are connected now; only those get work.
+    `available` names the robots whose workers are connected now; only those get work. `durations`
+    are those learned, by type of robot; skill models and top speeds hold for the others.
     """
 
     skills: Mapping[str, SkillModel]
@@ -34,6 +37,7 @@ class WorldModel:
     robots: Mapping[str, RobotSpec] = field(default_factory=dict)
     available: frozenset[str] = frozenset()
     facts: Mapping[Variable, Value] = field(default_factory=dict)
+    durations: Mapping[str, Durations] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -44,6 +48,7 @@ class WorldModel:
         robots: Iterable[RobotSpec],
         facts: Iterable[Fact],
         available: Iterable[str] | None = None,
+        durations: Mapping[str, Durations] | None = None,
     ) -> WorldModel:
         """A model from payloads; without `available` every robot is taken to be connected."""
         specs = {spec.robot: spec for spec in robots}
@@ -54,6 +59,7 @@ class WorldModel:
             robots=specs,
             available=frozenset(specs if available is None else available),
             facts={Variable(fact.relation, fact.subject): fact.value for fact in facts},
+            durations=durations or {},
         )
 
     def value(self, relation: str, subject: str) -> Value:
@@ -104,8 +110,16 @@ class WorldModel:
         place = self.places.get(name)
         return max((surface.z_m for surface in place.surfaces), default=0.0) if place else 0.0
 
+    def work_s(self, robot: str, skill: SkillModel) -> float:
+        """Seconds that a skill takes a robot, without the way to it."""
+        return work_s(self._durations(robot), skill)
+
     def travel_s(self, robot: str, origin: Value, target: str) -> float:
         """Seconds that a robot takes from one place to another; from anywhere if unknown."""
+        return pace(self._durations(robot)) * self.way_s(robot, origin, target)
+
+    def way_s(self, robot: str, origin: Value, target: str) -> float:
+        """Seconds from one place to another at a robot's top speed; from anywhere if unknown."""
         speed = self.capability(robot, "drive") or TRAVEL_SPEED_M_S
         place = self.places.get(target)
         if place is None or origin == target:
@@ -116,6 +130,10 @@ class WorldModel:
             known = place.travel_m.values()
             metres = sum(known) / len(known) if known else UNKNOWN_TRAVEL_M
         return metres / speed
+
+    def _durations(self, robot: str) -> Durations | None:
+        spec = self.robots.get(robot)
+        return None if spec is None else self.durations.get(spec.model)
 
     def holds(self, condition: Condition) -> bool:
         """Whether the facts say that the condition holds."""
@@ -130,6 +148,7 @@ class WorldModel:
             self.robots,
             self.available,
             {**self.facts, **facts},
+            self.durations,
         )
 
 

@@ -35,12 +35,13 @@ DEFAULT_SKILLS = Path("skills") / "household.yaml"
 
 @dataclass(frozen=True)
 class Composition:
-    """What this planner is made of."""
+    """What this planner is made of. `judge` is asked, at no cost, whether a goal can be reached."""
 
     skills: Mapping[str, SkillModel]
     planners: Mapping[str, Planner]
     allocators: Mapping[str, Allocator]
     llm: LlmPlanner
+    judge: Planner
 
     @property
     def strategies(self) -> tuple[str, ...]:
@@ -79,7 +80,7 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
         if not isinstance(found, Allocator):
             raise FleetError(f"{type(found).__name__}, installed as an allocator, is not one")
         allocators[found.name] = found
-    return Composition(load_all_skills(skill_files), planners, allocators, llm)
+    return Composition(load_all_skills(skill_files), planners, allocators, llm, symbolic)
 
 
 def load_all_skills(skill_files: tuple[Path, ...] = ()) -> dict[str, SkillModel]:

@@ -27,6 +27,7 @@ from fleet.service.planning_desk import carry_out
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import (
     ANSWER,
+    DURATIONS,
     GOAL_STATUS,
     ORDER,
     PLAN_STATUS,
@@ -113,15 +114,18 @@ class PlannerService:
         return {"time_s": self._time_s, "wall_time_s": time.time()}
 
     async def _take_over(self) -> None:
-        """Without a journal: what an earlier planner answered and ended is not done again."""
+        """Without a journal: what an earlier planner answered and ended is not done again, and what
+        it learned is not forgotten."""
         answers = await self._session.list(ANSWER)
         goals = await self._session.list(GOAL_STATUS)
         plans = await self._session.list(PLAN_STATUS)
+        durations = await self._session.list(DURATIONS)
         self._apply(
             events.Remembered(
                 answers=tuple(answers.values()),
                 goals=tuple(goals.values()),
                 plans=tuple(address.plan for address in plans),
+                durations=tuple(durations.values()),
                 **self._at(),
             )
         )

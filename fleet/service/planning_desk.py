@@ -4,20 +4,33 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from dataclasses import replace as changed
 
 from msgspec.structs import replace
 
-from fleet.allocators.base import Allocated, NotAllocated
+from fleet.allocators.base import Allocated, Allocator, NotAllocated
 from fleet.core.events import PlanMade, PlanNotMade
 from fleet.core.state import Job, State
 from fleet.core.telling import SEARCHED
 from fleet.core.world_model import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
+from fleet.service.circumstances import circumstances_of
 from fleet.service.composition import Composition
+from fleet.service.mending import mended_plan
+from fleet.service.partial import PartialPlan, plan_what_can_be
 from keyexpr_schema.goals import Condition, GoalState, GoalStatus
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.plans import Plan
 from keyexpr_schema.tasks import TaskState
+
+
+@dataclass(frozen=True)
+class _Made:
+    plan: Plan
+    allocated: Allocated
+    mended: bool = False
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
 
 def carry_out(
@@ -38,14 +51,13 @@ def carry_out(
             violations=made.violations,
             planning_time_s=took_s,
         )
-    plan, allocated = made
-    schedule = allocated.schedule
+    allocated, schedule = made.allocated, made.allocated.schedule
     durations_s = {task: end_s - schedule.start_s[task] for task, end_s in schedule.end_s.items()}
-    timed = [replace(task, duration_s=durations_s[task.task]) for task in plan.tasks]
+    timed = [replace(task, duration_s=durations_s[task.task]) for task in made.plan.tasks]
     return PlanMade(
         **at,
         job=job.job,
-        plan=replace(plan, tasks=tuple(timed)),
+        plan=replace(made.plan, tasks=tuple(timed)),
         allocation=dict(allocated.allocation),
         sequence=dict(schedule.sequence),
         extra_after=dict(schedule.extra_after),
@@ -53,28 +65,106 @@ def carry_out(
         makespan_s=schedule.makespan_s,
         lower_bound_s=allocated.lower_bound_s,
         notes=allocated.notes,
+        mended=made.mended,
+        left_out=dict(made.left_out),
         planning_time_s=took_s,
     )
 
 
-def _plan_and_allocate(
-    job: Job, state: State, parts: Composition
-) -> tuple[Plan, Allocated] | NoPlan:
-    world = state.world(parts.skills)
+def _plan_and_allocate(job: Job, state: State, parts: Composition) -> _Made | NoPlan:
     allocator = parts.allocators.get(job.allocator)
     if allocator is None:
         choices = ", ".join(sorted(parts.allocators))
         return NoPlan(f"there is no allocator {job.allocator}: choose one of {choices}")
-    plan = _plan(job, state, world, parts)
-    if isinstance(plan, NoPlan):
-        return plan
-    kept = replace(plan, pins={**_busy_robots(job, plan, state), **plan.pins})
-    made = allocator.allocate(kept, world)
-    if isinstance(made, NotAllocated) and kept.pins != plan.pins:
-        made = allocator.allocate(plan, world)
-    if isinstance(made, NotAllocated):
-        return NoPlan(made.violations[0].sentence, made.violations)
-    return plan, made
+    desk = _Desk(job, state, parts, state.world(parts.skills), allocator)
+    return (desk.mended() if job.remaining is not None else None) or desk.planned()
+
+
+@dataclass(frozen=True)
+class _Desk:
+    job: Job
+    state: State
+    parts: Composition
+    world: WorldModel
+    allocator: Allocator
+
+    def mended(self) -> _Made | None:
+        """What is left of the plan with another allocation, if that will do."""
+        planner = self.parts.planners.get(self.job.planner)
+        if planner is None or self.job.remaining is None:
+            return None
+        made = mended_plan(
+            self.job.remaining, self._problem(), planner, self.parts.judge, self._reached()
+        )
+        if made is None:
+            return None
+        found = self._allocate(made.plan)
+        return None if isinstance(found, NotAllocated) else self._made(made, found, mended=True)
+
+    def planned(self) -> _Made | NoPlan:
+        """A new plan; of goals that can be reached, where the job allows that."""
+        made = self._plan()
+        if isinstance(made, NoPlan):
+            return made
+        found = self._allocate(made.plan)
+        if isinstance(found, NotAllocated):
+            return NoPlan(found.violations[0].sentence, found.violations)
+        return self._made(made, found)
+
+    def _made(self, made: PartialPlan, found: Allocated, mended: bool = False) -> _Made:
+        told = (f"goal {goal} is left out: {reason}" for goal, reason in made.left_out.items())
+        found = changed(found, notes=(*found.notes, *told))
+        return _Made(made.plan, found, mended, made.left_out)
+
+    def _allocate(self, plan: Plan) -> Allocated | NotAllocated:
+        """With what is under way left where it is, if that can be."""
+        busy = _busy_robots(self.job, plan, self.state)
+        told = circumstances_of(self.job, self.state, frozenset(busy))
+        kept = replace(plan, pins={**busy, **plan.pins})
+        made = self.allocator.allocate(kept, self.world, told)
+        if isinstance(made, NotAllocated) and kept.pins != plan.pins:
+            made = self.allocator.allocate(plan, self.world, told)
+        return made
+
+    def _plan(self) -> PartialPlan | NoPlan:
+        job, planners = self.job, self.parts.planners
+        if job.proposal is not None:
+            return PartialPlan(_with_goal_conditions(job.proposal, self.state))
+        planner = planners.get(job.planner)
+        if planner is None:
+            return NoPlan(
+                f"there is no planner {job.planner}: choose one of {', '.join(sorted(planners))}"
+            )
+        problem = self._problem()
+        if not job.partial:
+            made = planner.plan(problem)
+            return made if isinstance(made, NoPlan) else PartialPlan(made)
+        return plan_what_can_be(planner, self.parts.judge, problem, self._reached())
+
+    def _problem(self) -> PlanningProblem:
+        job, state = self.job, self.state
+        return PlanningProblem(
+            plan=job.plan,
+            goals=tuple(
+                replace(state.goals[goal], conditions=_wanted(state.goal_states[goal], self.world))
+                for goal in job.goals
+                if goal in state.goals
+            ),
+            world=self.world,
+            revision=job.revision,
+            strategy=job.strategy,
+            allocator=job.allocator,
+            first_task=job.first_task,
+            searched=_searched(job, state, self.parts),
+        )
+
+    def _reached(self) -> frozenset[str]:
+        return frozenset(
+            goal
+            for goal in self.job.goals
+            if goal in self.state.goal_states
+            and self.state.goal_states[goal].state is GoalState.REACHED
+        )
 
 
 def _wanted(status: GoalStatus, world: WorldModel) -> tuple[Condition, ...]:
@@ -107,33 +197,6 @@ def _work(skill: str, args: Mapping[str, str], robots: Iterable[str | None]) -> 
         (name, value)
         for name, value in args.items()
         if value not in others and not value.startswith(ACTOR_PREFIX)
-    )
-
-
-def _plan(job: Job, state: State, world: WorldModel, parts: Composition) -> Plan | NoPlan:
-    if job.proposal is not None:
-        return _with_goal_conditions(job.proposal, state)
-    planner = parts.planners.get(job.planner)
-    if planner is None:
-        return NoPlan(
-            f"there is no planner {job.planner}: choose one of {', '.join(sorted(parts.planners))}"
-        )
-    goals = tuple(
-        replace(state.goals[goal], conditions=_wanted(state.goal_states[goal], world))
-        for goal in job.goals
-        if goal in state.goals
-    )
-    return planner.plan(
-        PlanningProblem(
-            plan=job.plan,
-            goals=goals,
-            world=world,
-            revision=job.revision,
-            strategy=job.strategy,
-            allocator=job.allocator,
-            first_task=job.first_task,
-            searched=_searched(job, state, parts),
-        )
     )
 
 

@@ -14,9 +14,10 @@ from fleet.allocators.makespan.compiled import Compiled
 from fleet.allocators.makespan.cpsat import installed
 from fleet.allocators.makespan.cpsat_process import Model
 from fleet.allocators.makespan.cpsat_request import helps, request_of
+from fleet.allocators.makespan.exhaustive import exhaust
 from fleet.allocators.makespan.graphs import cheapest_assignment
 from fleet.allocators.makespan.lists import construct
-from fleet.allocators.makespan.portfolio import solve
+from fleet.allocators.makespan.portfolio import blocks_in_order, solve
 from fleet.allocators.makespan.problem import BadShop, Block, Machine, Operation, Place, Shop, Timed
 from fleet.allocators.makespan.reschedule import WITHIN, reschedule, without_machines
 from fleet.allocators.makespan.timing import timed
@@ -158,6 +159,26 @@ def test_where_blocks_are_free_and_alone_there_is_always_an_answer(shop: Shop) -
     ready = Compiled(shop)
     assume(all(len(together) == 1 for together in ready.knot_blocks))
     assert solve(shop, deadline_s=0.0, exact=False) is not None
+
+
+@settings(max_examples=150, deadline=None)
+@given(shops(most_blocks=4))
+def test_what_looked_at_every_schedule_is_as_short_as_brute_force(shop: Shop) -> None:
+    assume(sound(shop))
+    ready = Compiled(shop)
+    begin = construct(ready)
+    assume(begin is not None)
+    assert begin is not None
+    found = exhaust(ready, begin)
+    if found is None:
+        return
+    order = blocks_in_order(ready, found.answer)
+    made = timed(shop, order, found.answer.machine_of)
+    assert made is not None and wrong(shop, made) is None
+    assert made.makespan_s <= begin.rated.makespan_s + NEAR
+    if found.proven:
+        least_s = min(one.makespan_s for one in every_schedule(shop))
+        assert abs(made.makespan_s - least_s) <= NEAR
 
 
 @settings(max_examples=12, deadline=None)

@@ -4,13 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
-from fleet.allocators.makespan.plan_shop import plan_shop
+from fleet.allocators.base import (
+    AllocationProblem,
+    Allocator,
+    Assignment,
+    Circumstances,
+    NotAllocated,
+)
+from fleet.allocators.makespan.bounds import lower_bound
+from fleet.allocators.makespan.compiled import Compiled
+from fleet.allocators.makespan.plan_shop import PlanShop, plan_shop
 from fleet.allocators.makespan.portfolio import solve
+from fleet.allocators.makespan.reschedule import reschedule
 from fleet.allocators.milp import MilpAllocator
 
 DEADLINE_S = 1.0
 """Wall time that the search may take, s."""
+RESCHEDULE_SHARE = 0.7
+"""Of that time, how much mending a schedule takes: robots wait meanwhile."""
+NOBODY = -1
+"""The machine of actors whose robot is gone."""
 
 
 class MakespanAllocator(Allocator):
@@ -22,6 +35,7 @@ class MakespanAllocator(Allocator):
     """
 
     name = "makespan"
+    reschedules = True
 
     def __init__(self, deadline_s: float = DEADLINE_S, exact: bool = True, seed: int = 0) -> None:
         """`exact` allows CP-SAT, which may take up to a second more to prove an optimum."""
@@ -31,6 +45,10 @@ class MakespanAllocator(Allocator):
 
     def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
         made = plan_shop(problem)
+        if problem.circumstances.home:
+            mended = _mended(made, problem.circumstances, self._deadline_s, self._seed)
+            if mended is not None:
+                return mended
         found = solve(made.shop, self._deadline_s, self._exact, self._seed)
         if found is None:
             # Robots are so few that rules run into a dead end: what is left is a matching problem.
@@ -45,6 +63,32 @@ class MakespanAllocator(Allocator):
             lower_bound_s=found.lower_bound_s,
             notes=found.notes,
         )
+
+
+def _mended(made: PlanShop, told: Circumstances, deadline_s: float, seed: int) -> Assignment | None:
+    """The allocation there was, with few actors in other hands."""
+    machine = {robot: i for i, robot in enumerate(made.robots)}
+    named = made.shop.blocks[len(made.actors) :]
+    home = [machine.get(told.home.get(actor, ""), NOBODY) for actor in made.actors]
+    home += [block.machines[0] for block in named]
+    block_of = {actor: block for block, actor in enumerate(made.actors)}
+    order = [block_of[actor] for actor in told.sequence if actor in block_of]
+    found = reschedule(made.shop, home, order, deadline_s=RESCHEDULE_SHARE * deadline_s, seed=seed)
+    if found is None:
+        return None
+    moved = sum(block < len(made.actors) for block in found.moved)
+    return Assignment(
+        allocation={
+            actor: made.robots[found.timed.machine_of[block]]
+            for block, actor in enumerate(made.actors)
+        },
+        sequence=tuple(made.actors[b] for b in found.timed.order if b < len(made.actors)),
+        lower_bound_s=lower_bound(Compiled(made.shop)),
+        notes=(
+            f"rescheduled: {moved} of {len(made.actors)} actors changed hands; "
+            f"with any number of changes the least found is {found.best_makespan_s:.1f} s",
+        ),
+    )
 
 
 def _by_load(chosen: Mapping[str, str] | Assignment) -> Assignment:

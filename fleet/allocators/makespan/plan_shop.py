@@ -151,8 +151,8 @@ def _apart(problem: AllocationProblem, block_of: Mapping[str, int]) -> dict[int,
 
 
 def _places(problem: AllocationProblem, actors: tuple[str, ...]) -> dict[str, Place]:
-    """Actors that have a load at the end come last; those that need their robot as it is now, and
-    as others would not leave it, come first."""
+    """Actors that have a load at the end come last; those that are under way, or need their robot
+    as it is now and as others would not leave it, come first."""
     checked = problem.checked
     last = {ACTOR_PREFIX + actor for actor in carried_at_end(checked).values()}
     leaves: dict[str, dict[str, Value]] = {}
@@ -165,6 +165,7 @@ def _places(problem: AllocationProblem, actors: tuple[str, ...]) -> dict[str, Pl
             for relation, value in rows.items():
                 left.setdefault(relation, set()).add(value)
     places: dict[str, Place] = {}
+    under_way = problem.circumstances.under_way
     for actor in actors:
         name = ACTOR_PREFIX + actor
         facts = checked.requirements[name].facts if name in checked.requirements else {}
@@ -172,6 +173,8 @@ def _places(problem: AllocationProblem, actors: tuple[str, ...]) -> dict[str, Pl
             places[name] = Place.FIRST
         elif name in last:
             places[name] = Place.LAST
+        elif actor in under_way:
+            places[name] = Place.FIRST
     return places
 
 

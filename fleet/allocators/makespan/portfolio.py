@@ -11,6 +11,7 @@ from fleet.allocators.makespan.bounds import bound_with_ways, lower_bound
 from fleet.allocators.makespan.compiled import Compiled
 from fleet.allocators.makespan.cpsat import CpSat, installed
 from fleet.allocators.makespan.cpsat_request import helps
+from fleet.allocators.makespan.exhaustive import exhaust
 from fleet.allocators.makespan.lists import ALPHAS, Answer, construct
 from fleet.allocators.makespan.problem import Shop, Timed
 from fleet.allocators.makespan.timing import timed
@@ -54,7 +55,16 @@ def solve(shop: Shop, deadline_s: float = 1.0, exact: bool = True, seed: int = 0
     notes = ["list schedule" if best is listed else "dispatch rule"]
     answer = timed(shop, blocks_in_order(ready, best), best.machine_of, bound_s)
     assert answer is not None, "an order of knots has no deadlock"
-    if not _met(best, bound_s):
+    all_tried = None if _met(best, bound_s) else exhaust(ready, best)
+    if all_tried is not None:
+        best = all_tried.answer
+        made = timed(shop, blocks_in_order(ready, best), best.machine_of)
+        assert made is not None, "an order of knots has no deadlock"
+        answer = made
+        if all_tried.proven:
+            bound_s = max(bound_s, best.rated.makespan_s)
+        notes.append("every schedule looked at")
+    if not _met(best, bound_s) and (all_tried is None or (exact and installed())):
         answer, bound_s, how = _search(shop, ready, best, answer, bound_s, until_s, exact, seed)
         notes.append(how)
         if ready.travels and answer.makespan_s > bound_s * (1 + NEAR):

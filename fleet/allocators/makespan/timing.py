@@ -44,7 +44,7 @@ def rate(
         if len(shop.knot_blocks[knot]) > 1:
             blocks = shop.knot_blocks[knot]
             if len({machine_of[b] for b in blocks}) < len(blocks):
-                ordered = _interleaved(flow, blocks, machine_of)
+                ordered = interleaved(flow, blocks, machine_of)
                 if ordered is None:
                     return None
                 flow = ordered
@@ -86,7 +86,7 @@ def rate(
     return None if cost > limit else Rated(cost, makespan, ends)
 
 
-def _interleaved(
+def interleaved(
     flow: Sequence[Step], blocks: Sequence[int], machine_of: Sequence[int]
 ) -> list[Step] | None:
     """A knot's steps when several of its blocks share a machine, one of them after the other."""

@@ -24,6 +24,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "replan": ("cli.commands.plans:replan_app", "Plan again from what is known now."),
     "world": ("cli.commands.world:app", "Places, objects, facts and statements."),
     "robots": ("cli.commands.robots:robots_app", "Every robot: what it can do, and is doing."),
+    "durations": (
+        "cli.commands.robots:durations_app",
+        "How long each type of robot really takes.",
+    ),
     "register": ("cli.commands.robots:register_app", "Declare robots from YAML files."),
     "unregister": ("cli.commands.robots:unregister_app", "Forget a robot."),
     "journal": ("cli.commands.overview:journal_app", "What changed, in the order it was stored."),

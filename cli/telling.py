@@ -151,8 +151,14 @@ def parse_value(written: str) -> Value:
     return int(number) if number.is_integer() and "." not in written else number
 
 
-async def put_goal(session: Session, text: str, name: str | None, priority: int = 0) -> Goal:
-    """Store a goal, confirmed, after all that were given before it.
+async def put_goal(
+    session: Session,
+    text: str,
+    name: str | None,
+    priority: int = 0,
+    within_s: float | None = None,
+) -> Goal:
+    """Store a goal, confirmed, after all that were given before it; due `within_s` from now [s].
 
     Raises:
         BadArgument: a goal of that name exists and says something else.
@@ -167,6 +173,7 @@ async def put_goal(session: Session, text: str, name: str | None, priority: int 
         goal=name or free_name(text, [*stored, *ended]),
         text=text,
         priority=priority,
+        due_s=None if within_s is None else await fleet_time_s(session) + within_s,
         ordinal=1 + max((each.ordinal for each in stored.values()), default=0),
     )
     await session.confirm(GOAL_SPEC, GoalAddress(spec.goal), spec)

@@ -73,7 +73,7 @@ class Plan(Payload, frozen=True, kw_only=True):
     tasks: tuple[Task, ...]
     strategy: str = "big-dag"
     made_by: str = "symbolic"
-    allocator: str = "milp"
+    allocator: str = "makespan"
     pins: dict[str, Id] = {}
     autostart: bool = True
     making: Making = Making()

@@ -26,7 +26,7 @@ class PlanRequest(Payload, frozen=True, kw_only=True):
     goals: tuple[Id, ...] = ()
     strategy: str = "big-dag"
     planner: str = "symbolic"
-    allocator: str = "milp"
+    allocator: str = "makespan"
     start: bool = True
     dry_run: bool = False
 

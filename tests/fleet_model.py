@@ -36,7 +36,8 @@ class FleetModel:
         self.wall_s = 1000.0
         self.given: dict[tuple[str, str, int], str] = {}
         """Robot of every attempt ever ordered."""
-        self.started: set[tuple[str, str, int]] = set()
+        self.started: dict[tuple[str, str, int], float] = {}
+        """When each attempt was started."""
         self.told: list[Report] = []
         self._truth: dict[tuple[str, str], Value] = {}
         self.tell(events.PlannerStarted, epoch=1, incarnation="one")
@@ -144,7 +145,7 @@ class FleetModel:
         """A worker starts an attempt; nobody may ever start it again."""
         attempt = (order.plan, order.task, order.attempt)
         if attempt not in self.started:
-            self.started.add(attempt)
+            self.started[attempt] = self.time_s
             self.report(order, ReportState.STARTED, started_s=self.time_s)
 
     def facts_after(self, order: Order) -> tuple[Fact, ...]:
@@ -167,7 +168,10 @@ class FleetModel:
         facts = self.facts_after(order)
         for fact in facts:
             self._truth[fact.relation, fact.subject] = fact.value
-        self.report(order, ReportState.SUCCEEDED, facts=facts, ended_s=self.time_s)
+        begun_s = self.started[order.plan, order.task, order.attempt]
+        self.report(
+            order, ReportState.SUCCEEDED, facts=facts, started_s=begun_s, ended_s=self.time_s
+        )
 
     def fail(self, order: Order, reason: str = "it slipped") -> None:
         """A robot has tried, and failed for good."""

@@ -34,6 +34,15 @@ async def add(
         str | None, typer.Option("--id", help="Name of the goal; else made from its words.")
     ] = None,
     priority: Annotated[int, typer.Option("--priority", help="Higher goes first.")] = 0,
+    within_s: Annotated[
+        float | None,
+        typer.Option(
+            "--within-s",
+            min=0.0,
+            metavar="SECONDS",
+            help="When it should be done, from now; plans keep to that if they can.",
+        ),
+    ] = None,
     plan: Annotated[
         bool, typer.Option("--plan", help="Have it planned and carried out at once.")
     ] = False,
@@ -60,7 +69,7 @@ async def add(
                 "no planner is running, so the goal was not stored; start one with "
                 "`robotctl planner`, or leave --plan out"
             )
-        spec = await put_goal(session, text, name, priority)
+        spec = await put_goal(session, text, name, priority, within_s)
         if not (wait or plan) and not await planner_alive(session):
             call.show(
                 GoalRow(goal=spec.goal, spec=spec, status=None),
@@ -117,7 +126,7 @@ def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
     meaning = f", understood as {means}" if means else ""
     hint = ""
     if status.state is GoalState.WAITING and not planned:
-        hint = f"; plan it with `robotctl plan create big-dag milp {spec.goal}`"
+        hint = f"; plan it with `robotctl plan create big-dag makespan {spec.goal}`"
     return f"goal {spec.goal} is {status.state.value}{meaning}{hint}"
 
 

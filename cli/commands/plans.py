@@ -32,8 +32,12 @@ def plan() -> None:
 @command(app, "create")
 async def create(
     call: Call,
-    strategy: Annotated[str, typer.Argument(metavar="STRATEGY", help="Such as big-dag.")],
-    allocator: Annotated[str, typer.Argument(metavar="ALLOCATOR", help="Such as milp.")],
+    strategy: Annotated[
+        str, typer.Argument(metavar="[STRATEGY]", help="How goals come together.")
+    ] = "big-dag",
+    allocator: Annotated[
+        str, typer.Argument(metavar="[ALLOCATOR]", help="Who chooses the robots.")
+    ] = "makespan",
     goals: Annotated[
         list[str] | None,
         typer.Argument(metavar="[GOAL]…", help="Which goals; else every goal that waits."),

@@ -11,6 +11,7 @@ from cli.command import Call, command
 register_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 unregister_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 robots_app = typer.Typer(rich_markup_mode=None, add_completion=False)
+durations_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 
 
 @command(register_app)
@@ -69,3 +70,17 @@ async def robots(call: Call) -> None:
         for name in sorted(set(specs) | alive)
     ]
     call.show(rows, lambda: robots_table(rows) if rows else "No robots are registered.")
+
+
+@command(durations_app)
+async def durations(call: Call) -> None:
+    """How long each type of robot really takes, learned from its reports."""
+    from cli.show.durations_table import durations_table
+    from keyexpr_schema.keyspace import DURATIONS
+
+    async with call.session() as session:
+        known = await session.list(DURATIONS)
+    rows = sorted(known.values(), key=lambda each: each.model)
+    call.show(
+        rows, lambda: durations_table(rows) if rows else "No robot has reported a task done yet."
+    )

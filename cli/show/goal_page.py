@@ -18,6 +18,8 @@ def goal_page(row: GoalRow) -> Group:
     if row.spec is not None:
         lines.append(Text(f"wanted      “{row.spec.text}”"))
         lines.append(Text(f"priority    {row.spec.priority}"))
+        if row.spec.due_s is not None:
+            lines.append(Text(f"due         {seconds(row.spec.due_s)} on the fleet's clock"))
     if status is None:
         lines.append(Text("understood  nobody has read it yet: no planner runs", "dim"))
         return Group(*lines)

@@ -143,7 +143,10 @@ class Allocator(ABC):
     ) -> Allocated | NotAllocated:
         plan, world, allocation = problem.plan, problem.world, chosen.allocation
         if chosen.sequence is None:
-            order = valid_schedule(plan, problem.checked, allocation, world)
+            told = problem.circumstances
+            order = valid_schedule(
+                plan, problem.checked, allocation, world, told.under_way, told.ready_s
+            )
             if isinstance(order, tuple):
                 return NotAllocated(order)
             return Allocated(allocation, order, chosen.lower_bound_s, chosen.notes)
@@ -173,7 +176,7 @@ def _problem(
         plan=plan,
         world=world,
         checked=checked,
-        able=able_robots(plan, checked, world),
+        able=able_robots(plan, checked),
         load=task_counts(plan),
         apart=actors_apart(plan, checked),
         circumstances=circumstances,

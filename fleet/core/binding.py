@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from fleet.core.checker import CheckedPlan
-from fleet.core.requirements import eligible
 from fleet.core.schedule import actors_of
+from fleet.core.standing import carried_at_end
 from fleet.core.world_model import WorldModel
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.plans import Plan
-from keyexpr_schema.world import Value
 
 Pair = tuple[str, str]
 
@@ -38,26 +37,9 @@ def actors_apart(plan: Plan, checked: CheckedPlan) -> frozenset[Pair]:
     return frozenset(apart)
 
 
-def carried_at_end(checked: CheckedPlan) -> dict[str, str]:
-    """Objects that the plan leaves with an actor, in its basket or hand, and which actor."""
-    holder: dict[str, Value] = {}
-    for task in checked.graph.order if checked.graph else ():
-        for literal in checked.actions[task].after:
-            if literal.variable.relation == "at":
-                holder[literal.variable.subject] = literal.value
-    return {
-        thing: value.removeprefix(ACTOR_PREFIX)
-        for thing, value in holder.items()
-        if isinstance(value, str) and value.startswith(ACTOR_PREFIX)
-    }
-
-
-def able_robots(plan: Plan, checked: CheckedPlan, world: WorldModel) -> dict[str, tuple[str, ...]]:
-    """The robots of the team that can be each actor."""
-    return {
-        actor: tuple(eligible(checked.requirements[ACTOR_PREFIX + actor], world)[0])
-        for actor in actors_of(plan)
-    }
+def able_robots(plan: Plan, checked: CheckedPlan) -> dict[str, tuple[str, ...]]:
+    """The robots of the team that can be each actor, in the order of the plan's actors."""
+    return {actor: checked.able[actor] for actor in actors_of(plan)}
 
 
 def task_counts(plan: Plan) -> dict[str, int]:
@@ -73,7 +55,7 @@ def least_loaded(plan: Plan, checked: CheckedPlan, world: WorldModel) -> Mapping
 
     Actors with the fewest choices come first.
     """
-    able = able_robots(plan, checked, world)
+    able = able_robots(plan, checked)
     apart = actors_apart(plan, checked)
     counts = task_counts(plan)
     load = dict.fromkeys(world.team, 0)

@@ -20,21 +20,26 @@ from dataclasses import dataclass, field
 from fleet.core.graph import Cycle, TaskGraph
 from fleet.core.plan_flow import PlanFlow
 from fleet.core.plan_form import PlanForm
-from fleet.core.requirements import Requirement, eligible
+from fleet.core.requirements import Candidates, Left, Requirement
 from fleet.core.skills import Action
 from fleet.core.world_model import WorldModel
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.plans import Plan, Violation
+from keyexpr_schema.world import Value
 
 
 @dataclass(frozen=True)
 class CheckedPlan:
-    """What the checker found; `graph` and `actions` are there once the plan's form is right."""
+    """What the checker found; `graph` and `actions` are there once the plan's form is right.
+
+    `able` has the robots that can be each actor, unless an allocation was checked.
+    """
 
     violations: tuple[Violation, ...]
     graph: TaskGraph | None = None
     actions: Mapping[str, Action] = field(default_factory=dict)
     requirements: Mapping[str, Requirement] = field(default_factory=dict)
+    able: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def valid(self) -> bool:
@@ -75,26 +80,38 @@ def check_plan(
     violations = flow.violations
     for actor, robot in plan.pins.items():
         flow.requirements[ACTOR_PREFIX + actor].pinned_to = robot
+    able: Mapping[str, tuple[str, ...]] = {}
     if allocation is None:
-        violations.extend(_actors_without_robot(flow.requirements, world))
+        requirements = {
+            actor.removeprefix(ACTOR_PREFIX): each
+            for actor, each in flow.requirements.items()
+            if actor.startswith(ACTOR_PREFIX)
+        }
+        candidates = Candidates(requirements, _leaves(graph, form.actions), world)
+        violations.extend(_actors_without_robot(candidates))
+        able = candidates.able
     else:
         violations.extend(_unable_robots(plan, allocation, form.actions, world))
-    return CheckedPlan(tuple(violations), graph, form.actions, dict(flow.requirements))
+    return CheckedPlan(tuple(violations), graph, form.actions, dict(flow.requirements), able)
 
 
-def _actors_without_robot(
-    requirements: Mapping[str, Requirement], world: WorldModel
-) -> Iterable[Violation]:
-    for actor, requirement in requirements.items():
-        if not actor.startswith(ACTOR_PREFIX):
-            continue
-        able, reasons = eligible(requirement, world)
+def _leaves(graph: TaskGraph, actions: Mapping[str, Action]) -> dict[str, frozenset[Left]]:
+    """What each actor leaves of its robot: its tasks have an order, and the last one holds."""
+    last: dict[str, dict[str, Value]] = {}
+    for task in graph.order:
+        for variable, value in actions[task].after:
+            if variable.subject.startswith(ACTOR_PREFIX):
+                rows = last.setdefault(variable.subject.removeprefix(ACTOR_PREFIX), {})
+                rows[variable.relation] = value
+    return {actor: frozenset(rows.items()) for actor, rows in last.items()}
+
+
+def _actors_without_robot(candidates: Candidates) -> Iterable[Violation]:
+    for actor, able in candidates.able.items():
         if not able:
-            told = "; ".join(dict.fromkeys(reasons)) or "no robot is connected"
-            yield Violation(
-                code="no-robot",
-                sentence=f"no robot can be actor {actor.removeprefix(ACTOR_PREFIX)}: {told}",
-            )
+            reasons = dict.fromkeys(candidates.reasons(actor))
+            told = "; ".join(reasons) or "no robot is connected"
+            yield Violation(code="no-robot", sentence=f"no robot can be actor {actor}: {told}")
 
 
 def _unable_robots(

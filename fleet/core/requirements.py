@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from fleet.core.skills import Action, Variable
 from fleet.core.world_model import WorldModel, known_value, room_left
 from keyexpr_schema.world import Value
+
+Left = tuple[str, Value]
+"""A relation and its value, as an actor leaves them of its robot."""
 
 
 @dataclass
@@ -21,32 +25,98 @@ class Requirement:
     pinned_to: str | None = None
 
 
-def eligible(requirement: Requirement, world: WorldModel) -> tuple[dict[str, None], list[str]]:
-    """Robots of the team that can be an actor (as an ordered set), and why each other cannot."""
-    able: dict[str, None] = {}
-    reasons: list[str] = []
-    for robot in world.team:
-        reason = _why_not(robot, requirement, world)
-        if reason is None:
-            able[robot] = None
-        else:
-            reasons.append(reason)
-    return able, reasons
+class Candidates:
+    """Which robots of the team can be which actors.
 
+    A robot can be an actor if it can play its roles, and if what the actor needs of it holds now or
+    is left so by another actor that the robot can be first: a robot with a full hand can pick once
+    it has put down what it carries. Whether the robot really becomes that other actor, the check of
+    the allocated plan has to say.
+    """
 
-def _why_not(robot: str, requirement: Requirement, world: WorldModel) -> str | None:
-    if requirement.pinned_to not in (None, robot):
-        return f"the plan wants {requirement.pinned_to} and not {robot}"
-    for action, parameter in requirement.roles:
-        if reason := world.lacks(robot, action, parameter):
-            return reason
-    for relation, (value, task) in requirement.facts.items():
-        has = known_value(Variable(relation, robot), world.facts, world)
-        if has != value:
-            told = "unknown" if has is None else has
-            return f"{task} needs {relation}({robot}) = {value}, and it is {told}"
-    if requirement.space:
-        room = room_left(robot, world.facts, world)
-        if room < requirement.space:
-            return f"{robot}'s basket has room for {room} more and {requirement.space} are needed"
-    return None
+    def __init__(
+        self,
+        requirements: Mapping[str, Requirement],
+        leaves: Mapping[str, frozenset[Left]],
+        world: WorldModel,
+    ) -> None:
+        """`leaves` has for every actor the facts that it leaves of its robot."""
+        self._requirements, self._world = requirements, world
+        self._playable: dict[tuple[object, ...], str | None] = {}
+        self._kinds = {
+            robot: (world.robots[robot].skills, tuple(world.robots[robot].capabilities.items()))
+            for robot in world.team
+        }
+        fitting = {actor: self._fitting(each) for actor, each in requirements.items()}
+        unmet = {
+            actor: {robot: list(self._unmet(robot, requirements[actor])) for robot in robots}
+            for actor, robots in fitting.items()
+        }
+        offered: dict[str, set[Left]] = {robot: set() for robot in world.team}
+        for actor, rows in unmet.items():
+            for robot, missing in rows.items():
+                if not missing:
+                    offered[robot] |= leaves.get(actor, frozenset())
+        self.able: dict[str, tuple[str, ...]] = {
+            actor: tuple(
+                robot
+                for robot, missing in rows.items()
+                if all(
+                    (relation, requirements[actor].facts[relation][0]) in offered[robot]
+                    for relation in missing
+                )
+            )
+            for actor, rows in unmet.items()
+        }
+
+    def reasons(self, actor: str) -> Iterator[str]:
+        """Why each robot of the team that cannot be the actor cannot."""
+        requirement = self._requirements[actor]
+        for robot in self._world.team:
+            if robot in self.able[actor]:
+                continue
+            if (reason := self._unfit(robot, requirement)) is not None:
+                yield reason
+                continue
+            for relation in self._unmet(robot, requirement):
+                value, task = requirement.facts[relation]
+                has = known_value(Variable(relation, robot), self._world.facts, self._world)
+                told = "unknown" if has is None else has
+                yield f"{task} needs {relation}({robot}) = {value}, and it is {told}"
+                break
+
+    def _fitting(self, requirement: Requirement) -> list[str]:
+        return [r for r in self._world.team if self._unfit(r, requirement) is None]
+
+    def _unfit(self, robot: str, requirement: Requirement) -> str | None:
+        """Why the robot could not be the actor whatever had happened before."""
+        if requirement.pinned_to not in (None, robot):
+            return f"the plan wants {requirement.pinned_to} and not {robot}"
+        for action, parameter in requirement.roles:
+            if self._lacks(robot, action, parameter):
+                return self._world.lacks(robot, action, parameter)
+        if requirement.space:
+            room = room_left(robot, self._world.facts, self._world)
+            if room < requirement.space:
+                needed = f"{requirement.space} are needed"
+                return f"{robot}'s basket has room for {room} more and {needed}"
+        return None
+
+    def _lacks(self, robot: str, action: Action, parameter: str) -> bool:
+        """Asked once for robots that are alike and things that measure the same."""
+        needs = action.skill.needs.get(parameter, ())
+        measured = tuple(
+            self._world.measure(need.measure, action.args[need.of])
+            for need in needs
+            if need.measure is not None and need.of is not None
+        )
+        key = (self._kinds[robot], action.skill.name, parameter, measured)
+        if key not in self._playable:
+            self._playable[key] = self._world.lacks(robot, action, parameter)
+        return self._playable[key] is not None
+
+    def _unmet(self, robot: str, requirement: Requirement) -> Iterator[str]:
+        """Relations that do not hold of the robot now as the actor needs them."""
+        for relation, (value, _) in requirement.facts.items():
+            if known_value(Variable(relation, robot), self._world.facts, self._world) != value:
+                yield relation

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import islice, permutations
 from math import inf
@@ -12,6 +12,7 @@ from typing import TypeVar
 from fleet.core.checker import CheckedPlan, check_plan
 from fleet.core.graph import Cycle, TaskGraph
 from fleet.core.skills import Action, Variable
+from fleet.core.standing import first_actors
 from fleet.core.timetable import Timetable
 from fleet.core.world_model import WorldModel
 from keyexpr_schema.ids import ACTOR_PREFIX
@@ -98,37 +99,54 @@ def best_schedule(
 
 
 def good_schedules(
-    plan: Plan, checked: CheckedPlan, allocation: Mapping[str, str], world: WorldModel
+    plan: Plan,
+    checked: CheckedPlan,
+    allocation: Mapping[str, str],
+    world: WorldModel,
+    under_way: Set[str] = frozenset(),
+    ready_s: Mapping[str, float] | None = None,
 ) -> Iterator[Schedule]:
     """Schedules over orders of groups of actors, the shortest first; none if all deadlock.
 
     One robot does its actors one after the other. Robots take groups in the same order, so they
-    never wait for each other in a circle.
+    never wait for each other in a circle. Groups with actors that are `under_way`, or that need
+    their robot as it is now, come first. `ready_s` says from when on a robot is free, s.
     """
     if checked.graph is None:
         return
     timetable = Timetable(checked.graph, checked.actions, allocation, world)
     groups = [sorted(group, key=timetable.first.__getitem__) for group in actor_groups(plan)]
+    ahead = first_actors(checked) | under_way
+    head = [group for group in groups if not ahead.isdisjoint(group)]
+    rest = [group for group in groups if ahead.isdisjoint(group)]
     orders: Iterable[Sequence[Sequence[str]]]
     if len(groups) <= EXHAUSTIVE_GROUPS:
-        orders = sorted(permutations(groups), key=lambda o: _quality(timetable.ends_s(o)))
+        fixed = ((*a, *b) for a in permutations(head) for b in permutations(rest))
+        orders = sorted(fixed, key=lambda o: _quality(timetable.ends_s(o)))
     else:
-        orders = (_swap_neighbours(timetable, groups, allocation), groups)
+        orders = (_swap_neighbours(timetable, head, rest, allocation), [*head, *rest])
     for order in orders:
-        found = schedule(plan, checked, allocation, world, order)
+        found = schedule(plan, checked, allocation, world, order, ready_s)
         if found is not None:
             yield found
 
 
 def valid_schedule(
-    plan: Plan, checked: CheckedPlan, allocation: Mapping[str, str], world: WorldModel
+    plan: Plan,
+    checked: CheckedPlan,
+    allocation: Mapping[str, str],
+    world: WorldModel,
+    under_way: Set[str] = frozenset(),
+    ready_s: Mapping[str, float] | None = None,
 ) -> Schedule | tuple[Violation, ...]:
     """The shortest schedule that passes the checker with robots for actors, or what is wrong.
 
-    Another order than the shortest may be the one that leaves every goal reached.
+    Another order than the shortest may be the one that leaves every goal reached. See
+    `good_schedules` for `under_way` and `ready_s`.
     """
     violations: tuple[Violation, ...] = ()
-    for found in islice(good_schedules(plan, checked, allocation, world), MAX_ORDERS_CHECKED):
+    found_orders = good_schedules(plan, checked, allocation, world, under_way, ready_s)
+    for found in islice(found_orders, MAX_ORDERS_CHECKED):
         violations = check_plan(plan, world, allocation, found.extra_after).violations
         if not violations:
             return found
@@ -144,17 +162,21 @@ def _quality(ends_s: Sequence[float] | None) -> tuple[float, float]:
 
 
 def _swap_neighbours(
-    timetable: Timetable, groups: Sequence[Sequence[str]], allocation: Mapping[str, str]
+    timetable: Timetable,
+    head: Sequence[Sequence[str]],
+    rest: Sequence[Sequence[str]],
+    allocation: Mapping[str, str],
 ) -> Sequence[Sequence[str]]:
-    order = list(groups)
+    """A good order; every group of `head` stays before every one of `rest`."""
+    order = [*head, *rest]
     robots = [{allocation[actor] for actor in group} for group in order]
     best = _quality(timetable.ends_s(order))
     improved = True
     while improved:
         improved = False
         for left in range(len(order) - 1):
-            if robots[left].isdisjoint(robots[left + 1]):
-                continue  # no robot's own order would change, so nothing would
+            if left + 1 == len(head) or robots[left].isdisjoint(robots[left + 1]):
+                continue  # where no robot's own order would change, nothing would
             _swap(order, left)
             quality = _quality(timetable.ends_s(order))
             if quality < best:

@@ -24,7 +24,7 @@ class PlanningProblem:
     world: WorldModel
     revision: int = 1
     strategy: str = "big-dag"
-    allocator: str = "milp"
+    allocator: str = "makespan"
     first_task: int = 1
     searched: frozenset[str] = frozenset()
     """Places in which this plan has looked around already."""

@@ -17,11 +17,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import product
 
-from fleet.core.binding import carried_at_end, least_loaded
+from fleet.core.binding import least_loaded
 from fleet.core.checker import check_plan
 from fleet.core.lifting import Strand, tasks_from
 from fleet.core.schedule import valid_schedule
 from fleet.core.skills import Variable
+from fleet.core.standing import carried_at_end
 from fleet.core.world_model import WorldModel
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.search import Facts

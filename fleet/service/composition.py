@@ -64,12 +64,12 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
     llm = LlmPlanner(config, symbolic, caller)
     planners: dict[str, Planner] = {symbolic.name: symbolic, llm.name: llm}
     own: tuple[Allocator, ...] = (
-        MilpAllocator(),
         MakespanAllocator(),
+        MilpAllocator(),
         BalancedAllocator(),
         CostBasedAllocator(),
         RoundRobinAllocator(),
-        LlmAllocator(AllocationAsker(config, caller), BalancedAllocator()),
+        LlmAllocator(AllocationAsker(config, caller), MakespanAllocator()),
     )
     allocators = {allocator.name: allocator for allocator in own}
     for found in _from_packages("robotfleet.planners"):

@@ -117,7 +117,7 @@ def _broken_goals(
         if not about:
             return frozenset()
         broken.update(about)
-    for actor, robots in able_robots(plan, checked, world).items():
+    for actor, robots in able_robots(plan, checked).items():
         if not robots:
             broken.update(t.goal for t in plan.tasks if t.actor == actor and t.goal is not None)
     return frozenset(broken)

@@ -15,6 +15,7 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event
+from fleet.core.lateness import SAME_CLOCK_S
 from fleet.core.state import Job, Policy, State
 from fleet.core.step import replay, step
 from fleet.core.working import next_timer
@@ -111,7 +112,10 @@ class PlannerService:
                     task.cancel()
 
     def _at(self) -> At:
-        return {"time_s": self._time_s, "wall_time_s": time.time()}
+        now_s = time.time()
+        if abs(now_s - self._time_s) < SAME_CLOCK_S:
+            self._time_s = now_s  # no simulation: the fleet's clock goes on without messages, too
+        return {"time_s": self._time_s, "wall_time_s": now_s}
 
     async def _take_over(self) -> None:
         """Without a journal: what an earlier planner answered and ended is not done again, and what

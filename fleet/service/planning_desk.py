@@ -98,7 +98,7 @@ class _Desk:
         )
         if made is None:
             return None
-        found = self._allocate(made.plan)
+        found = self._allocate(made.plan, {})
         return None if isinstance(found, NotAllocated) else self._made(made, found, mended=True)
 
     def planned(self) -> _Made | NoPlan:
@@ -106,7 +106,7 @@ class _Desk:
         made = self._plan()
         if isinstance(made, NoPlan):
             return made
-        found = self._allocate(made.plan)
+        found = self._allocate(made.plan, _busy_robots(self.job, made.plan, self.state))
         if isinstance(found, NotAllocated):
             return NoPlan(found.violations[0].sentence, found.violations)
         return self._made(made, found)
@@ -116,9 +116,8 @@ class _Desk:
         found = changed(found, notes=(*found.notes, *told))
         return _Made(made.plan, found, mended, made.left_out)
 
-    def _allocate(self, plan: Plan) -> Allocated | NotAllocated:
-        """With what is under way left where it is, if that can be."""
-        busy = _busy_robots(self.job, plan, self.state)
+    def _allocate(self, plan: Plan, busy: Mapping[str, str]) -> Allocated | NotAllocated:
+        """With actors that robots are `busy` with left where they are, if that can be."""
         told = circumstances_of(self.job, self.state, frozenset(busy))
         kept = replace(plan, pins={**busy, **plan.pins})
         made = self.allocator.allocate(kept, self.world, told)
@@ -177,16 +176,16 @@ def _wanted(status: GoalStatus, world: WorldModel) -> tuple[Condition, ...]:
 def _busy_robots(job: Job, plan: Plan, state: State) -> dict[str, str]:
     """Actors of the new plan whose work a robot has begun already, so that it goes on with it."""
     book = state.plans.get(job.plan)
-    begun = {
-        _work(record.skill, record.args, (record.robot, *state.robots)): record.robot
-        for name in job.running
-        if book is not None and (record := book.records.get(name)) is not None and record.robot
-    }
+    begun: dict[tuple[object, ...], list[str]] = {}
+    for name in job.running:
+        if book is not None and (record := book.records.get(name)) is not None and record.robot:
+            work = _work(record.skill, record.args, (record.robot, *state.robots))
+            begun.setdefault(work, []).append(record.robot)
     pins: dict[str, str] = {}
     for task in plan.tasks:
-        robot = begun.get(_work(task.skill, task.args, ()))
-        if robot is not None and robot not in pins.values():
-            pins[task.actor] = robot
+        robots = begun.get(_work(task.skill, task.args, ()))
+        if robots and task.actor not in pins and robots[0] not in pins.values():
+            pins[task.actor] = robots.pop(0)
     return pins
 
 

@@ -89,6 +89,11 @@ class Planner(RuleBasedStateMachine):
             self.away.add(robot)
             self.model.lose(robot)
 
+    @rule(seconds=st.sampled_from([20.0, 120.0, 2000.0]))
+    def time_passes(self, seconds: float) -> None:
+        self.model.time_s += seconds
+        self.model.tell(events.TimePassed)
+
     @rule()
     def robots_return(self) -> None:
         for robot in sorted(self.away):

@@ -8,9 +8,9 @@ from math import inf
 
 from fleet.allocators.base import AllocationProblem
 from fleet.allocators.makespan.problem import Block, Machine, Operation, Place, Shop
-from fleet.core.binding import carried_at_end
 from fleet.core.schedule import predicted_duration_s
 from fleet.core.skills import Action, Variable
+from fleet.core.standing import carried_at_end, first_actors
 from fleet.core.world_model import WorldModel
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.plans import Plan
@@ -153,28 +153,16 @@ def _apart(problem: AllocationProblem, block_of: Mapping[str, int]) -> dict[int,
 def _places(problem: AllocationProblem, actors: tuple[str, ...]) -> dict[str, Place]:
     """Actors that have a load at the end come last; those that are under way, or need their robot
     as it is now and as others would not leave it, come first."""
-    checked = problem.checked
-    last = {ACTOR_PREFIX + actor for actor in carried_at_end(checked).values()}
-    leaves: dict[str, dict[str, Value]] = {}
-    for task in checked.graph.order if checked.graph else ():
-        for variable, value in checked.actions[task].after:
-            leaves.setdefault(variable.subject, {})[variable.relation] = value
-    left: dict[str, set[Value]] = {}
-    for subject, rows in leaves.items():
-        if subject not in last:
-            for relation, value in rows.items():
-                left.setdefault(relation, set()).add(value)
+    last = set(carried_at_end(problem.checked).values())
+    first = first_actors(problem.checked)
     places: dict[str, Place] = {}
-    under_way = problem.circumstances.under_way
     for actor in actors:
-        name = ACTOR_PREFIX + actor
-        facts = checked.requirements[name].facts if name in checked.requirements else {}
-        if any(left.get(relation, set()) - {value} for relation, (value, _) in facts.items()):
-            places[name] = Place.FIRST
-        elif name in last:
-            places[name] = Place.LAST
-        elif actor in under_way:
-            places[name] = Place.FIRST
+        if actor in first:
+            places[ACTOR_PREFIX + actor] = Place.FIRST
+        elif actor in last:
+            places[ACTOR_PREFIX + actor] = Place.LAST
+        elif actor in problem.circumstances.under_way:
+            places[ACTOR_PREFIX + actor] = Place.FIRST
     return places
 
 

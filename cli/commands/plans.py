@@ -143,13 +143,21 @@ async def show(
     dot: Annotated[
         bool, typer.Option("--dot", help="Only the graph, in Graphviz' language (`| dot -Tsvg`).")
     ] = False,
+    analyze_idle: Annotated[
+        bool,
+        typer.Option("--analyze-idle", help="How long robots stand idle, predicted and measured."),
+    ] = False,
 ) -> None:
     """One plan: its tasks and who does them, what waits for what, how it was made and changed."""
     from cli.board import FLEET, following
     from cli.errors import BadArgument, Unknown, check_known
+    from cli.plans.idle import idle_report
+    from cli.show.idle_page import idle_page
 
     if dot and call.json:
         raise BadArgument("--dot and --json are two forms of the same: choose one")
+    if dot and analyze_idle:
+        raise BadArgument("--dot draws only the graph; --analyze-idle does not go with it")
 
     async with call.session() as session, following(session, *FLEET) as board:
         pass
@@ -162,6 +170,7 @@ async def show(
     name = plan
     records = {task: record for (of, task), record in board.tasks.items() if of == name}
     spec, status = board.plans.get(name), board.plan_status.get(name)
+    idle = idle_report(spec, status, records.values(), board.specs.values()) if spec else None
 
     def draw() -> RenderableType:
         from rich.console import Group
@@ -179,9 +188,11 @@ async def show(
             return Group(table, "", violations_table(status.violations))
         if dot:
             return plan_dot(spec, status, records)
-        return plan_page(spec, status, records, board.goals, board.goal_status, board.now_s)
+        page = plan_page(spec, status, records, board.goals, board.goal_status, board.now_s)
+        return Group(page, "", idle_page(idle)) if analyze_idle and idle else page
 
-    call.show({"plan": spec, "status": status, "tasks": list(records.values())}, draw)
+    told = {"plan": spec, "status": status, "tasks": list(records.values())}
+    call.show({**told, "idle": idle} if analyze_idle else told, draw)
 
 
 command(app, "check", FactWords)(check)

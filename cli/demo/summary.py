@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 import msgspec
 
 from cli.judge import Verdict
+from fleet.core.idle_time import measured_idle
 from keyexpr_schema.simulation import ContactCount
 from keyexpr_schema.tasks import TaskRecord, TaskState
 
@@ -79,39 +80,14 @@ def task_lines(records: Iterable[TaskRecord]) -> tuple[TaskLine, ...]:
 
 
 def times(
-    records: Sequence[TaskRecord], robots: Iterable[str]
+    records: Sequence[TaskRecord], robots: Sequence[str]
 ) -> tuple[float, dict[str, float], dict[str, float]]:
     """Makespan, busy time by robot and idle time by robot [s].
 
     The makespan runs from the first order to the last end. A robot is busy while at least one of
     its tasks runs (tries of earlier attempts count, too); it is idle for the rest of the makespan.
     """
-    begins = [
-        min(t for t in (record.ordered_s, record.started_s) if t is not None)
-        for record in records
-        if record.ordered_s is not None or record.started_s is not None
-    ]
-    ends = [record.ended_s for record in records if record.ended_s is not None]
-    makespan_s = max(0.0, max(ends) - min(begins)) if begins and ends else 0.0
-    busy_s = {}
-    for robot in robots:
-        spans = [span for record in records if record.robot == robot for span in _spans(record)]
-        busy_s[robot] = union_s(spans)
-    idle_s = {robot: max(0.0, makespan_s - busy) for robot, busy in busy_s.items()}
-    return makespan_s, busy_s, idle_s
-
-
-def _spans(record: TaskRecord) -> list[tuple[float, float]]:
-    spans = [(each.started_s, each.ended_s) for each in record.tries]
-    if record.started_s is not None and record.ended_s is not None:
-        spans.append((record.started_s, record.ended_s))
-    return spans
-
-
-def union_s(spans: Iterable[tuple[float, float]]) -> float:
-    """The length of the union of intervals [s]."""
-    total_s, reached_s = 0.0, float("-inf")
-    for start_s, end_s in sorted(spans):
-        total_s += max(0.0, end_s - max(start_s, reached_s))
-        reached_s = max(reached_s, end_s)
-    return total_s
+    told = measured_idle(records, robots)
+    busy_s = {robot: told.busy[robot] for robot in robots}
+    idle_s = {robot: max(0.0, told.makespan - busy) for robot, busy in busy_s.items()}
+    return told.makespan, busy_s, idle_s

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from itertools import permutations, product
 
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
 from fleet.allocators.makespan.bounds import bound_with_ways, lower_bound
 from fleet.allocators.makespan.compiled import Compiled
+from fleet.allocators.makespan.cpsat import installed
+from fleet.allocators.makespan.cpsat_process import Model
+from fleet.allocators.makespan.cpsat_request import helps, request_of
 from fleet.allocators.makespan.exhaustive import exhaust
 from fleet.allocators.makespan.graphs import cheapest_assignment
 from fleet.allocators.makespan.lists import construct
@@ -189,6 +193,26 @@ def test_cp_sat_agrees_with_brute_force(shop: Shop) -> None:
     assert found.lower_bound_s <= least_s + NEAR
     if any("proven" in note for note in found.notes):
         assert found.makespan_s <= least_s + NEAR
+
+
+@pytest.mark.skipif(not installed(), reason="OR-Tools is an extra: cp-sat")
+@settings(max_examples=100, deadline=None)
+@given(shops(most_blocks=3))
+def test_the_model_of_cp_sat_has_the_optimum_of_brute_force(shop: Shop) -> None:
+    """The whole of it, cuts included, solved to the end; times are whole seconds."""
+    from ortools.sat.python import cp_model
+
+    assume(sound(shop))
+    ready = Compiled(shop)
+    hint = construct(ready)
+    if hint is None or not helps(ready):
+        return
+    data = request_of(ready, hint, lower_bound(ready), until_s=0.0, seed=0)
+    solver = cp_model.CpSolver()
+    solver.parameters.num_workers = 1
+    assert solver.solve(Model(cp_model, data).model) == cp_model.OPTIMAL
+    least_s = min(one.makespan_s for one in every_schedule(shop))
+    assert solver.objective_value == pytest.approx(least_s)
 
 
 @settings(max_examples=60, deadline=None)

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cli.demo.summary import task_lines, times, union_s
+from cli.demo.summary import task_lines, times
+from fleet.core.idle_time import union_s
 from keyexpr_schema.tasks import TaskRecord, TaskState, Try
 
 

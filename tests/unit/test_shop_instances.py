@@ -15,6 +15,8 @@ KNOWN = {
     "mk01": 40, "mk02": 26, "mk03": 204,
 }  # fmt: skip
 SIZES = {"ft06": (36, 6), "mk01": (55, 6), "mk02": (58, 6), "mk03": (150, 8)}
+NEVER_S = 600.0
+"""A search that has not ended by itself by then never will: it takes seconds."""
 QUICK = ("la01", "la05", "mk03")
 """Solved to the bound without CP-SAT."""
 
@@ -28,20 +30,25 @@ def test_an_instance_says_its_source_and_optimum(name: str) -> None:
     assert len(instance.shop.machines) == machines
 
 
+@pytest.mark.timeout(2 * NEVER_S)
 @pytest.mark.parametrize("name", QUICK)
 def test_rules_and_annealing_reach_the_bound(name: str) -> None:
     instance = load(name)
-    found = solve(instance.shop, deadline_s=20.0, exact=False)
+    found = solve(instance.shop, deadline_s=NEVER_S, exact=False)
     assert found is not None
     assert found.makespan_s == found.lower_bound_s == KNOWN[name]
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(2 * NEVER_S)
 @pytest.mark.skipif(not installed(), reason="OR-Tools is an extra: cp-sat")
 @pytest.mark.parametrize("name", [name for name in KNOWN if name not in QUICK])
 def test_the_optimum_is_found_and_proven(name: str) -> None:
-    """Of both the instance (a wrong number would have another optimum) and the scheduler."""
-    found = solve(load(name).shop, deadline_s=30.0)
+    """Of both the instance (a wrong number would have another optimum) and the scheduler.
+
+    The search ends with the proof. How long that takes is measured in the benchmark.
+    """
+    found = solve(load(name).shop, deadline_s=NEVER_S)
     assert found is not None
     assert found.makespan_s == KNOWN[name]
     assert found.lower_bound_s == KNOWN[name]

@@ -234,12 +234,19 @@ async def test_a_goal_is_planned_and_waited_for_in_one_command(
             await carry_out(session, order)
         said = await waiting
         page = (await robotctl.soon("goal", "show", "g")).out
+        idle = (await robotctl.soon("plan", "show", "--analyze-idle")).out
+        data = (await robotctl.soon("plan", "show", "--analyze-idle", "--json")).data
     assert said.code == 0, said.err
     first, second, last = said.out.strip().splitlines()
     assert first == "goal g is waiting, understood as at(cup_1) = hallway"
     assert second == "plan plan-1 has 4 tasks for 1 goals"
     assert last == "goal g is reached, understood as at(cup_1) = hallway"
     assert "understood  at(cup_1) = hallway" in page
+    assert "Idle time" in idle and "hsr" in idle.partition("Idle time")[2]
+    assert data["idle"]["fleet"] == ["hsr"]
+    assert data["idle"]["unit_predicted"] == {"makespan": 4.0, "idle": {"hsr": 0.0}, "mean": 0.0}
+    assert data["idle"]["measured"] is None  # the hsr of this test tells no times
+    assert data["idle"]["predicted"]["makespan"] == data["status"]["predicted_makespan_s"]
 
 
 async def test_the_page_of_a_plan_and_its_graph(

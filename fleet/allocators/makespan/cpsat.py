@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from contextlib import suppress
@@ -15,18 +15,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fleet.allocators.makespan.compiled import Compiled
+from fleet.allocators.makespan.cpsat_request import groups_of, request_of, unit_of
 from fleet.allocators.makespan.lists import Answer
 from fleet.allocators.makespan.problem import Place
 
-MAX_CHOICES = 4000
-"""Blocks times pools of machines up to which CP-SAT is asked, without travel."""
-MAX_ARCS = 12_000
-"""Pairs of blocks on a machine, over all machines, up to which it is asked, with travel."""
 GRACE_S = 0.3
 """How much later than its deadline the process may end before it is ended, s."""
-UNITS_PER_S = 1000
-"""Times become whole milliseconds, rounded down, so that a bound stays a bound; times that are
-whole seconds stay exact."""
 
 
 class Exact(NamedTuple):
@@ -46,14 +40,16 @@ class CpSat:
     ) -> None:
         """`until_s` is on `time.time()`."""
         self._shop = shop
-        self._groups = _groups(shop)
-        self._unit = 1 if shop.whole else UNITS_PER_S
+        self._groups = groups_of(shop)
+        self._unit = unit_of(shop)
         self._until_s = until_s
-        request = self._request(hint, bound_s, until_s, seed)
+        request = request_of(shop, hint, bound_s, until_s, seed)
+        # A file and not a pipe: nobody reads before the end, and a full pipe would stop the solver.
+        self._answers = tempfile.TemporaryFile(mode="w+", encoding="utf-8")  # noqa: SIM115 (close)
         self._process = subprocess.Popen(
             [sys.executable, "-P", str(Path(__file__).with_name("cpsat_process.py"))],
             stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
+            stdout=self._answers,
             stderr=subprocess.DEVNULL,
             text=True,
         )
@@ -61,7 +57,6 @@ class CpSat:
         # It may end at once; what it says, or does not, is read as usual.
         with suppress(BrokenPipeError), self._process.stdin as pipe:
             pipe.write(json.dumps(request))
-        self._process.stdin = None
 
     @property
     def ended(self) -> bool:
@@ -70,18 +65,20 @@ class CpSat:
 
     def result(self) -> Exact:
         """Wait until its deadline at most; what it found."""
-        try:
-            wait_s = max(self._until_s + GRACE_S - time.time(), 0.0)
-            text, _ = self._process.communicate(timeout=wait_s)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            text, _ = self._process.communicate()
-        return self._read(text)
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(max(self._until_s + GRACE_S - time.time(), 0.0))
+        self._end()
+        self._answers.seek(0)
+        return self._read(self._answers.read())
 
     def close(self) -> None:
         """End it, whatever it is doing."""
-        self._process.kill()
-        self._process.communicate()
+        self._end()
+        self._answers.close()
+
+    def _end(self) -> None:
+        self._process.kill()  # nothing to one that has ended
+        self._process.wait()
 
     def _read(self, text: str) -> Exact:
         solution: dict[str, Any] | None = None
@@ -116,104 +113,7 @@ class CpSat:
             free[machine] = float("inf") if last else solution["ends"][block]
         return machine_of
 
-    def _request(self, hint: Answer, bound_s: float, until_s: float, seed: int) -> dict[str, Any]:
-        shop, unit = self._shop, self._unit
-
-        def whole(seconds: float) -> int:
-            return floor(seconds * unit + 1e-6)
-
-        group_of = {m: g for g, group in enumerate(self._groups) for m in group}
-        machines = shop.shop.machines
-        ends = hint.rated.ends_s
-        starts = _starts(shop, hint)
-        return {
-            "until": until_s,
-            "workers": max(1, min(os.cpu_count() or 1, 8)),
-            "seed": seed,
-            "horizon": whole(hint.rated.makespan_s) + 1,
-            "bound": whole(bound_s - 1e-9),
-            "travel": [[[whole(s) for s in row] for row in rows] for rows in shop.shop.travel_s]
-            if shop.travels
-            else None,
-            "groups": [
-                {
-                    "kind": machines[group[0]].kind,
-                    "ready": whole(machines[group[0]].ready_s),
-                    "site": machines[group[0]].site,
-                    "size": len(group),
-                }
-                for group in self._groups
-            ],
-            "steps": [
-                {
-                    "block": step.block,
-                    "befores": step.befores,
-                    "durations": [whole(d) for d in step.duration_s],
-                    "target": step.target,
-                    "tail": whole(step.tail_s),
-                }
-                for step in sorted(step for flow in shop.flow for step in flow)
-            ],
-            "blocks": [
-                {
-                    "groups": sorted({group_of[m] for m in block.machines}),
-                    "steps": shop.steps_of[b],
-                    "place": int(block.place),
-                    "apart": sorted(block.apart),
-                    "entry": next(
-                        (
-                            s
-                            for s in shop.steps_of[b]
-                            if shop.block_of[s] == b and shop.targets[s] >= 0
-                        ),
-                        -1,
-                    ),
-                    "exit": shop.exit_of[b],
-                }
-                for b, block in enumerate(shop.shop.blocks)
-            ],
-            "hint": {
-                "starts": [whole(s) for s in starts],
-                "ends": [whole(e) for e in ends],
-                "groups": [group_of[m] for m in hint.machine_of],
-            },
-        }
-
-
-def _starts(shop: Compiled, hint: Answer) -> list[float]:
-    kinds = shop.kinds
-    return [
-        max(0.0, hint.rated.ends_s[s] - shop.durations[s][kinds[hint.machine_of[b]]])
-        for s, b in enumerate(shop.block_of)
-    ]
-
 
 def installed() -> bool:
     """Whether OR-Tools can be imported."""
     return find_spec("ortools") is not None
-
-
-def helps(shop: Compiled) -> bool:
-    """Whether the model is small enough to be of use."""
-    blocks = shop.shop.blocks
-    if shop.travels:
-        if any(exit_ < 0 for exit_ in shop.exit_of):
-            return False  # where a machine is then depends on more than the block before
-        return sum(len(b.machines) for b in blocks) * len(blocks) <= MAX_ARCS
-    group_of = {machine: g for g, group in enumerate(_groups(shop)) for machine in group}
-    return sum(len({group_of[m] for m in block.machines}) for block in blocks) <= MAX_CHOICES
-
-
-def _groups(shop: Compiled) -> list[list[int]]:
-    """Machines that are alike in everything; with travel each is its own group."""
-    machines = shop.shop.machines
-    if shop.travels:
-        return [[m] for m in range(len(machines))]
-    masks = [0] * len(machines)
-    for number, block in enumerate(shop.shop.blocks):
-        for m in block.machines:
-            masks[m] |= 1 << number
-    found: dict[tuple[int, float, int], list[int]] = {}
-    for m, machine in enumerate(machines):
-        found.setdefault((machine.kind, machine.ready_s, masks[m]), []).append(m)
-    return list(found.values())

@@ -22,11 +22,14 @@ def main() -> None:
     """Read, solve until the deadline, print."""
     data = json.load(sys.stdin)
     cp_model = _cp_model()
-    model = _Model(cp_model, data)
+    model = Model(cp_model, data)
     solver = cp_model.CpSolver()
     solver.parameters.max_time_in_seconds = max(data["until"] - time.time(), 0.05)
     solver.parameters.num_workers = data["workers"]
     solver.parameters.random_seed = data["seed"]
+    # Searches from the bound upwards. With two or three workers CP-SAT leaves it out, and it is the
+    # one that proves most; beside it all that makes a schedule shorter goes on.
+    solver.parameters.extra_subsolvers.append("objective_lb_search")
 
     tell_each = type(
         "TellEach",
@@ -59,7 +62,9 @@ def _tell(row: dict[str, Any]) -> None:
     print(json.dumps(row), flush=True)  # noqa: T201 (standard output is the way out)
 
 
-class _Model:
+class Model:
+    """The shop as a CP-SAT model; `cp` is the module `cp_model`, `data` what `request_of` made."""
+
     def __init__(self, cp: Any, data: dict[str, Any]) -> None:
         self.data = data
         self.model = model = cp.CpModel()
@@ -68,7 +73,8 @@ class _Model:
         self.starts = [model.new_int_var(0, horizon, "") for _ in data["steps"]]
         self.ends = [model.new_int_var(0, horizon, "") for _ in data["steps"]]
         self.lits: list[dict[int, Any]] = []
-        self.sizes: dict[int, Any] = {}
+        self.ways: dict[int, list[tuple[Any, int]]] = {}
+        """By group: arcs of its circuit with the way that comes before the block they lead to."""
         for step, row in enumerate(data["steps"]):
             for before in row["befores"]:
                 model.add(self.starts[step] >= self.ends[before])
@@ -82,6 +88,7 @@ class _Model:
             self._cumulatives()
         else:
             self._circuits()
+        self._loads()
         for number, block in enumerate(data["blocks"]):
             for other in block["apart"]:
                 for group, lit in self.lits[number].items():
@@ -153,7 +160,7 @@ class _Model:
                 model.add_implication(lit, ~empty)
                 first, last = model.new_bool_var(""), model.new_bool_var("")
                 arcs += [(0, here, first), (here, 0, last)]
-                self._follows(block, group, first, group["ready"], travel[group["site"]])
+                self._follows(block, number, first, group["ready"], travel[group["site"]])
                 if row["place"] == 2:
                     continue
                 for there, other in enumerate(mine, start=1):
@@ -163,17 +170,69 @@ class _Model:
                     arc = model.new_bool_var("")
                     arcs.append((here, there, arc))
                     end = self._span(block)[1]
-                    self._follows(other, group, arc, end, travel[row["exit"]])
+                    self._follows(other, number, arc, end, travel[row["exit"]])
             model.add_circuit(arcs)
 
-    def _follows(self, block: int, group: Any, arc: Any, free: Any, ways: list[int]) -> None:
+    def _loads(self) -> None:
+        """What follows from the rest, and the solver does not see by itself: the work given to the
+        machines of a pool, and their ways, fit between the least head and the least tail there."""
+        data = self.data
+        heads = self._heads()
+        for number, group in enumerate(data["groups"]):
+            mine = [b for b, lits in enumerate(self.lits) if number in lits]
+            if not mine:
+                continue
+            steps = [data["blocks"][b]["steps"] for b in mine]
+            head = min(heads[row[0]] for row in steps)
+            tail = min(data["steps"][row[-1]]["tail"] for row in steps)
+            if group["ready"] + tail <= data["bound"]:
+                # A machine that is free later than that may well have nothing to do.
+                head = max(head, group["ready"])
+            work = [sum(self._least(step, b, group["kind"]) for step in row)
+                    for b, row in zip(mine, steps, strict=True)]  # fmt: skip
+            total = sum(s * self.lits[b][number] for b, s in zip(mine, work, strict=True))
+            total += sum(way * arc for arc, way in self.ways.get(number, ()))
+            self.model.add(total <= group["size"] * (self.top - head - tail))
+
+    def _least(self, step: int, block: int = -1, kind: int = 0) -> int:
+        """What a step takes without its way: a block's own on this kind of machine, else on the
+        fastest."""
+        row = self.data["steps"][step]
+        durations: list[int] = row["durations"]
+        if row["block"] == block:
+            return durations[kind]
+        groups = self.data["groups"]
+        return min(durations[int(groups[group]["kind"])] for group in self.lits[row["block"]])
+
+    def _heads(self) -> list[int]:
+        """Before which no step starts."""
+        steps = self.data["steps"]
+        heads = [-1] * len(steps)
+        left = list(range(len(steps)))
+        while left:
+            waiting = []
+            for step in left:
+                befores = steps[step]["befores"]
+                if any(heads[before] < 0 for before in befores):
+                    waiting.append(step)
+                    continue
+                ends = (heads[before] + self._least(before) for before in befores)
+                heads[step] = max(ends, default=0)
+            left = waiting
+        return heads
+
+    def _follows(self, block: int, number: int, arc: Any, free: Any, ways: list[int]) -> None:
+        """With this arc, the block comes after `free` on the machine `number`."""
+        group = self.data["groups"][number]
         begin, _ = self._span(block)
         self.model.add(begin >= free).only_enforce_if(arc)
         entry = self.data["blocks"][block]["entry"]
         if entry < 0:
             return
         row = self.data["steps"][entry]
-        size = row["durations"][group["kind"]] + ways[row["target"]]
+        way = ways[row["target"]]
+        self.ways.setdefault(number, []).append((arc, way))
+        size = row["durations"][group["kind"]] + way
         self.model.add(self.ends[entry] >= self.starts[entry] + size).only_enforce_if(arc)
 
     def _hint(self) -> None:

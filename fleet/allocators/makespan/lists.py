@@ -34,12 +34,13 @@ class Answer(NamedTuple):
 
 
 class Habit(NamedTuple):
-    """A schedule that is to be kept to: knots in its order, each block at `home` unless it ends
-    more than `slack_s` earlier elsewhere."""
+    """A schedule that is to be kept to: knots in its order, each block at `home` if it ends there
+    by `latest_s`, or nowhere else earlier by more than `slack_s`."""
 
     order: Sequence[int]
     home: Sequence[int]
-    slack_s: float
+    slack_s: float = 0.0
+    latest_s: Sequence[float] | None = None
 
 
 def construct(
@@ -146,7 +147,10 @@ class _Board:
             home = self.habit.home[block]
             if home != machine and home in machines:
                 there = self.guess(block, home, ready_s)
-                if there.finish_s <= found.finish_s + self.habit.slack_s:
+                enough_s = found.finish_s + self.habit.slack_s
+                if self.habit.latest_s is not None:
+                    enough_s = max(enough_s, self.habit.latest_s[block])
+                if there.finish_s <= enough_s:
                     return there
         return found
 

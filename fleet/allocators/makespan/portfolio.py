@@ -9,7 +9,8 @@ from random import Random
 from fleet.allocators.makespan.anneal import anneal
 from fleet.allocators.makespan.bounds import bound_with_ways, lower_bound
 from fleet.allocators.makespan.compiled import Compiled
-from fleet.allocators.makespan.cpsat import CpSat, helps, installed
+from fleet.allocators.makespan.cpsat import CpSat, installed
+from fleet.allocators.makespan.cpsat_request import helps
 from fleet.allocators.makespan.exhaustive import exhaust
 from fleet.allocators.makespan.lists import ALPHAS, Answer, construct
 from fleet.allocators.makespan.problem import Shop, Timed

@@ -1,10 +1,10 @@
 """A schedule mended after a machine is lost or late, with few blocks changing hands.
 
-Candidates: the orphans put where there is time; the old order gone through again, each block where
-it was unless it ends so many seconds earlier elsewhere, for a range of seconds; the best of those
-annealed with a price on every move, and without; and a schedule from scratch. Of all that are
-within `WITHIN` of the shortest, the one with the fewest moves is taken, and moves that it can do
-without are taken back.
+Candidates: the old order gone through again, each block where it was if it ends there early enough
+for a target, for a range of targets; the orphans put where there is time; a schedule from scratch;
+and the best of those annealed. Of all that are within `WITHIN` of the shortest, the one with the
+fewest moves is taken, moves that it can do without are taken back, and what time is left goes into
+a search with a price on moves.
 """
 
 from __future__ import annotations
@@ -25,8 +25,14 @@ WITHIN = 0.02
 """Share of the best makespan that fewer moves may cost."""
 PRICE = 0.002
 """Share of the makespan that one move costs while annealing: ten moves for `WITHIN`."""
-SLACKS = (0.2, 0.03, 0.08, 0.015, 0.05, 0.005)
-"""Shares of the makespan by which a block must end earlier elsewhere to be moved."""
+TARGETS = (1.0, 0.99, 0.98, 0.97, 0.96, 0.95, 0.93)
+"""Of the longest makespan that is allowed; tried one after the other."""
+ALWAYS = 3
+"""So many of them whatever the time."""
+TARGETS_SHARE, REPAIR_SHARE, SHORTEN_SHARE, MORE_TARGETS_SHARE, TAKE_BACK_SHARE = (
+    0.4, 0.5, 0.6, 0.7, 0.9,
+)  # fmt: skip
+"""When each step is over, as a share of the time."""
 TRIED = 4
 """Machines that are tried for an orphan: those that are done first."""
 
@@ -76,42 +82,107 @@ def reschedule(
     Raises:
         BadShop: a frozen block cannot be done by its machine.
     """
-    until_s = time.perf_counter() + deadline_s
+    began_s = time.perf_counter()
+
+    def at(share: float) -> float:
+        return began_s + share * deadline_s
+
     shop = _pinned(shop, home, frozen)
     ready = Compiled(shop)
     knots = _knots_in_order(ready, order)
-    repaired = _repair(ready, home, knots)
-    scratch = construct(ready)
-    first = [a for a in (repaired, scratch) if a is not None]
-    if not first:
+    first = [construct(ready), construct(ready, habit=Habit(knots, home, inf))]
+    found = [answer for answer in first if answer is not None]
+    if not found and (repaired := _repair(ready, home, knots, at(1.0))) is not None:
+        found.append(repaired)
+    if not found:
         return None
-    scale_s = min(a.rated.makespan_s for a in first)
-    for share in SLACKS:
-        if time.perf_counter() > until_s - 0.6 * deadline_s:
-            break
-        made = construct(ready, habit=Habit(knots, home, share * scale_s))
-        if made is not None:
-            first.append(made)
-    scale_s = min(a.rated.makespan_s for a in first)
-
-    def priced_s(a: Answer) -> float:
-        return a.rated.makespan_s + PRICE * scale_s * len(_moved(a.machine_of, home))
-
-    length_s = until_s - time.perf_counter()
-    start = min(first, key=priced_s)
-    priced = anneal(
-        ready, start, until_s - 0.35 * length_s, 0.0, seed, PRICE * scale_s, home, frozen
-    )
-    shortest = min([*first, priced], key=lambda a: a.rated.makespan_s)
-    free = anneal(ready, shortest, until_s - 0.2 * length_s, 0.0, seed + 1, frozen=frozen)
-    found = [*first, priced, free]
-    best_s = min(a.rated.makespan_s for a in found)
-    good = [a for a in found if a.rated.makespan_s <= best_s * (1 + WITHIN)]
-    chosen = min(good, key=lambda a: (len(_moved(a.machine_of, home)), a.rated.makespan_s))
-    chosen = _taken_back(ready, chosen, home, best_s * (1 + WITHIN), until_s)
+    mending = _Mending(ready, home, knots, frozen, found, seed)
+    mending.keep_to_targets(at(TARGETS_SHARE))
+    mending.repair(at(REPAIR_SHARE))
+    mending.shorten(at(SHORTEN_SHARE))
+    mending.keep_to_targets(at(MORE_TARGETS_SHARE))
+    chosen = mending.move_less(at(TAKE_BACK_SHARE), at(1.0))
     answer = timed(shop, blocks_in_order(ready, chosen), chosen.machine_of)
     assert answer is not None, "an order of knots has no deadlock"
-    return Rescheduled(answer, tuple(_moved(chosen.machine_of, home)), best_s)
+    return Rescheduled(answer, tuple(_moved(chosen.machine_of, home)), mending.best_s)
+
+
+class _Mending:
+    """Everything found so far, and ways to find more."""
+
+    def __init__(
+        self,
+        shop: Compiled,
+        home: Sequence[int],
+        knots: Sequence[int],
+        frozen: frozenset[int],
+        found: list[Answer],
+        seed: int,
+    ) -> None:
+        self.shop, self.home, self.knots, self.frozen = shop, home, knots, frozen
+        self.found, self.seed = found, seed
+        self.targeted_s = 0.0
+        """The limit that targets were last taken from."""
+        self.tails_s = [shop.tails[steps[-1]] for steps in shop.steps_of]
+
+    @property
+    def best_s(self) -> float:
+        """The shortest makespan found, whatever it moves."""
+        return min(answer.rated.makespan_s for answer in self.found)
+
+    @property
+    def limit_s(self) -> float:
+        """The longest makespan that fewer moves may lead to."""
+        return self.best_s * (1 + WITHIN)
+
+    def keep_to_targets(self, until_s: float) -> None:
+        """Everybody stays where the target can be met there. That misses it by a little, since
+        those who come later are not asked, so that shorter ones are tried, too."""
+        tried = 0
+        while tried < len(TARGETS):
+            if tried >= ALWAYS and time.perf_counter() > until_s:
+                break
+            if self.limit_s != self.targeted_s:
+                # The first time, or one of those before has come out shorter than all others.
+                self.targeted_s, tried = self.limit_s, 0
+            elif tried == 0:
+                break
+            target_s = TARGETS[tried] * self.targeted_s
+            tried += 1
+            latest_s = [target_s - tail_s for tail_s in self.tails_s]
+            made = construct(self.shop, habit=Habit(self.knots, self.home, 0.0, latest_s))
+            if made is not None:
+                self.found.append(made)
+
+    def repair(self, until_s: float) -> None:
+        """Only orphans move."""
+        made = _repair(self.shop, self.home, self.knots, until_s)
+        if made is not None:
+            self.found.append(made)
+
+    def shorten(self, until_s: float) -> None:
+        """Search for a shorter schedule, at any number of moves."""
+        shortest = min(self.found, key=lambda answer: answer.rated.makespan_s)
+        self.found.append(anneal(self.shop, shortest, until_s, 0.0, self.seed, frozen=self.frozen))
+
+    def move_less(self, take_back_until_s: float, until_s: float) -> Answer:
+        """The answer with the fewest moves within the limit, and fewer if that can be."""
+        chosen = self._chosen()
+        chosen = _taken_back(self.shop, chosen, self.home, self.limit_s, take_back_until_s)
+        self.found.append(chosen)
+        price_s = PRICE * self.best_s
+        priced = anneal(
+            self.shop, chosen, until_s, 0.0, self.seed + 1, price_s, self.home, self.frozen
+        )
+        self.found.append(priced)
+        return self._chosen()
+
+    def _chosen(self) -> Answer:
+        limit_s = self.limit_s
+        return min(
+            (answer for answer in self.found if answer.rated.makespan_s <= limit_s),
+            key=lambda a: (len(_moved(a.machine_of, self.home)), a.rated.makespan_s),
+        )
 
 
 def _pinned(shop: Shop, home: Sequence[int], frozen: frozenset[int]) -> Shop:
@@ -131,8 +202,11 @@ def _moved(machine_of: Sequence[int], home: Sequence[int]) -> list[int]:
     return [b for b, (now, was) in enumerate(zip(machine_of, home, strict=True)) if now != was]
 
 
-def _repair(shop: Compiled, home: Sequence[int], knots: list[int]) -> Answer | None:
-    """Everything stays but the orphans, the one of highest rank first."""
+def _repair(
+    shop: Compiled, home: Sequence[int], knots: Sequence[int], until_s: float
+) -> Answer | None:
+    """Everything stays but the orphans, the one of highest rank first; they go where there is least
+    to do, and while there is time, where the makespan is least."""
     blocks = shop.shop.blocks
     machine_of = list(home)
     orphans = [b for b, block in enumerate(blocks) if home[b] not in block.machines]
@@ -146,6 +220,8 @@ def _repair(shop: Compiled, home: Sequence[int], knots: list[int]) -> Answer | N
         busy[machine_of[block]] += _length_s(shop, block, machine_of[block])
     best = rate(shop, knots, machine_of)
     for block in orphans:
+        if time.perf_counter() > until_s:
+            break
         now = machine_of[block]
         for machine in sorted(blocks[block].machines, key=busy.__getitem__)[:TRIED]:
             if any(machine_of[other] == machine for other in blocks[block].apart):
@@ -159,7 +235,7 @@ def _repair(shop: Compiled, home: Sequence[int], knots: list[int]) -> Answer | N
                 best, now = found, machine
         machine_of[block] = now
     apart = any(machine_of[o] == machine_of[b] for b, row in enumerate(blocks) for o in row.apart)
-    return None if best is None or apart else Answer(knots, machine_of, best)
+    return None if best is None or apart else Answer(list(knots), machine_of, best)
 
 
 def _length_s(shop: Compiled, block: int, machine: int) -> float:

@@ -27,10 +27,10 @@ Expected = Literal["done", "refused", "given-up"]
 class MissionEntry(Entry, frozen=True):
     """One mission as it is written down.
 
-    The planner is told where every object is and what it lies on, but for those in `unknown`, and with what `wrong`
-    says of some. `lies` puts objects elsewhere: `[table or floor, x_m, y_m]`. Objects in `missing`
-    are spoken of and exist nowhere. `truth` must hold at the end, `stages` one after the other
-    on the way there. What `truth` and `stages` do not name must not have been moved.
+    The planner is told where every object is and what it lies on, but for those in `unknown`, and
+    with what `wrong` says of some. `lies` puts objects elsewhere: `[table or floor, x_m, y_m]`.
+    Objects in `missing` are spoken of and exist nowhere. `truth` must hold at the end, `stages` one
+    after the other on the way there. What `truth` and `stages` do not name must not have been moved.
     """
 
     mission: str

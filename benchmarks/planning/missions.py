@@ -30,7 +30,7 @@ class MissionEntry(Entry, frozen=True):
     The planner is told where every object is and what it lies on, but for those in `unknown`, and
     with what `wrong` says of some. `lies` puts objects elsewhere: `[table or floor, x_m, y_m]`.
     Objects in `missing` are spoken of and exist nowhere. `truth` must hold at the end, `stages` one
-    after the other on the way there. What `truth` and `stages` do not name must not have been moved.
+    after the other on the way there. What neither names must not have been moved.
     """
 
     mission: str

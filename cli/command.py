@@ -25,8 +25,9 @@ if TYPE_CHECKING:
 
     from keyexpr_schema.session import Session
 
-CONNECT_TIMEOUT_S = 2.0
-"""Less than the 3 s within which robotctl must say that there is no router."""
+CONNECT_TIMEOUT_S = 1.5
+"""With the time that Python takes to start, less than the 3 s within which robotctl must say that
+there is no router."""
 
 _OURS = ("cli", "keyexpr_schema", "fleet", "sim", "workers")
 

@@ -31,8 +31,9 @@ async def load(
     from sim.world_file import load_world
 
     told = load_world(file)
-    places, objects = told.places(), told.objects()
     async with call.session() as session:
+        # Working out the distances takes a second: only once there is somebody to tell.
+        places, objects = told.places(), told.objects()
         await put_world(session, places, objects)
     call.show(
         {"places": places, "objects": objects},

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, FactWords, command
+from cli.command import Call, FactWords, Group, command
 from cli.commands.plan_files import check, diff, propose
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from keyexpr_schema.requests import Control
     from keyexpr_schema.session import Session
 
-app = typer.Typer(rich_markup_mode=None, add_completion=False)
+app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, add_completion=False)
 replan_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 PlanArgument = Annotated[str, typer.Argument(metavar="PLAN", help="Its name.")]
 HOW_TO_PLAN = "make one with `robotctl plan create`"

@@ -179,3 +179,19 @@ def test_a_late_report_of_the_lost_robot_changes_nothing() -> None:
     before = robot_of(model)
     model.report(order, ReportState.FAILED, reason="back again")
     assert robot_of(model) == before
+
+
+@pytest.mark.parametrize("strategy", ["big-dag", "per-goal", "monolithic"])
+def test_the_only_robot_is_planned_with_again_while_its_hand_is_full(strategy: str) -> None:
+    model = FleetModel((manipulator("r1"),), cups=3)
+    model.plan(*(bring(n, "hallway") for n in (1, 2, 3)), strategy=strategy)
+    while model.state.facts["r1/holding"].value == "nothing":
+        model.succeed(order_of(model, "r1"))
+    undisturbed = model.orders()
+    model.tell(
+        events.ReplanAsked, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
+    )
+    assert model.orders() == undisturbed
+    assert book(model).plan.revision == 2
+    model.finish()
+    assert all(status.state is GoalState.REACHED for status in model.state.goal_states.values())

@@ -195,3 +195,18 @@ def test_the_only_robot_is_planned_with_again_while_its_hand_is_full(strategy: s
     assert book(model).plan.revision == 2
     model.finish()
     assert all(status.state is GoalState.REACHED for status in model.state.goal_states.values())
+
+
+def test_a_lost_robot_that_had_nothing_else_to_do_takes_its_goal_with_it() -> None:
+    model = running(robots=2, cups=2)
+    holder, other = (order.robot for order in model.orders())
+    while model.state.facts[f"{holder}/holding"].value == "nothing":
+        model.succeed(order_of(model, holder))
+    undisturbed = order_of(model, other)
+    model.lose(holder)
+    assert order_of(model, other) == undisturbed
+    states = sorted(status.state.value for status in model.state.goal_states.values())
+    assert states == ["failed", "running"]
+    model.finish()
+    assert book(model).state is PlanState.SUCCEEDED
+    assert all(record.robot == other for record in book(model).current())

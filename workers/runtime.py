@@ -27,8 +27,8 @@ from workers.recovery import (
     stopped_half_way,
 )
 from workers.reports import report_on
-from workers.rivals import no_rivals
 from workers.retry import run_attempt
+from workers.rivals import no_rivals
 from workers.skill import SkillRegistry
 from workers.worldview import WORLD_KEYS, WorldView
 

@@ -138,6 +138,9 @@ def test_a_missing_file_and_a_file_that_is_not_yaml(tmp_path: Path) -> None:
     bad.write_text("just words\n")
     with pytest.raises(BadFile, match="a world file is a list of `name: value` lines"):
         load_world(bad)
+    bad.write_text("world: home\nsize_m: [1, 1]\nplaces: {}\nsize_m: [2, 2]\n")
+    with pytest.raises(BadFile, match=r"bad\.yaml line 4: this is not YAML: 'size_m' comes twice"):
+        load_world(bad)
 
 
 def mission(tmp_path: Path, robots: str) -> Path:
@@ -215,4 +218,15 @@ def test_a_robot_that_cannot_drive_is_refused(tmp_path: Path) -> None:
         load_robot(path)
     path.write_text("robot: r\nmodel: hsr\nskills: navigate\ncapabilities: {drive: 1}\n")
     with pytest.raises(BadFile, match=r"skills: expected a list, got text"):
+        load_robot(path)
+
+
+@pytest.mark.parametrize("name", ["a/b", "r$*", "röbot", "", "x" * 64])
+def test_a_robot_with_a_name_that_can_be_no_key_is_told_the_rule(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "r.yaml"
+    path.write_text(
+        f"robot: '{name}'\nmodel: hsr\nskills: [navigate]\ncapabilities: {{drive: 1}}\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(BadFile, match=r"robot: expected a name \(1 to 63 ASCII letters, digits"):
         load_robot(path)

@@ -17,9 +17,6 @@ from sim.world_model import LARGEST_RADIUS_M, WorldFile
 PATIENCE_S = 60.0
 """Simulated time after which a robot that cannot get on gives up."""
 
-FAR_M = 3.0
-"""How far around a point that nobody can reach it is looked for the nearest free floor."""
-
 LINGER_S = 10.0
 """How long a robot that reached a stance is left alone there, since it came to do something."""
 
@@ -124,26 +121,13 @@ class Navigator:
         what = f"({point_m[0]:.2f}, {point_m[1]:.2f})"
         docks = self._spots.stances(point_m, traveller.radius_m, reach_m)
         if not docks:
-            raise NoStance(
-                f"{robot} does not get to {what}: {self._why_not(robot, point_m, reach_m)}"
-            )
+            why = self._spots.why_not(point_m, traveller.radius_m, reach_m)
+            raise NoStance(f"{robot} does not get to {what}: {why}")
         part = self._lattice.parts[traveller.frontier]
         docks = [dock for dock in docks if self._lattice.parts[dock.node] == part]
         if not docks:
             raise NoPath(f"there is no way to {what} from where {robot} stands")
         self._tasks[robot] = _Task(what, docks=tuple(docks))
-
-    def _why_not(
-        self, robot: str, point_m: tuple[float, float, float], reach_m: tuple[float, float]
-    ) -> str:
-        """How near a robot can stand to a point that it has no stance for, and how near it must."""
-        radius_m = self._robots[robot].radius_m
-        further = self._spots.stances(point_m, radius_m, (reach_m[1], FAR_M))
-        needed = f"it must stand {reach_m[0]:.2f} to {reach_m[1]:.2f} m away"
-        if not further:
-            return f"{needed}, and there is no room to stand near it"
-        nearest_m = min(math.dist(dock.point_m, point_m[:2]) for dock in further)
-        return f"{needed}, and there is room only {nearest_m:.2f} m away"
 
     def cancel(self, robot: str) -> None:
         """Forget where `robot` was going; it comes to rest within a step."""

@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from sim.errors import BadFile
+from sim.reach import out_of_reach
 from sim.world_file import CONFIGS, find_mission, load_mission, load_robot, load_world
 
 HOME = CONFIGS / "worlds" / "home.yaml"
@@ -230,3 +231,20 @@ def test_a_robot_with_a_name_that_can_be_no_key_is_told_the_rule(tmp_path: Path,
     )
     with pytest.raises(BadFile, match=r"robot: expected a name \(1 to 63 ASCII letters, digits"):
         load_robot(path)
+
+
+def test_what_lies_in_the_middle_of_a_wide_table_is_said_to_be_out_of_reach(
+    tmp_path: Path,
+) -> None:
+    path = mission(tmp_path, f"  - {{spec: {HSR}, start: {{at_m: [8.0, 3.0]}}}}\n")
+    assert out_of_reach(load_mission(path)) == ()
+    with path.open("a") as file:
+        file.write("objects: {cup_2: {on: kitchen_table, at_m: [0.3, 0.0]}}\n")
+    [sentence] = out_of_reach(load_mission(path))
+    assert sentence.startswith(
+        "cup_2 lies on kitchen_table at [0.3, 0.0], where no hand gets to: for hsr, it must stand "
+        "0.43 to 0.55 m away, and there is room only 0.6"
+    )
+    only_drives = tmp_path / "only.yaml"
+    only_drives.write_text(path.read_text().replace(str(HSR), str(HSR.with_name("locobot.yaml"))))
+    assert out_of_reach(load_mission(only_drives)) == ()

@@ -64,6 +64,7 @@ async def create(
     from cli.errors import BadArgument, check_known
     from cli.naming import request_name
     from cli.plans.files import check_suffix, write_plan
+    from keyexpr_schema.ids import check_id
     from keyexpr_schema.keyspace import GOAL_SPEC, PLANNER_STATUS
     from keyexpr_schema.requests import PlanRequest
     from keyexpr_schema.service import PlannerAddress
@@ -72,6 +73,8 @@ async def create(
         raise BadArgument("--out goes with --dry-run; see a plan that was made with `plan show`")
     if out is not None:
         check_suffix(out)
+    if name is not None:
+        check_id(name, "plan")
     async with call.session() as session:
         known = [address.goal for address in await session.list(GOAL_SPEC)]
         for goal in goals or ():
@@ -91,7 +94,7 @@ async def create(
             PlanRequest(
                 request=request_name(),
                 plan=name,
-                goals=tuple(goals or ()),
+                goals=tuple(dict.fromkeys(goals or ())),
                 strategy=strategy,
                 planner=planner,
                 allocator=allocator,

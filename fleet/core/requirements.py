@@ -16,6 +16,8 @@ class Requirement:
     roles: list[tuple[Action, str]] = field(default_factory=list)
     facts: dict[str, tuple[Value, str]] = field(default_factory=dict)
     """By relation: the value needed, and the task that needs it first."""
+    valued: dict[Variable, str] = field(default_factory=dict)
+    """Variables whose value at the start must be this robot, and the task that needs it first."""
     space: int = 0
     """Room needed in its basket, in objects."""
     pinned_to: str | None = None
@@ -45,7 +47,10 @@ def _why_not(robot: str, requirement: Requirement, world: WorldModel) -> str | N
         if has != value:
             told = "unknown" if has is None else has
             return f"{task} needs {relation}({robot}) = {value}, and it is {told}"
-    if requirement.space:
+    for variable, task in requirement.valued.items():
+        if (has := known_value(variable, world.facts, world)) != robot:
+            return f"{task} needs {variable} = {robot}, and it is {has}"
+    if requirement.space > 0:
         room = room_left(robot, world.facts, world)
         if room < requirement.space:
             return f"{robot}'s basket has room for {room} more and {requirement.space} are needed"

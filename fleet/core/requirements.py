@@ -20,6 +20,8 @@ class Requirement:
     roles: list[tuple[Action, str]] = field(default_factory=list)
     facts: dict[str, tuple[Value, str]] = field(default_factory=dict)
     """By relation: the value needed, and the task that needs it first."""
+    valued: dict[Variable, str] = field(default_factory=dict)
+    """Variables whose value at the start must be this robot, and the task that needs it first."""
     space: int = 0
     """Room needed in its basket, in objects."""
     pinned_to: str | None = None
@@ -96,7 +98,7 @@ class Candidates:
         able = self._able_to_play(requirement)
         if requirement.pinned_to is not None:
             able = [requirement.pinned_to] if requirement.pinned_to in able else []
-        if requirement.space:
+        if requirement.valued or requirement.space > 0:
             able = [robot for robot in able if self._unfit(robot, requirement) is None]
         return able
 
@@ -128,7 +130,10 @@ class Candidates:
         for action, parameter in requirement.roles:
             if reason := self._world.lacks(robot, action, parameter):
                 return reason
-        if requirement.space:
+        for variable, task in requirement.valued.items():
+            if (has := known_value(variable, self._world.facts, self._world)) != robot:
+                return f"{task} needs {variable} = {robot}, and it is {has}"
+        if requirement.space > 0:
             room = room_left(robot, self._world.facts, self._world)
             if room < requirement.space:
                 needed = f"{requirement.space} are needed"

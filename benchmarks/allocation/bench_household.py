@@ -1,4 +1,4 @@
-"""Idle time of strategies and allocators on households: the table of the RobotFleet paper, and more.
+"""Idle time of strategies and allocators on households: the RobotFleet paper's table, and more.
 
 `python -m benchmarks.allocation.bench_household` prints it. Schedules are those that the allocators
 predict; every one of them has passed the checker. `--llm-config FILE` adds the language model.

@@ -55,7 +55,9 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     partial: bool = False
     """Whether goals that cannot be reached are left out, and not the whole plan refused."""
     remaining: Plan | None = None
-    """What is left of the plan, where another allocation of it may do."""
+    """What is left of the plan, where that may do, with goals planned alone that it fails."""
+    outside: bool = False
+    """Whether nothing speaks against the plan, so that another allocation of what is left does."""
     home: dict[str, str] = {}
     """The robot of each actor until now."""
     sequence: tuple[str, ...] = ()
@@ -72,10 +74,12 @@ class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
     """A plan with everything the planner keeps about it.
 
     `records` hold the tasks of every revision; `plan` only those of the current one.
-    `replan_reason` set means: order nothing more, and plan again. If it is also `mend_reason`,
-    another allocation of what is left may do. `dropping` are tasks that are under way and no longer
-    wanted; their orders are cancelled. `team` are the robots that were there when the plan was
-    made. `late` are tasks that took far longer than predicted, and were reacted to.
+    `replan_reason` set means: order nothing more, and plan again. What is left is mended, if that
+    can be, unless it is also `anew_reason`. If it is also `outside_reason`, it says nothing against
+    the plan: robots came, went or are late, a goal was deleted. `dropping` are tasks that are under
+    way and no longer wanted; their orders are cancelled. `team` are the robots that were there when
+    the plan was made. `late` are tasks that took far longer than predicted, and were reacted to.
+    `failures` counts the tasks of each goal that failed for good.
     """
 
     plan: Plan
@@ -87,8 +91,10 @@ class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
     sequence: dict[str, tuple[str, ...]] = {}
     job: Job | None = None
     replan_reason: str | None = None
-    mend_reason: str | None = None
+    anew_reason: str | None = None
+    outside_reason: str | None = None
     late: tuple[str, ...] = ()
+    failures: dict[str, int] = {}
     amendment: Task | None = None
     """A task that someone wants added, and the request for it."""
     amendment_request: str | None = None

@@ -11,7 +11,7 @@ from fleet.core.planning import plan_again
 from fleet.core.requests import take_waiting_goals
 from fleet.core.skills import Action
 from fleet.core.state import OUTSTANDING, PlanBook, State
-from fleet.core.surprises import why_replan
+from fleet.core.surprises import new_robots, why_replan
 from fleet.core.telling import mark_goals, next_stage
 from keyexpr_schema.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.plans import PlanState
@@ -60,12 +60,14 @@ def _cancel(state: State, book: PlanBook) -> State:
 def _run(state: State, book: PlanBook, skills: Skills) -> State:
     state = _mark_reached(state, book, skills)
     book = state.plans[book.plan.plan]
-    reason = why_replan(state, book, skills)
-    if reason is not None:
+    if (reason := why_replan(state, book, skills)) is not None:
         return advance(set_book(state, replace(book, replan_reason=reason)), skills)
+    if (helpers := new_robots(state, book, skills)) is not None:
+        return advance(set_book(state, helpers), skills)
     if (late := late_task(state, book)) is not None:
         reason = f"{late.robot} is late with {late.task} ({late.skill})"
-        book = replace(book, replan_reason=reason, mend_reason=reason, late=(*book.late, late.task))
+        handled = (*book.late, late.task)
+        book = replace(book, replan_reason=reason, outside_reason=reason, late=handled)
         return advance(set_book(state, book), skills)
     if all(record.state is TaskState.SUCCEEDED for record in book.current()):
         return set_book(state, replace(book, state=PlanState.SUCCEEDED))
@@ -215,7 +217,7 @@ def _fail_tasks_of_lost_robots(state: State) -> State:
                 for name, record in book.records.items()
             }
             if records != book.records or book.replan_reason is None:
-                lost = replace(book, records=records, replan_reason=reason, mend_reason=reason)
+                lost = replace(book, records=records, replan_reason=reason, outside_reason=reason)
                 state = set_book(state, lost)
     return state
 

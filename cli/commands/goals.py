@@ -156,7 +156,7 @@ async def show(call: Call, goal: GoalArgument) -> None:
 
 @command(app, "delete")
 async def delete(call: Call, goal: GoalArgument) -> None:
-    """Take a goal back. A plan that was made for it goes on; cancel that with `plan cancel`."""
+    """Take a goal back; its plan goes on without it, and ends if it had no other goal."""
     from cli.errors import check_known
     from keyexpr_schema.goals import GoalAddress
     from keyexpr_schema.keyspace import GOAL_SPEC

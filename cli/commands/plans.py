@@ -64,10 +64,10 @@ async def create(
     from cli.errors import BadArgument, check_known
     from cli.naming import request_name
     from cli.plans.files import check_suffix, write_plan
+    from cli.telling import planner_status
     from keyexpr_schema.ids import check_id
-    from keyexpr_schema.keyspace import GOAL_SPEC, PLANNER_STATUS
+    from keyexpr_schema.keyspace import GOAL_SPEC
     from keyexpr_schema.requests import PlanRequest
-    from keyexpr_schema.service import PlannerAddress
 
     if out is not None and not dry_run:
         raise BadArgument("--out goes with --dry-run; see a plan that was made with `plan show`")
@@ -79,7 +79,7 @@ async def create(
         known = [address.goal for address in await session.list(GOAL_SPEC)]
         for goal in goals or ():
             check_known("goal", goal, known, "say one with `robotctl goal add`")
-        can = await session.get(PLANNER_STATUS, PlannerAddress())
+        can = await planner_status(session)
         if can is not None:
             # A planner that lists nothing has not said what it offers; then its answer decides.
             for what, asked, offered in (

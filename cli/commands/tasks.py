@@ -104,10 +104,10 @@ async def add(
     from cli.commands.plans import check_plan
     from cli.errors import check_known
     from cli.naming import request_name
-    from keyexpr_schema.keyspace import PLAN_SPEC, PLANNER_STATUS, ROBOT_SPEC
+    from cli.telling import planner_status
+    from keyexpr_schema.keyspace import PLAN_SPEC, ROBOT_SPEC
     from keyexpr_schema.plans import PlanAddress
     from keyexpr_schema.requests import Control, ControlRequest
-    from keyexpr_schema.service import PlannerAddress
 
     given = parse_args(args or [])
     async with call.session() as session:
@@ -118,7 +118,7 @@ async def add(
         if robot is not None:
             robots = [address.robot for address in await session.list(ROBOT_SPEC)]
             check_known("robot", robot, robots, "declare one with `robotctl register FILE`")
-        can = await session.get(PLANNER_STATUS, PlannerAddress())
+        can = await planner_status(session)
         if can is not None and can.skills:
             check_known("skill", skill, can.skills, "")
         answer = await ask_planner(

@@ -135,7 +135,8 @@ class PlannerService:
         )
 
     async def _take_charge(self) -> None:
-        status = await self._session.get(PLANNER_STATUS, PlannerAddress())
+        # Listed, not got: a value there that is none must not keep the planner from starting.
+        status = (await self._session.list(PLANNER_STATUS)).get(PlannerAddress())
         epoch = 1 + max(self._state.epoch, status.epoch if status else 0)
         self._apply(
             events.PlannerStarted(

@@ -127,7 +127,8 @@ def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
     hint = ""
     if status.state is GoalState.WAITING and not planned:
         hint = f"; plan it with `robotctl plan create big-dag makespan {spec.goal}`"
-    return f"goal {spec.goal} is {status.state.value}{meaning}{hint}"
+    note = f" ({status.note})" if status.note else ""
+    return f"goal {spec.goal} is {status.state.value}{meaning}{note}{hint}"
 
 
 @command(app, "list")

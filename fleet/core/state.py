@@ -8,6 +8,7 @@ from typing import TypeVar
 import msgspec
 
 from fleet.core.language import Vocabulary
+from fleet.core.language.vocabulary import Deed
 from fleet.core.skills import SkillModel
 from fleet.core.world_model import WorldModel
 from keyexpr_schema.durations import Durations
@@ -29,13 +30,14 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     `approval`: a person has to approve every new plan. `auto_plan`: goals that wait are planned
     without being asked for, into a running plan where there is one. `interpreter`: sentences that
     the grammar refuses go to a language model. `lost_after_s`: a robot whose worker is gone for
-    longer (wall time, s) counts as lost.
+    longer (wall time, s) counts as lost. `deeds` are skills that goals can ask for by name.
     """
 
     approval: bool = False
     auto_plan: bool = False
     interpreter: bool = False
     lost_after_s: float = 30.0
+    deeds: tuple[Deed, ...] = ()
 
 
 class Job(msgspec.Struct, frozen=True, kw_only=True):
@@ -171,7 +173,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
                 continue
             if isinstance(fact.value, str) and rooms.get(fact.value, where) == where:
                 rests[fact.subject] = fact.value
-        return Vocabulary(self.places, self.objects, self.robots, whereabouts, rests)
+        deeds = self.policy.deeds
+        return Vocabulary(self.places, self.objects, self.robots, whereabouts, rests, deeds)
 
     def world(self, skills: Mapping[str, SkillModel]) -> WorldModel:
         """The world as believed now."""

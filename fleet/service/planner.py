@@ -13,6 +13,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.deeds import deeds_of
 from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event
 from fleet.core.lateness import SAME_CLOCK_S
@@ -58,7 +59,11 @@ class PlannerService:
         self._journal = journal
         self._parts = parts
         self._interpreter = parts.llm.interpreter(parts.skills)
-        self._policy = replace(policy or Policy(), interpreter=self._interpreter.configured)
+        self._policy = replace(
+            policy or Policy(),
+            interpreter=self._interpreter.configured,
+            deeds=deeds_of(parts.skills),
+        )
         self._incarnation = uuid.uuid4().hex[:12]
         self._state = State()
         self._time_s = 0.0

@@ -123,7 +123,7 @@ def _fact(subject: str, relation: str, value: str) -> Fact:
     return Fact(subject=subject, relation=relation, value=value, source="benchmark")
 
 
-def _goals(count: int) -> tuple[Goal, ...]:
+def goals_of(count: int) -> tuple[Goal, ...]:
     return tuple(
         Goal(
             goal=f"g{i}",
@@ -147,7 +147,7 @@ def _planned(
     """Planning [s], planning and allocation [s], number of tasks, predicted makespan [s]."""
     goals, robots = size
     world = household(goals, robots, parts)
-    problem = PlanningProblem(plan="p", goals=_goals(goals), world=world, strategy=strategy)
+    problem = PlanningProblem(plan="p", goals=goals_of(goals), world=world, strategy=strategy)
     plan, planning_s = _timed(lambda: parts.planners["symbolic"].plan(problem))
     if isinstance(plan, NoPlan):
         raise SystemExit(f"{goals} goals, {robots} robots, {strategy}: no plan: {plan.reason}")

@@ -25,8 +25,9 @@ if TYPE_CHECKING:
 
     from keyexpr_schema.session import Session
 
-CONNECT_TIMEOUT_S = 2.0
-"""Less than the 3 s within which robotctl must say that there is no router."""
+CONNECT_TIMEOUT_S = 1.5
+"""With the time that Python takes to start, less than the 3 s within which robotctl must say that
+there is no router."""
 
 _OURS = ("cli", "keyexpr_schema", "fleet", "sim", "workers")
 
@@ -101,6 +102,20 @@ class Call:
 
 
 Body = Callable[..., Coroutine[Any, Any, None] | None]
+
+
+class Group(typer.core.TyperGroup):
+    """A group of commands that converts no options of its own where none are given.
+
+    typer converts option values with pydantic, those of options that were not given, too, and
+    importing it takes longer than all the rest of `robotctl COMMAND --help`.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Where a command comes first, no option of the group was given."""
+        if args and args[0] in self.commands:
+            self.params, self.add_help_option = [], False
+        return super().parse_args(ctx, args)
 
 
 class FactWords(typer.core.TyperCommand):

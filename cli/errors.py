@@ -53,7 +53,8 @@ def check_known(what: str, name: str, known: Iterable[str], how_to_add: str) -> 
     if name in names:
         return
     if not names:
-        raise Unknown(f"there is no {what} {name!r}: none is known yet; {how_to_add}")
+        how = f"; {how_to_add}" if how_to_add else ""
+        raise Unknown(f"there is no {what} {name!r}: none is known yet{how}")
     near = get_close_matches(name, names, n=1)
     hint = f" (did you mean {near[0]!r}?)" if near else ""
     raise Unknown(f"there is no {what} {name!r}{hint}; known are: {', '.join(names)}")

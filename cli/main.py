@@ -13,7 +13,7 @@ import typer
 import typer.core
 import typer.main
 
-from cli.command import GlobalFlags, JsonOption, RealmOption, RouterOption
+from cli.command import GlobalFlags, Group, JsonOption, RealmOption, RouterOption
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "status": ("cli.commands.overview:status_app", "The whole fleet on one page."),
@@ -41,7 +41,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
 """Name of each command: where its typer app is, and its line in `robotctl --help`."""
 
 
-class LazyGroup(typer.core.TyperGroup):
+class LazyGroup(Group):
     """Knows its commands by name and help line, and imports one when it is about to run."""
 
     def __init__(self, **attrs: Any) -> None:

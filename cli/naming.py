@@ -5,17 +5,20 @@ from __future__ import annotations
 import uuid
 from collections.abc import Iterable
 
+from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.ids import slug
 
 
-def free_name(text: str, taken: Iterable[str]) -> str:
+def free_name(text: str, taken: Iterable[str], kind: str) -> str:
     """A name made from the words of `text` that is not one of `taken`.
 
-    Raises:
-        InvalidId: `text` has nothing that a name could be made of.
+    Where no letter of it can stand in a name, as of Chinese, the name is `kind`.
     """
     used = set(taken)
-    base = slug(text)
+    try:
+        base = slug(text)
+    except InvalidId:
+        base = kind
     number = 1
     name = base
     while name in used:

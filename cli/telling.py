@@ -7,9 +7,10 @@ import math
 import time
 from collections.abc import Iterable
 from contextlib import suppress
+from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
-from cli.errors import BadArgument, check_known
+from cli.errors import BadArgument, Unknown, check_known
 from cli.naming import free_name
 from cli.presence import planner_alive
 from keyexpr_schema.goals import Goal, GoalAddress
@@ -19,6 +20,7 @@ from keyexpr_schema.keyspace import (
     GOAL_STATUS,
     OBJECT,
     PLACE,
+    PLANNER_STATUS,
     ROBOT_SPEC,
     ROBOT_STATE,
     SIM_CLOCK,
@@ -26,6 +28,7 @@ from keyexpr_schema.keyspace import (
     STATEMENT,
     STATEMENT_STATUS,
 )
+from keyexpr_schema.service import PlannerAddress
 from keyexpr_schema.world import (
     Fact,
     FactAddress,
@@ -40,6 +43,7 @@ from keyexpr_schema.world import (
 )
 
 if TYPE_CHECKING:
+    from keyexpr_schema.robots import RobotSpec
     from keyexpr_schema.session import Session
 
 
@@ -60,11 +64,17 @@ async def put_world(session: Session, places: Iterable[Place], objects: Iterable
 
 
 async def add_statement(session: Session, text: str, name: str | None = None) -> Statement:
-    """Store a sentence, confirmed, under `name` or one made from its words."""
+    """Store a sentence, confirmed, under `name` or one made from its words.
+
+    Raises:
+        BadArgument: it has no words.
+    """
+    if not text.strip():
+        raise BadArgument("say something, such as “The first cup is in the kitchen.”")
     if name is None:
         stored = await session.list(STATEMENT)
         same = [a.statement for a, said in stored.items() if said.text == text]
-        name = same[0] if same else free_name(text, (a.statement for a in stored))
+        name = same[0] if same else free_name(text, (a.statement for a in stored), "statement")
     said = Statement(statement=name, text=text)
     await session.confirm(STATEMENT, StatementAddress(name), said)
     return said
@@ -84,6 +94,27 @@ async def statement_read(session: Session, statement: str) -> StatementStatus | 
                     status: StatementStatus = change.value
                     return status
     return None
+
+
+async def check_skills(session: Session, specs: Iterable[RobotSpec]) -> None:
+    """Do nothing if the planner has a model of each skill, or if no planner ever ran here.
+
+    Raises:
+        Unknown: it lacks one, so that no plan could ever ask a robot for it.
+    """
+    planner = await session.get(PLANNER_STATUS, PlannerAddress())
+    if planner is None or not planner.skills:
+        return
+    for spec in specs:
+        for skill in spec.skills:
+            if skill not in planner.skills:
+                near = get_close_matches(skill, planner.skills, n=1)
+                hint = f" (did you mean {near[0]!r}?)" if near else ""
+                raise Unknown(
+                    f"robot {spec.robot!r}: the planner knows no skill {skill!r}{hint}; it knows "
+                    f"{', '.join(sorted(planner.skills))}; "
+                    "teach it more with `robotctl planner --skills FILE`"
+                )
 
 
 async def add_fact(session: Session, relation: str, subject: str, written: str) -> Fact:
@@ -161,8 +192,10 @@ async def put_goal(
     """Store a goal, confirmed, after all that were given before it; due `within_s` from now [s].
 
     Raises:
-        BadArgument: a goal of that name exists and says something else.
+        BadArgument: it has no words, or there is a goal of that name.
     """
+    if not text.strip():
+        raise BadArgument("say what you want, such as “Bring the first cup to the hallway.”")
     stored = {address.goal: spec for address, spec in (await session.list(GOAL_SPEC)).items()}
     ended = [address.goal for address in await session.list(GOAL_STATUS)]
     if name in stored:
@@ -170,7 +203,7 @@ async def put_goal(
             f"there is a goal {name!r} already: “{stored[name].text}”; use another --id"
         )
     spec = Goal(
-        goal=name or free_name(text, [*stored, *ended]),
+        goal=name if name is not None else free_name(text, [*stored, *ended], "goal"),
         text=text,
         priority=priority,
         due_s=None if within_s is None else await fleet_time_s(session) + within_s,

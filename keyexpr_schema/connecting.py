@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import threading
 from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -17,6 +18,11 @@ import zenoh
 from keyexpr_schema.errors import Unreachable
 from keyexpr_schema.link import Link
 from keyexpr_schema.wire import zenoh_config
+
+_log = logging.getLogger(__name__)
+
+WAITING_LINE_S = 1.0
+"""Who waits for a router for ever says so after this long."""
 
 OPEN_ATTEMPT_MS = 500
 """Zenoh's own retry inside `open` cannot be interrupted, so it gets short attempts."""
@@ -58,6 +64,7 @@ async def _connect(
     loop = asyncio.get_running_loop()
     started_s = loop.time()
     pause_s = 0.1
+    told = timeout_s is not None
     while True:
         left_s = None if timeout_s is None else timeout_s - (loop.time() - started_s)
         attempt_ms = OPEN_ATTEMPT_MS if left_s is None else min(OPEN_ATTEMPT_MS, left_s * 1000)
@@ -86,6 +93,9 @@ async def _connect(
         except asyncio.CancelledError:
             opening.abandon()
             raise
+        if not told and loop.time() - started_s >= WAITING_LINE_S:
+            _log.warning("no router answers at %s; waiting for one", ", ".join(endpoints))
+            told = True
         await asyncio.sleep(pause_s)
         pause_s = min(0.5, pause_s * 2)
 

@@ -76,7 +76,9 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     """What the planner says of a goal. `reason` is a sentence where it failed or was rejected.
 
     A goal that says "first …, then …" has several `stages`, reached one after the other;
-    `conditions` are those of the stage that it is at, `stage` counts from 0.
+    `conditions` are those of the stage that it is at, `stage` counts from 0. `note` is a sentence
+    about words of the goal that are no part of what must hold: remarks that ask for nothing, and
+    what it takes for granted against what is believed.
     """
 
     goal: Id
@@ -86,4 +88,5 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     stage: int = 0
     plan: Id | None = None
     reason: str | None = None
+    note: str | None = None
     time_s: float = 0.0

@@ -9,6 +9,7 @@ import msgspec
 
 from keyexpr_schema.errors import InvalidId
 
+ID_RULE = "1 to 63 ASCII letters, digits, '_', '.' or '-', starting with a letter or a digit"
 ID_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,62}$"
 _ID = re.compile(ID_PATTERN, re.ASCII)
 
@@ -30,10 +31,7 @@ def check_id(value: str, what: str = "name") -> str:
         InvalidId: it is not; the message says what would be.
     """
     if not _ID.fullmatch(value):
-        raise InvalidId(
-            f"{what} {value!r} is not valid: use 1 to 63 ASCII letters, digits, '_', '.' or '-', "
-            "starting with a letter or a digit"
-        )
+        raise InvalidId(f"{what} {value!r} is not valid: use {ID_RULE}")
     return value
 
 

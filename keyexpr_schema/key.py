@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 import msgspec
 
 from keyexpr_schema.errors import ForeignKey, InvalidId, UndecodablePayload
-from keyexpr_schema.ids import check_id
+from keyexpr_schema.ids import ID_PATTERN, ID_RULE, check_id
 
 SCHEMA_PREFIX = "robotfleet"
 
@@ -138,8 +138,21 @@ class Key(Generic[A, P]):
             ) from None
 
     def encode(self, payload: P) -> bytes:
-        """JSON bytes of `payload`."""
+        """JSON bytes of `payload`; that they decode is for the caller to see to, or `check`."""
         return msgspec.json.encode(payload)
+
+    def check(self, payload: P, address: A) -> bytes:
+        """JSON bytes of `payload` that every reader can decode.
+
+        A struct takes any value when it is made: without this a wrong one would be found out only
+        by its readers, and whoever waits for them would wait in vain.
+
+        Raises:
+            UndecodablePayload: a field has a value that its type does not allow.
+        """
+        data = self.encode(payload)
+        self.decode(data, self.build(address))
+        return data
 
     def decode(self, data: bytes, keyexpr: str | None = None) -> P:
         """The payload in `data`.
@@ -160,5 +173,10 @@ def decode_payload(kind: type[P], data: bytes, where: str) -> P:
         return msgspec.json.decode(data, type=kind)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise UndecodablePayload(
-            f"the value at {where} is not a {kind.__name__}: {error}"
+            f"the value at {where} is not a {kind.__name__}: {plainly(error)}"
         ) from None
+
+
+def plainly(error: Exception) -> str:
+    """The text of a decoding error, with the rule for names in words and not as a pattern."""
+    return str(error).replace(f"`str` matching regex {ID_PATTERN!r}", f"a name ({ID_RULE})")

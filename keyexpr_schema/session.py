@@ -132,8 +132,9 @@ class Session:
 
         Raises:
             Unconfirmed: it was not read back within `timeout_s`; it may still arrive.
+            UndecodablePayload: no reader could read it, so it is not put at all.
         """
-        await self._confirm(key, address, key.encode(payload), timeout_s)
+        await self._confirm(key, address, key.check(payload, address), timeout_s)
 
     async def delete(self, key: Key[A, P], address: A, timeout_s: float = 10.0) -> None:
         """Delete, and return when the store has no value of this key, or a newer one.

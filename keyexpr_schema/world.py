@@ -105,7 +105,9 @@ class Place(Payload, frozen=True, kw_only=True):
 class Object(Payload, frozen=True, kw_only=True):
     """A thing that can be spoken about. `ordinal` counts within a kind: cup 1 is the first cup.
 
-    `home` is the place where it belongs, for those who tidy up.
+    `categories` are nouns for more than its kind ("dish"), `uses` verbs for what it is good for
+    ("drink": it is "something to drink"). `home` is the place where it belongs, for those who tidy
+    up.
     """
 
     object: Id
@@ -116,3 +118,5 @@ class Object(Payload, frozen=True, kw_only=True):
     mass_kg: float = 0.0
     movable: bool = True
     home: Id | None = None
+    categories: tuple[str, ...] = ()
+    uses: tuple[str, ...] = ()

@@ -62,7 +62,10 @@ class FurnitureEntry(Entry, frozen=True):
 
 
 class ObjectKind(Entry, frozen=True):
-    """What objects of one kind look like; a box has `size_m`, the others a radius."""
+    """What objects of one kind look like; a box has `size_m`, the others a radius.
+
+    `categories` and `uses` are words for them: a bottle is a `drink`, and something to `drink`.
+    """
 
     shape: Literal["cylinder", "box", "sphere"]
     mass_kg: Positive
@@ -70,6 +73,8 @@ class ObjectKind(Entry, frozen=True):
     height_m: Positive | None = None
     size_m: tuple[Positive, Positive, Positive] | None = None
     rgba: Rgba = (0.6, 0.6, 0.6, 1.0)
+    categories: tuple[str, ...] = ()
+    uses: tuple[str, ...] = ()
 
     @property
     def extent_m(self) -> tuple[float, float, float]:
@@ -191,6 +196,7 @@ class WorldFile(Entry, frozen=True):
         counts: dict[str, int] = {}
         found = []
         for name, entry in self.object_entries.items():
+            kind = self.object_kinds[entry.kind]
             counts[entry.kind] = counts.get(entry.kind, 0) + 1
             found.append(
                 Object(
@@ -199,8 +205,10 @@ class WorldFile(Entry, frozen=True):
                     label=entry.label or name.replace("_", " "),
                     ordinal=counts[entry.kind],
                     aliases=entry.aliases,
-                    mass_kg=self.object_kinds[entry.kind].mass_kg,
+                    mass_kg=kind.mass_kg,
                     home=entry.home,
+                    categories=kind.categories,
+                    uses=kind.uses,
                 )
             )
         return tuple(found)

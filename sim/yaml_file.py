@@ -9,6 +9,7 @@ from typing import Any, TypeVar, get_args, get_origin
 
 import msgspec
 
+from keyexpr_schema.key import plainly
 from sim.errors import BadFile
 
 S = TypeVar("S", bound=msgspec.Struct)
@@ -33,6 +34,19 @@ def read_yaml(path: Path, kind: type[S], what: str) -> S:
             first: [(tag, rule) for tag, rule in rules if tag != "tag:yaml.org,2002:bool"]
             for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
         }
+
+        def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+            """YAML forbids a name that comes twice; PyYAML forgets the first without a word."""
+            seen: set[str] = set()
+            for name, _ in node.value:
+                if not isinstance(name, yaml.ScalarNode):
+                    continue
+                if name.value in seen:
+                    raise yaml.constructor.ConstructorError(
+                        None, None, f"{name.value!r} comes twice", name.start_mark
+                    )
+                seen.add(str(name.value))
+            return super().construct_mapping(node, deep)
 
     Loader.add_implicit_resolver(
         "tag:yaml.org,2002:bool", re.compile(r"^(?:true|True|false|False)$"), list("tTfF")
@@ -85,7 +99,7 @@ def _sentence(
                 break
         if place:
             break
-    message, _, below = str(error).partition(" - at `$")
+    message, _, below = plainly(error).partition(" - at `$")
     where = (place + below.rstrip("`")).lstrip(".")
     message = message[0].lower() + message[1:]
     for spoken, plain in _WORDS:

@@ -10,9 +10,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from fleet.service.router_process import with_port
 from keyexpr_schema.session import SessionConfig
+
+settings.register_profile("robotfleet", deadline=None)  # no timing decides a test
+settings.load_profile("robotfleet")
 
 
 class RouterProcess:

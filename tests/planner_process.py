@@ -142,26 +142,27 @@ async def next_order(session: Session, done: set[str]) -> Order:
     return order
 
 
-async def carry_out(session: Session, order: Order) -> None:
-    """Report an order as done, with the facts that follow."""
+async def carry_out(session: Session, order: Order, took_s: float | None = None) -> None:
+    """Report an order as done, with the facts that follow, and perhaps how long it took."""
     facts = tuple(
-        fact(literal.variable.subject, literal.variable.relation, str(literal.value), "hsr")
+        fact(literal.variable.subject, literal.variable.relation, str(literal.value), order.robot)
         for literal in SKILLS[order.skill].ground(order.args).after
     )
     report = Report(
-        robot="hsr", plan=order.plan, revision=order.revision, task=order.task,
+        robot=order.robot, plan=order.plan, revision=order.revision, task=order.task,
         attempt=order.attempt, epoch=order.epoch, incarnation="i1",
         state=ReportState.SUCCEEDED, facts=facts,
+        started_s=None if took_s is None else 100.0, ended_s=100.0 + (took_s or 0.0),
     )  # fmt: skip
     await session.confirm(
-        REPORT, ReportAddress("hsr", order.plan, order.task, order.attempt), report
+        REPORT, ReportAddress(order.robot, order.plan, order.task, order.attempt), report
     )
 
 
-async def finish(session: Session, done: set[str]) -> None:
+async def finish(session: Session, done: set[str], took_s: float | None = None) -> None:
     while len(done) < 4:
         order = await next_order(session, done)
         done.add(order.task)
-        await carry_out(session, order)
+        await carry_out(session, order, took_s)
     await value(session, PLAN_STATUS, PlanAddress("p"), state=PlanState.SUCCEEDED)
     await value(session, GOAL_STATUS, GoalAddress("g"), state=GoalState.REACHED)

@@ -104,7 +104,7 @@ class SkillContext:
         return outcome
 
     async def look(self) -> tuple[Detection, ...]:
-        """Look around. What is seen elsewhere than the facts say is learned.
+        """Look around. What is seen elsewhere than the facts say, or on something else, is learned.
 
         Raises:
             SkillFailed: the camera gave nothing.
@@ -114,6 +114,11 @@ class SkillContext:
             where = self.world.whereabouts(detection)
             if where is not None and self._believed(detection.object) != where:
                 self.learn("at", detection.object, where)
+            # In a basket it is at the robot, which says all; `on` is of furniture and the floor.
+            if where in self.world.places and self._believed(detection.object, "on") != (
+                detection.support
+            ):
+                self.learn("on", detection.object, detection.support)
         return seen
 
     async def holding(self) -> str | None:
@@ -140,6 +145,6 @@ class SkillContext:
         self.learn("at", self.robot, place)
         return senses
 
-    def _believed(self, object: str) -> Value:
-        fact = self._learned.get(FactAddress(object, "at"))
-        return fact.value if fact is not None else self.world.belief("at", object)
+    def _believed(self, object: str, relation: str = "at") -> Value:
+        fact = self._learned.get(FactAddress(object, relation))
+        return fact.value if fact is not None else self.world.belief(relation, object)

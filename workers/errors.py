@@ -48,5 +48,9 @@ class JournalBusy(WorkerError):
     """Another process has the journal open: two workers for one robot must not be."""
 
 
+class RobotTaken(WorkerError):
+    """Another worker, with another journal, drives the robot: two would do each order twice."""
+
+
 class JournalUnreadable(WorkerError):
     """The journal's file is not a journal that this version can read."""

@@ -28,6 +28,7 @@ from workers.recovery import (
 )
 from workers.reports import report_on
 from workers.retry import run_attempt
+from workers.rivals import no_rivals
 from workers.skill import SkillRegistry
 from workers.worldview import WORLD_KEYS, WorldView
 
@@ -70,10 +71,14 @@ class Worker:
 
         A cancelled worker brings the robot to rest and reports the attempt that ran as
         interrupted.
+
+        Raises:
+            RobotTaken: another worker of this robot is connected.
         """
         robot = self.spec.robot
         watched = self._session.watch(*WORLD_KEYS, (ORDER, {"robot": robot}))
         alive = self._session.token(ROBOT_ALIVE, AliveAddress(robot, self.incarnation))
+        await no_rivals(self._session, robot)
         sending = asyncio.create_task(self._outbox.run())
         try:
             async with watched as watch, alive:

@@ -202,6 +202,8 @@ class FleetRun:
     def _tell_beliefs(self) -> None:
         for thing, place in self.mission.told().items():
             self._learn(Fact(subject=thing, relation="at", value=place, source="person"))
+        for thing, surface in self.mission.told_on().items():
+            self._learn(Fact(subject=thing, relation="on", value=surface, source="person"))
         for number, text in enumerate(self.mission.entry.statements, 1):
             self._tell(
                 events.StatementTold, statement=Statement(statement=f"said_{number}", text=text)

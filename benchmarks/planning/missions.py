@@ -27,10 +27,10 @@ Expected = Literal["done", "refused", "given-up"]
 class MissionEntry(Entry, frozen=True):
     """One mission as it is written down.
 
-    The planner is told where every object is, but for those in `unknown`, and with what `wrong`
-    says of some. `lies` puts objects elsewhere: `[table or floor, x_m, y_m]`. Objects in `missing`
-    are spoken of and exist nowhere. `truth` must hold at the end, `stages` one after the other
-    on the way there. What `truth` and `stages` do not name must not have been moved.
+    The planner is told where every object is and what it lies on, but for those in `unknown`, and
+    with what `wrong` says of some. `lies` puts objects elsewhere: `[table or floor, x_m, y_m]`.
+    Objects in `missing` are spoken of and exist nowhere. `truth` must hold at the end, `stages` one
+    after the other on the way there. What neither names must not have been moved.
     """
 
     mission: str
@@ -102,6 +102,14 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True):
             if thing not in self.entry.unknown and thing not in self.entry.missing
         }
         return {thing: place for thing, place in known.items() if place is not None}
+
+    def told_on(self) -> dict[str, str]:
+        """What the planner is told that those lie on of which it is told rightly where they are."""
+        return {
+            thing: self.world.object_entries[thing].on
+            for thing, place in self.told().items()
+            if place == self.start_of(thing)
+        }
 
 
 def load_missions(only: str | None = None) -> tuple[Mission, ...]:

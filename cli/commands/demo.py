@@ -50,14 +50,18 @@ async def demo(
     from cli.demo.mission_run import DemoOptions
     from cli.errors import check_known
     from cli.show.live import Ticker
+    from sim.reach import out_of_reach
     from sim.world_file import load_mission
 
     check_known("backend", backend, BACKENDS, "")
     parse_speed(speed)
-    name = load_mission(mission).mission
+    loaded = load_mission(mission)
+    if backend == "mujoco":
+        for sentence in out_of_reach(loaded):
+            call.warn(f"note: {sentence}")
     options = DemoOptions(
         mission=mission,
-        out=out or _new_folder(name),
+        out=out or _new_folder(loaded.mission),
         backend=backend,
         speed=speed,
         view=view,

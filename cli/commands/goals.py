@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, command
+from cli.command import Call, Group, command
 
 if TYPE_CHECKING:
     from keyexpr_schema.goals import Goal, GoalStatus
@@ -17,7 +17,7 @@ UNDERSTANDING_S = 10.0
 READING_S = 180.0
 """How long a language model may take to read a sentence that the grammar refuses."""
 
-app = typer.Typer(rich_markup_mode=None, add_completion=False)
+app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, add_completion=False)
 GoalArgument = Annotated[str, typer.Argument(metavar="GOAL", help="Its name.")]
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, FactWords, command
+from cli.command import Call, FactWords, Group, command
 from cli.commands.plan_files import check, diff, propose
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from keyexpr_schema.requests import Control
     from keyexpr_schema.session import Session
 
-app = typer.Typer(rich_markup_mode=None, add_completion=False)
+app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, add_completion=False)
 replan_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 PlanArgument = Annotated[str, typer.Argument(metavar="PLAN", help="Its name.")]
 HOW_TO_PLAN = "make one with `robotctl plan create`"
@@ -70,6 +70,7 @@ async def create(
     from cli.errors import BadArgument, check_known
     from cli.naming import request_name
     from cli.plans.files import check_suffix, write_plan
+    from keyexpr_schema.ids import check_id
     from keyexpr_schema.keyspace import GOAL_SPEC, PLANNER_STATUS
     from keyexpr_schema.requests import PlanRequest
     from keyexpr_schema.service import PlannerAddress
@@ -81,6 +82,8 @@ async def create(
         raise BadArgument("--out goes with --dry-run; see a plan that was made with `plan show`")
     if out is not None:
         check_suffix(out)
+    if name is not None:
+        check_id(name, "plan")
     async with call.session() as session:
         known = [address.goal for address in await session.list(GOAL_SPEC)]
         for goal in goals or ():
@@ -100,7 +103,7 @@ async def create(
             PlanRequest(
                 request=request_name(),
                 plan=name,
-                goals=tuple(goals or ()),
+                goals=tuple(dict.fromkeys(goals or ())),
                 strategy=strategy,
                 planner=planner,
                 allocator=allocator,

@@ -22,17 +22,21 @@ async def register(
     ],
 ) -> None:
     """Declare robots from YAML files; declaring one again replaces what was said of it."""
+    from cli.telling import check_skills
     from keyexpr_schema.keyspace import ROBOT_SPEC
     from keyexpr_schema.robots import RobotAddress
     from sim.world_file import load_robot
 
     specs = [load_robot(file) for file in files]
     async with call.session() as session:
+        await check_skills(session, specs)
         for spec in specs:
             await session.confirm(ROBOT_SPEC, RobotAddress(spec.robot), spec)
     call.show(
         specs,
-        lambda: "\n".join(f"registered {s.robot}, which can {', '.join(s.skills)}" for s in specs),
+        lambda: "\n".join(
+            f"registered {s.robot}, which can {', '.join(s.skills) or 'do nothing'}" for s in specs
+        ),
     )
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, command
+from cli.command import Call, Group, command
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from keyexpr_schema.session import Session
     from keyexpr_schema.world import Value
 
-app = typer.Typer(rich_markup_mode=None, add_completion=False)
+app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, add_completion=False)
 
 
 @app.callback()
@@ -31,8 +31,9 @@ async def load(
     from sim.world_file import load_world
 
     told = load_world(file)
-    places, objects = told.places(), told.objects()
     async with call.session() as session:
+        # Working out the distances takes a second: only once there is somebody to tell.
+        places, objects = told.places(), told.objects()
         await put_world(session, places, objects)
     call.show(
         {"places": places, "objects": objects},

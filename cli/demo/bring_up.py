@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from cli.board import Board
 from cli.demo.fleet import Fleet
 from cli.errors import TooLate
-from cli.telling import put_world
+from cli.telling import check_skills, put_world
 from keyexpr_schema.errors import NoAnswer, Unreachable
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import PLANNER_ALIVE, ROBOT_ALIVE, ROBOT_SPEC, STORE_JOURNAL
@@ -107,6 +107,7 @@ async def bring_up(fleet: Fleet, session: Session, board: Board, mission: Missio
         ),
         _recording(fleet),
     )
+    await check_skills(session, (robot.spec for robot in mission.robots))
 
 
 def _can_be_planned(board: Board, robot: str) -> bool:

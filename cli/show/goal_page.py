@@ -30,6 +30,8 @@ def goal_page(row: GoalRow) -> Group:
         lines.append(Text(f"{head}{' and '.join(str(each) for each in stage)}{now}"))
     if status.plan:
         lines.append(Text(f"plan        {status.plan}"))
+    if status.note:
+        lines.append(Text(f"note        {status.note}"))
     if status.reason:
         lines.append(Text(f"reason      {status.reason}", "red"))
     lines.append(Text(f"since       {seconds(status.time_s)} on the fleet's clock"))

@@ -58,8 +58,14 @@ def _planner(planner: PlannerStatus | None, planning: bool) -> str:
         return "not running (start one with `robotctl planner`)"
     if planner is None:
         return "running"
-    offers = ", ".join([*planner.planners, *planner.strategies, *planner.allocators])
-    return f"running, epoch {planner.epoch}" + (f": {offers}" if offers else "")
+    offers = (
+        ("strategies", planner.strategies),
+        ("planners", planner.planners),
+        ("allocators", planner.allocators),
+        ("skills", planner.skills),
+    )
+    said = [f"  {what:<11}{', '.join(names)}" for what, names in offers if names]
+    return "\n".join([f"running, epoch {planner.epoch}", *said])
 
 
 def journal_table(journal: StoreJournal) -> Table:

@@ -137,10 +137,16 @@ def _plan_documents(
     )
     old_records = before.records if before else {}
     new_records = after.records if after else {}
+    # Of a thousand records one has changed: the others are the very same objects.
+    touched = [
+        task
+        for task in {**old_records, **new_records}
+        if old_records.get(task) is not new_records.get(task)
+    ]
     yield from _difference(
         TASK_RECORD,
-        {TaskAddress(plan, task): record for task, record in old_records.items()},
-        {TaskAddress(plan, task): record for task, record in new_records.items()},
+        {TaskAddress(plan, task): old_records[task] for task in touched if task in old_records},
+        {TaskAddress(plan, task): new_records[task] for task in touched if task in new_records},
     )
     yield from _difference(ORDER, _orders(before, old_epoch), _orders(after, epoch))
 

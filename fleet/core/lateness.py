@@ -15,7 +15,7 @@ SAME_CLOCK_S = 86400.0
 
 def late_at_s(record: TaskRecord) -> float | None:
     """When a task that runs counts as late, on the fleet's clock, s."""
-    if record.state is not TaskState.RUNNING or record.started_s is None:
+    if record.started_s is None:
         return None
     return record.started_s + FACTOR * record.duration_s + MARGIN_S
 
@@ -56,9 +56,8 @@ def behind_s(state: State, robot: str) -> float:
 
 
 def _that_matter(book: PlanBook) -> list[TaskRecord]:
-    waiting = {record.robot for record in book.current() if record.state is TaskState.WAITING}
-    return [
-        record
-        for record in book.current()
-        if record.task not in book.late and record.robot in waiting
-    ]
+    """Tasks that run and were not reacted to, of robots that have more to do."""
+    current = list(book.current())
+    running = [r for r in current if r.state is TaskState.RUNNING and r.task not in book.late]
+    waiting = {r.robot for r in current if r.state is TaskState.WAITING} if running else set()
+    return [record for record in running if record.robot in waiting]

@@ -98,7 +98,12 @@ class PlanFlow:
             facts.setdefault(variable.relation, (literal.value, task))
             return
         has = known_value(variable, self._world.facts, self._world)
-        if has != literal.value:
+        wanted = literal.value
+        an_actor = isinstance(wanted, str) and wanted.startswith(ACTOR_PREFIX)
+        if an_actor and has in self._world.robots:
+            # Who has it must be the actor: something is taken out of a basket, or back.
+            self.requirements[str(wanted)].valued.setdefault(variable, task)
+        elif has != wanted:
             told = "that is not known" if has is None else f"it is {has}"
             self._unmet(
                 "condition-unmet", task, literal, f"{task} needs {literal}, and at the start {told}"
@@ -152,7 +157,8 @@ class PlanFlow:
                 initial += 1
         if carrier.startswith(ACTOR_PREFIX):
             requirement = self.requirements[carrier]
-            requirement.space = max(requirement.space, planned + 1)
+            freed = sum(self._leaves(variable, task) for variable in requirement.valued)
+            requirement.space = max(requirement.space, planned + 1 - freed)
         elif initial + planned + 1 > capacity(carrier, self._world):
             self.violations.append(
                 Violation(
@@ -163,9 +169,22 @@ class PlanFlow:
                 )
             )
 
+    def _leaves(self, variable: Variable, task: str) -> bool:
+        """Whether what an actor has in its basket at the start is out of it before the task."""
+        if variable.relation != "at":
+            return False
+        holder = self._world.value("at", variable.subject)
+        in_hand = self._world.value("holding", str(holder)) == variable.subject
+        rows = self._positions.get(variable.subject, ())
+        return not in_hand and any(self._graph.precedes(writer, task) for writer, _ in rows)
+
     def _final_facts(self) -> dict[Variable, Value]:
         """Every variable at the end; unknown where the order of its last writers is open."""
         final: dict[Variable, Value] = dict(self._world.facts)
+        # What is required of an actor at the start holds of the robot that will be it.
+        for actor, requirement in self.requirements.items():
+            for relation, (value, _) in requirement.facts.items():
+                final[Variable(relation, actor)] = value
         for variable, rows in self._writers.items():
             final[variable] = _agreed(
                 [

@@ -107,6 +107,7 @@ def _as_it_was(book: PlanBook, job: Job, event: events.PlanMade) -> bool:
     """Whether another allocation of what is left has turned out to be the one there is."""
     return (
         event.mended
+        and not event.left_out
         and event.allocation.items() <= job.home.items()
         and not any(r.state in (TaskState.FAILED, TaskState.CANCELLED) for r in book.current())
     )

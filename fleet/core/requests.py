@@ -130,7 +130,8 @@ def replan_asked(state: State, event: events.ReplanAsked) -> State:
     if ask.goals and (reason := _why_not_plan(state, None, ask.goals)):
         return answer(state, ask.request, False, reason)
     goals = tuple(dict.fromkeys([*book.plan.goals, *ask.goals]))
-    book = replace(book, plan=replace(book.plan, goals=goals), replan_reason=ask.reason)
+    # What a person asks for is no sign that the world does not go along: counting begins anew.
+    book = replace(book, plan=replace(book.plan, goals=goals), replan_reason=ask.reason, replans=0)
     state = set_book(state, book)
     return answer(state, ask.request, True, f"plan {ask.plan} is made again", ask.plan)
 

@@ -20,6 +20,8 @@ class Requirement:
     roles: list[tuple[Action, str]] = field(default_factory=list)
     facts: dict[str, tuple[Value, str]] = field(default_factory=dict)
     """By relation: the value needed, and the task that needs it first."""
+    valued: dict[Variable, str] = field(default_factory=dict)
+    """Variables whose value at the start must be this robot, and the task that needs it first."""
     space: int = 0
     """Room needed in its basket, in objects."""
     pinned_to: str | None = None
@@ -30,8 +32,9 @@ class Candidates:
 
     A robot can be an actor if it can play its roles, and if what the actor needs of it holds now or
     is left so by another actor that the robot can be first: a robot with a full hand can pick once
-    it has put down what it carries. Whether the robot really becomes that other actor, the check of
-    the allocated plan has to say.
+    it has put down what it carries. That goes for states such as an empty hand, not for things and
+    places: what one actor picked, another one cannot count on holding. Whether the robot really
+    becomes that other actor, the check of the allocated plan has to say.
     """
 
     def __init__(
@@ -42,11 +45,12 @@ class Candidates:
     ) -> None:
         """`leaves` has for every actor the facts that it leaves of its robot."""
         self._requirements, self._world = requirements, world
-        self._playable: dict[tuple[object, ...], str | None] = {}
-        self._kinds = {
-            robot: (world.robots[robot].skills, tuple(world.robots[robot].capabilities.items()))
-            for robot in world.team
-        }
+        alike: dict[object, list[str]] = {}
+        for robot in world.team:
+            spec = world.robots[robot]
+            alike.setdefault((spec.skills, tuple(spec.capabilities.items())), []).append(robot)
+        self._kinds = list(alike.values())
+        self._playable: dict[tuple[object, ...], list[str]] = {}
         fitting = {actor: self._fitting(each) for actor, each in requirements.items()}
         unmet = {
             actor: {robot: list(self._unmet(robot, requirements[actor])) for robot in robots}
@@ -56,7 +60,11 @@ class Candidates:
         for actor, rows in unmet.items():
             for robot, missing in rows.items():
                 if not missing:
-                    offered[robot] |= leaves.get(actor, frozenset())
+                    offered[robot] |= {
+                        (relation, value)
+                        for relation, value in leaves.get(actor, frozenset())
+                        if not isinstance(value, str) or world.kind_of(value) is None
+                    }
         self.able: dict[str, tuple[str, ...]] = {
             actor: tuple(
                 robot
@@ -86,34 +94,51 @@ class Candidates:
                 break
 
     def _fitting(self, requirement: Requirement) -> list[str]:
-        return [r for r in self._world.team if self._unfit(r, requirement) is None]
+        """Robots that could be the actor, if all else were as it needs it."""
+        able = self._able_to_play(requirement)
+        if requirement.pinned_to is not None:
+            able = [requirement.pinned_to] if requirement.pinned_to in able else []
+        if requirement.valued or requirement.space > 0:
+            able = [robot for robot in able if self._unfit(robot, requirement) is None]
+        return able
+
+    def _able_to_play(self, requirement: Requirement) -> list[str]:
+        """Asked once of robots that are alike, for roles that ask the same of them."""
+        key = tuple(self._asks(action, parameter) for action, parameter in requirement.roles)
+        if key not in self._playable:
+            able = {
+                robot
+                for kind in self._kinds
+                if not any(self._world.lacks(kind[0], *role) for role in requirement.roles)
+                for robot in kind
+            }
+            self._playable[key] = [robot for robot in self._world.team if robot in able]
+        return self._playable[key]
+
+    def _asks(self, action: Action, parameter: str) -> tuple[object, ...]:
+        measured = (
+            self._world.measure(need.measure, action.args[need.of])
+            for need in action.skill.needs.get(parameter, ())
+            if need.measure is not None and need.of is not None
+        )
+        return action.skill.name, parameter, *measured
 
     def _unfit(self, robot: str, requirement: Requirement) -> str | None:
         """Why the robot could not be the actor whatever had happened before."""
         if requirement.pinned_to not in (None, robot):
             return f"the plan wants {requirement.pinned_to} and not {robot}"
         for action, parameter in requirement.roles:
-            if self._lacks(robot, action, parameter):
-                return self._world.lacks(robot, action, parameter)
-        if requirement.space:
+            if reason := self._world.lacks(robot, action, parameter):
+                return reason
+        for variable, task in requirement.valued.items():
+            if (has := known_value(variable, self._world.facts, self._world)) != robot:
+                return f"{task} needs {variable} = {robot}, and it is {has}"
+        if requirement.space > 0:
             room = room_left(robot, self._world.facts, self._world)
             if room < requirement.space:
                 needed = f"{requirement.space} are needed"
                 return f"{robot}'s basket has room for {room} more and {needed}"
         return None
-
-    def _lacks(self, robot: str, action: Action, parameter: str) -> bool:
-        """Asked once for robots that are alike and things that measure the same."""
-        needs = action.skill.needs.get(parameter, ())
-        measured = tuple(
-            self._world.measure(need.measure, action.args[need.of])
-            for need in needs
-            if need.measure is not None and need.of is not None
-        )
-        key = (self._kinds[robot], action.skill.name, parameter, measured)
-        if key not in self._playable:
-            self._playable[key] = self._world.lacks(robot, action, parameter)
-        return self._playable[key] is not None
 
     def _unmet(self, robot: str, requirement: Requirement) -> Iterator[str]:
         """Relations that do not hold of the robot now as the actor needs them."""

@@ -156,7 +156,16 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
             for fact in self.facts.values()
             if fact.relation == "at" and isinstance(fact.value, str)
         }
-        return Vocabulary(self.places, self.objects, self.robots, whereabouts)
+        rooms = {s.surface: p.place for p in self.places.values() for s in p.surfaces}
+        rests: dict[str, str] = {}
+        for fact in self.facts.values():
+            where = whereabouts.get(fact.subject)
+            # What it lay on says nothing any more once it was taken to another place.
+            if fact.relation != "on" or where not in self.places:
+                continue
+            if isinstance(fact.value, str) and rooms.get(fact.value, where) == where:
+                rests[fact.subject] = fact.value
+        return Vocabulary(self.places, self.objects, self.robots, whereabouts, rests)
 
     def world(self, skills: Mapping[str, SkillModel]) -> WorldModel:
         """The world as believed now."""

@@ -6,10 +6,10 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
-from fleet.core.language import read_goal, statement_facts
+from fleet.core.language import Reading, read_goal, statement_facts
 from fleet.core.state import State, put, without
 from fleet.errors import NotUnderstood
-from keyexpr_schema.goals import ENDED_GOALS, Condition, Goal, GoalState, GoalStatus
+from keyexpr_schema.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
 from keyexpr_schema.plans import PlanState
 from keyexpr_schema.world import NOTHING, Fact, StatementStatus, Value
 
@@ -33,6 +33,8 @@ def _take_goal(state: State, goal: Goal) -> State:
     """Say what a goal means; a sentence that the grammar refuses may go to a language model."""
     status = _understand(state, goal)
     state = set_goal(state, status)
+    if status.state is GoalState.WAITING:
+        state = _presume(state, goal.goal, _reading(state, goal))
     if status.state is GoalState.REJECTED and state.policy.interpreter and not goal.conditions:
         state = set_goal(state, replace(status, state=GoalState.READING))
         return replace(state, interpreting=tuple({*state.interpreting, goal.goal}))
@@ -121,7 +123,8 @@ def goal_forgotten(state: State, event: events.GoalForgotten) -> State:
 
 def _understand(state: State, goal: Goal) -> GoalStatus:
     try:
-        stages = _stages(state, goal)
+        reading = _reading(state, goal)
+        stages = reading.stages
         for condition in (condition for stage in stages for condition in stage):
             for name in (*condition.subjects, condition.value):
                 _check_name(state, name)
@@ -134,14 +137,41 @@ def _understand(state: State, goal: Goal) -> GoalStatus:
         state=GoalState.WAITING,
         conditions=stages[0],
         stages=stages,
+        note=_note(state, reading),
         time_s=state.time_s,
     )
 
 
-def _stages(state: State, goal: Goal) -> tuple[tuple[Condition, ...], ...]:
+def _reading(state: State, goal: Goal) -> Reading:
     if goal.conditions:
-        return (goal.conditions,)
-    return read_goal(goal.text, state.vocabulary()).stages
+        return Reading(goal.text, (goal.conditions,))
+    return read_goal(goal.text, state.vocabulary())
+
+
+def _note(state: State, reading: Reading) -> str | None:
+    """What a goal's sentence says besides what must hold, so that no word is lost unseen."""
+    notes = [f"{remark!r} asks for nothing" for remark in reading.remarks]
+    for relation, subject, value in reading.presumed:
+        fact = state.fact(relation, subject)
+        if fact is not None and fact.value not in (None, value):
+            notes.append(f"it takes {subject} to be at {value}; believed is {fact.value}")
+    return "; ".join(notes) or None
+
+
+def _presume(state: State, goal: str, reading: Reading) -> State:
+    """Believe what a goal takes for granted where nothing is known, as if it had been stated."""
+    for relation, subject, value in reading.presumed:
+        fact = state.fact(relation, subject)
+        if fact is None or fact.value is None:
+            said = Fact(
+                subject=subject,
+                relation=relation,
+                value=value,
+                source=f"{PLANNER_SOURCE}:{goal}",
+                time_s=state.time_s,
+            )
+            state = believe(state, said)
+    return state
 
 
 def _check_name(state: State, name: Value) -> None:

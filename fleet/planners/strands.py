@@ -99,9 +99,10 @@ def options_for(
     found.sort(key=lambda pair: pair[0].cost_s + _unloading_s(pair[0], pair[1], world))
     strands: dict[object, Strand] = {}
     for result, condition in found:
-        named = frozenset(
-            robot for robot in world.robots if robot in (condition.subject, condition.value)
-        )
+        # What rides in a basket already rides with a certain robot.
+        rides_with = facts.get(Variable("at", condition.subject))
+        spoken_of = (condition.subject, condition.value, rides_with)
+        named = frozenset(robot for robot in world.robots if robot in spoken_of)
         content = tuple(_signature(action) for action in result.actions)
         strands.setdefault(content, Strand(aim.goal, result.actions, named))
     return Options(tuple(strands.values())[:ALTERNATIVES], found[0][0].facts)

@@ -121,10 +121,8 @@ class Navigator:
         what = f"({point_m[0]:.2f}, {point_m[1]:.2f})"
         docks = self._spots.stances(point_m, traveller.radius_m, reach_m)
         if not docks:
-            raise NoStance(
-                f"{robot} cannot stand anywhere with {what} "
-                f"between {reach_m[0]:.2f} and {reach_m[1]:.2f} m away"
-            )
+            why = self._spots.why_not(point_m, traveller.radius_m, reach_m)
+            raise NoStance(f"{robot} does not get to {what}: {why}")
         part = self._lattice.parts[traveller.frontier]
         docks = [dock for dock in docks if self._lattice.parts[dock.node] == part]
         if not docks:

@@ -20,6 +20,9 @@ FORECOURT_M = 1.0
 TABLE_FRONT_M = 0.9
 """Nearer than this to a table, a waiting robot is in the way of those who work at it."""
 
+FAR_M = 3.0
+"""How far around a point that nobody can reach it is looked for the nearest free floor."""
+
 DOCK_M = 1.3
 """Longest straight way from the lattice to a stance."""
 
@@ -150,3 +153,14 @@ class Spots:
                 off = 2.0 * abs(float(d[k]) - middle) + 0.2 * len(dock.owned)
                 found.append(Dock(dock.node, stance, dock.yaw_rad, dock.owned, dock.cost_m + off))
         return found
+
+    def why_not(
+        self, point_m: tuple[float, float, float], radius_m: float, reach_m: tuple[float, float]
+    ) -> str:
+        """Of a point without stances: how near to it one must stand, and how near one can."""
+        needed = f"it must stand {reach_m[0]:.2f} to {reach_m[1]:.2f} m away"
+        further = self.stances(point_m, radius_m, (reach_m[1], FAR_M))
+        if not further:
+            return f"{needed}, and there is no room to stand near it"
+        nearest_m = min(math.dist(dock.point_m, point_m[:2]) for dock in further)
+        return f"{needed}, and there is room only {nearest_m:.2f} m away"

@@ -2,47 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from itertools import combinations
 
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from fleet.core.checker import check_plan
 from fleet.core.graph import TaskGraph
-from fleet.core.skills import Variable
 from fleet.core.world_model import WorldModel, condition_holds, first_unmet, room_left
-from keyexpr_schema.plans import Plan, Task
-from tests.household import at, carrier, home, manipulator
-
-ROBOTS = ("hsr", "locobot")
-PLACES = ("kitchen", "hallway")
-CUPS = ("cup_1", "cup_2")
-WORLD = home((manipulator(), carrier(basket=1)))
-
-
-@st.composite
-def plans(draw: st.DrawFn) -> Plan:
-    """Small plans of allocated robots: sensible enough that some pass, random enough to fail."""
-    tasks: list[Task] = []
-    for number in range(draw(st.integers(1, 6))):
-        skill = draw(st.sampled_from(["navigate", "pick", "place", "place_on_robot"]))
-        robot = draw(st.sampled_from(ROBOTS)) if skill == "navigate" else "hsr"
-        actor = {"hsr": "a1", "locobot": "a2"}[robot]
-        place = draw(st.sampled_from(PLACES))
-        args = {"robot": f"?{actor}"}
-        if skill == "navigate":
-            args["to"] = place
-        else:
-            args |= {"object": draw(st.sampled_from(CUPS)), "place": place}
-        if skill == "place_on_robot":
-            args["carrier"] = "locobot"
-        names = [task.task for task in tasks]
-        after = tuple(draw(st.lists(st.sampled_from(names), unique=True))) if names else ()
-        if draw(st.booleans()):  # half of the time in order, so that whole sequences occur
-            after = tuple(names)
-        tasks.append(Task(task=f"t{number}", skill=skill, args=args, actor=actor, after=after))
-    goal = at(draw(st.sampled_from(CUPS)), draw(st.sampled_from(PLACES)))
-    return Plan(plan="p", goals=("g",), conditions=(goal,), tasks=tuple(tasks))
+from keyexpr_schema.plans import Plan
+from tests.random_plans import ALLOCATION, plans
 
 
 def orders(graph: TaskGraph, done: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
@@ -80,9 +49,39 @@ def works(plan: Plan, world: WorldModel, allocation: dict[str, str]) -> bool:
     return True
 
 
-@settings(max_examples=400, deadline=None)
-@given(plans(), st.booleans())
-def test_a_plan_passes_exactly_if_every_order_works(plan: Plan, in_kitchen: bool) -> None:
-    allocation = {"a1": "hsr", "a2": "locobot"}
-    world = WORLD.with_facts({Variable("at", "hsr"): "kitchen"}) if in_kitchen else WORLD
-    assert check_plan(plan, world, allocation).valid == works(plan, world, allocation)
+@settings(max_examples=500, deadline=None)
+@given(plans())
+def test_a_plan_passes_exactly_if_every_order_works(drawn: tuple[Plan, WorldModel]) -> None:
+    plan, world = drawn
+    good = works(plan, world, ALLOCATION)
+    checked = check_plan(plan, world, ALLOCATION)
+    assert checked.valid == good, checked.violations
+    if good:  # each actor has at least the robot that it is here
+        assert not check_plan(plan, world).violations
+
+
+def test_the_plans_drawn_are_good_and_bad_in_many_ways() -> None:
+    outcomes: Counter[str] = Counter()
+
+    @settings(max_examples=300, deadline=None, database=None, derandomize=True)
+    @given(plans())
+    def count(drawn: tuple[Plan, WorldModel]) -> None:
+        plan, world = drawn
+        checked = check_plan(plan, world, ALLOCATION)
+        outcomes["good" if checked.valid else "bad"] += 1
+        outcomes["good with a handover"] += checked.valid and any(
+            task.skill in ("place_on_robot", "unload") for task in plan.tasks
+        )
+        outcomes["good and open"] += checked.valid and any(
+            not TaskGraph({t.task: t.after for t in plan.tasks}).ordered(one.task, other.task)
+            for one, other in combinations(plan.tasks, 2)
+        )
+        outcomes.update({violation.code for violation in checked.violations})
+
+    count()
+    total = outcomes["good"] + outcomes["bad"]
+    assert outcomes["good"] > total / 5 and outcomes["bad"] > total / 5, outcomes
+    for kind in ("good with a handover", "good and open", "condition-undone", "condition-unmet"):
+        assert outcomes[kind] >= 5, outcomes
+    for kind in ("robot-in-two-places", "goal-unmet", "no-space"):
+        assert outcomes[kind], outcomes

@@ -128,6 +128,20 @@ def test_a_carrier_must_stay_until_it_has_been_given_the_cup() -> None:
     assert "robot-in-two-places" in codes(tasks)
 
 
+def test_where_a_carrier_must_be_at_the_start_counts_at_the_end() -> None:
+    tasks = [
+        *fetch()[:2],
+        task("stay", "search", "a2", place="kitchen"),
+        task(
+            "give", "place_on_robot", "a1", "pick", "stay",
+            object="cup_1", carrier=A2, place="kitchen",
+        ),
+    ]  # fmt: skip
+    here = (fact("locobot", "at", "kitchen"),)
+    assert codes(tasks, at("cup_1", "kitchen"), facts=here) == []
+    assert codes(tasks, at("cup_1", "kitchen")) == ["no-robot"]
+
+
 def test_a_basket_takes_what_it_takes() -> None:
     second = [
         task("pick2", "pick", "a1", "give", object="cup_2", place="kitchen"),

@@ -23,7 +23,12 @@ from tests.language_house import WORDS
         ),
         (
             "Cups 1 and 2 are on the kitchen table",
-            [("at", "cup_1", "kitchen"), ("at", "cup_2", "kitchen")],
+            [
+                ("at", "cup_1", "kitchen"),
+                ("on", "cup_1", "kitchen_table"),
+                ("at", "cup_2", "kitchen"),
+                ("on", "cup_2", "kitchen_table"),
+            ],
         ),
         ("Nobody knows where the book is", [("at", "book", None)]),
         ("It is unknown where the book is.", [("at", "book", None)]),
@@ -41,7 +46,10 @@ from tests.language_house import WORDS
             "In the kitchen there are two cups",
             [("at", "cup_1", "kitchen"), ("at", "cup_2", "kitchen")],
         ),
-        ("On the kitchen table is the book", [("at", "book", "kitchen")]),
+        (
+            "On the kitchen table is the book",
+            [("at", "book", "kitchen"), ("on", "book", "kitchen_table")],
+        ),
         (
             "The first cup is in the kitchen and the second cup is in the hallway",
             [("at", "cup_1", "kitchen"), ("at", "cup_2", "hallway")],
@@ -72,8 +80,15 @@ from tests.language_house import WORDS
             ],
         ),
         ("the book's in the kitchen", [("at", "book", "kitchen")]),
-        ("The book is on the table in the hallway", [("at", "book", "hallway")]),
-        ("The book is in the kitchen. It is on the kitchen table.", [("at", "book", "kitchen")]),
+        (
+            "The book is on the table in the hallway",
+            [("at", "book", "hallway"), ("on", "book", "hallway_table")],
+        ),
+        (
+            "The book is in the kitchen. It is on the kitchen table.",
+            [("at", "book", "kitchen"), ("on", "book", "kitchen_table")],
+        ),
+        ("The book can be found in the kitchen", [("at", "book", "kitchen")]),
         ("The book's location is unknown", [("at", "book", None)]),
         ("cup 1 in kitchen", [("at", "cup_1", "kitchen")]),
         ("The fridge is in the kitchen", [("at", "fridge", "kitchen")]),
@@ -97,7 +112,10 @@ from tests.language_house import WORDS
             ],
         ),
         ("the kitchen was not searched", [("searched", "kitchen", False)]),
-        ("I left the first cup on the coffee table", [("at", "cup_1", "living_room")]),
+        (
+            "I left the first cup on the coffee table",
+            [("at", "cup_1", "living_room"), ("on", "cup_1", "coffee_table")],
+        ),
         (
             "the HSR and the locobot are in the hallway",
             [("at", "hsr", "hallway"), ("at", "locobot", "hallway")],
@@ -145,14 +163,14 @@ def test_statements_become_facts(text: str, expected: list[tuple[str, str, Value
         ("The weather is nice", "'The weather' is not a known object, robot or place"),
         (
             "If the book is in the kitchen",
-            "'If' makes it depend on something else, which a goal cannot",
+            "'If' makes it depend on something else, which a fact cannot",
         ),
         (
             "there are cups in the kitchen",
             "'cups' does not say how many: say all of them or which ones",
         ),
         ("no cups are in the kitchen", "'no' says what must not be, or leaves something out"),
-        ("the book is in the kitchen at 5 pm", "'pm' names a time, which a goal cannot"),
+        ("the book is in the kitchen at 5 pm", "'pm' names a time, which a fact cannot"),
         (
             "every room was not searched",
             "'every room was not searched' could mean all or some of them",

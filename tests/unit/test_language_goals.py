@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from msgspec import structs
 
 from fleet.core.language import Vocabulary, goal_conditions, read_goal
+from fleet.errors import NotUnderstood
+from keyexpr_schema.world import Object
 from tests.language_house import OBJECTS, PLACES, ROBOTS, WORDS, shown
 
 
@@ -198,6 +202,50 @@ from tests.language_house import OBJECTS, PLACES, ROBOTS, WORDS, shown
         ("return the book to the hallway", "at(book) = hallway"),
         ("return to the hallway", "at(hsr|locobot) = hallway"),
         ("Pick up the book, go to the hallway and put it down there", "at(book) = hallway"),
+        ("Everybody go to the kitchen", "at(hsr) = kitchen; at(locobot) = kitchen"),
+        ("Someone should take the book to the kitchen", "at(book) = kitchen"),
+        ("Bring the book to the kitchen as soon as possible", "at(book) = kitchen"),
+        ("I'd love to have the book in the kitchen", "at(book) = kitchen"),
+        ("put down the book in the kitchen", "at(book) = kitchen"),
+        ("gather all cups in the kitchen", "at(cup_1) = kitchen; at(cup_2) = kitchen"),
+        ("bring the blue and red cups to the hallway", "at(cup_2) = hallway; at(cup_1) = hallway"),
+        (
+            "bring all cups and books to the hallway",
+            "at(cup_1) = hallway; at(cup_2) = hallway; at(book) = hallway",
+        ),
+        (
+            "bring the first and second cup to the hallway",
+            "at(cup_1) = hallway; at(cup_2) = hallway",
+        ),
+        ("bring the first and the last cup home", "at(cup_1) = kitchen; at(cup_2) = kitchen"),
+        (
+            "bring a cup to the hallway and another one to the lounge",
+            "at(cup_1|cup_2) = hallway; at(cup_1|cup_2) = living_room",
+        ),
+        (
+            "bring a cup to the hallway and the other one to the lounge",
+            "at(cup_1|cup_2) = hallway; at(cup_1|cup_2) = living_room",
+        ),
+        (
+            "bring the first cup to the hallway and another cup to the hallway",
+            "at(cup_1) = hallway; at(cup_2) = hallway",
+        ),
+        (
+            "bring the first cup to the hallway and a cup to the lounge",
+            "at(cup_1) = hallway; at(cup_2) = living_room",
+        ),
+        (
+            "look for a cup in the kitchen and the hallway",
+            "searched(kitchen); searched(hallway); located(cup_1|cup_2)",
+        ),
+        (
+            "look for the book everywhere",
+            "searched(kitchen); searched(living_room); searched(hallway); located(book)",
+        ),
+        (
+            "look for the book in every room",
+            "searched(hallway); searched(kitchen); searched(living_room); located(book)",
+        ),
         (
             "Go to the kitchen, pick up the first cup, go to the hallway and put it down there",
             "at(hsr|locobot) = kitchen > at(cup_1) = hallway",
@@ -355,3 +403,80 @@ def test_names_win_over_grammar() -> None:
     words = Vocabulary({**WORDS.places, **places}, WORDS.objects, WORDS.robots)
     text = "Bring the book to the drop and pick up point and the first cup to robot lab 2"
     assert shown(read_goal(text, words)) == "at(book) = to_go; at(cup_1) = lab"
+
+
+TRAY = Object(object="tray", kind="tray", label="tea tray", home="kitchen", categories=("dish",))
+HOUSEHOLD = Vocabulary(
+    WORDS.places,
+    {
+        "tray": TRAY,
+        "novel": Object(object="novel", kind="book", label="novel", uses=("read",), home="hallway"),
+        "atlas": Object(object="atlas", kind="book", label="atlas", ordinal=2, uses=("read",)),
+        "milk": Object(object="milk", kind="carton", label="carton of milk", uses=("drink",)),
+        "plate": Object(
+            object="plate", kind="plate", label="plate", home="kitchen", categories=("dish",)
+        ),
+    },
+    WORDS.robots,
+    {"tray": "living_room", "novel": "living_room", "plate": "living_room", "atlas": "hallway"},
+    {"tray": "coffee_table", "novel": "coffee_table", "plate": "floor"},
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("Bring something to read to the kitchen", "at(novel|atlas) = kitchen"),
+        ("Bring a book to read to the kitchen", "at(novel|atlas) = kitchen"),
+        ("Bring something to drink to the kitchen", "at(milk) = kitchen"),
+        ("Bring the carton of milk to the kitchen", "at(milk) = kitchen"),
+        ("Bring all dishes to the kitchen", "at(plate) = kitchen; at(tray) = kitchen"),
+        ("Get me something to read. The atlas in the kitchen would do.", "at(atlas) = kitchen"),
+        ("Bring me a book to the kitchen. The novel is fine.", "at(novel) = kitchen"),
+        ("Clear the coffee table", "at(tray) = kitchen; at(novel) = hallway"),
+        ("Tidy up the coffee table", "at(tray) = kitchen; at(novel) = hallway"),
+        (
+            "Put everything on the coffee table in the hallway",
+            "at(tray) = hallway; at(novel) = hallway",
+        ),
+        ("Clear off the coffee table", "at(tray) = kitchen; at(novel) = hallway"),
+    ],
+)
+def test_what_things_are_for_and_lie_on_tells_them_apart(text: str, expected: str) -> None:
+    assert shown(read_goal(text, HOUSEHOLD)) == expected
+
+
+def test_the_other_one_of_a_kind_is_no_other_dish() -> None:
+    text = "Bring the novel to the kitchen and the other one to the hallway"
+    assert shown(read_goal(text, HOUSEHOLD)) == "at(novel) = kitchen; at(atlas) = hallway"
+
+
+def test_where_it_is_not_known_what_a_thing_lies_on_nothing_is_left_behind() -> None:
+    words = replace(HOUSEHOLD, rests={"tray": "coffee_table"})
+    for text in ("Clear the coffee table", "Bring everything on the coffee table to the hallway"):
+        with pytest.raises(NotUnderstood, match="whether novel or plate lies on coffee_table"):
+            read_goal(text, words)
+
+
+def test_what_cannot_go_anywhere_is_not_cleared_away() -> None:
+    words = replace(HOUSEHOLD, rests={**HOUSEHOLD.rests, "atlas": "hallway_table"})
+    with pytest.raises(NotUnderstood, match="atlas has no home in another place"):
+        read_goal("Clear the hallway table", words)
+
+
+def test_a_remark_is_kept_apart() -> None:
+    reading = read_goal("I have a headache, please bring the book to the kitchen", WORDS)
+    assert shown(reading) == "at(book) = kitchen"
+    assert reading.remarks == ("I have a headache",)
+    after = read_goal("Bring the book to the kitchen. I am so tired!", WORDS)
+    assert after.remarks == ("I am so tired",)
+
+
+def test_something_in_every_room_is_something_else_in_each() -> None:
+    places = {name: WORDS.places[name] for name in ("kitchen", "hallway")}
+    words = Vocabulary(places, WORDS.objects, WORDS.robots)
+    expected = "at(hsr|locobot) = hallway; at(hsr|locobot) = kitchen"
+    assert shown(read_goal("Send a robot to every room", words)) == expected
+    assert shown(read_goal("There should be a robot in each room", words)) == expected
+    with pytest.raises(NotUnderstood, match="say which"):
+        read_goal("Bring the book to every room", words)

@@ -179,3 +179,34 @@ def test_a_late_report_of_the_lost_robot_changes_nothing() -> None:
     before = robot_of(model)
     model.report(order, ReportState.FAILED, reason="back again")
     assert robot_of(model) == before
+
+
+@pytest.mark.parametrize("strategy", ["big-dag", "per-goal", "monolithic"])
+def test_the_only_robot_is_planned_with_again_while_its_hand_is_full(strategy: str) -> None:
+    model = FleetModel((manipulator("r1"),), cups=3)
+    model.plan(*(bring(n, "hallway") for n in (1, 2, 3)), strategy=strategy)
+    while model.state.facts["r1/holding"].value == "nothing":
+        model.succeed(order_of(model, "r1"))
+    undisturbed = model.orders()
+    model.tell(
+        events.ReplanAsked, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
+    )
+    assert model.orders() == undisturbed
+    assert book(model).plan.revision == 2
+    model.finish()
+    assert all(status.state is GoalState.REACHED for status in model.state.goal_states.values())
+
+
+def test_a_lost_robot_that_had_nothing_else_to_do_takes_its_goal_with_it() -> None:
+    model = running(robots=2, cups=2)
+    holder, other = (order.robot for order in model.orders())
+    while model.state.facts[f"{holder}/holding"].value == "nothing":
+        model.succeed(order_of(model, holder))
+    undisturbed = order_of(model, other)
+    model.lose(holder)
+    assert order_of(model, other) == undisturbed
+    states = sorted(status.state.value for status in model.state.goal_states.values())
+    assert states == ["failed", "running"]
+    model.finish()
+    assert book(model).state is PlanState.SUCCEEDED
+    assert all(record.robot == other for record in book(model).current())

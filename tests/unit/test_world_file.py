@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from sim.errors import BadFile
+from sim.reach import out_of_reach
 from sim.world_file import CONFIGS, find_mission, load_mission, load_robot, load_world
 
 HOME = CONFIGS / "worlds" / "home.yaml"
@@ -138,6 +139,9 @@ def test_a_missing_file_and_a_file_that_is_not_yaml(tmp_path: Path) -> None:
     bad.write_text("just words\n")
     with pytest.raises(BadFile, match="a world file is a list of `name: value` lines"):
         load_world(bad)
+    bad.write_text("world: home\nsize_m: [1, 1]\nplaces: {}\nsize_m: [2, 2]\n")
+    with pytest.raises(BadFile, match=r"bad\.yaml line 4: this is not YAML: 'size_m' comes twice"):
+        load_world(bad)
 
 
 def mission(tmp_path: Path, robots: str) -> Path:
@@ -154,7 +158,7 @@ def test_a_mission_by_name_and_by_path_is_the_same() -> None:
     assert by_name == load_mission(CONFIGS / "missions" / "two-cups.yaml")
     assert [robot.spec.robot for robot in by_name.robots] == ["hsr", "locobot"]
     assert by_name.robots[1].start_m_rad == pytest.approx((5.0, 1.5, math.pi / 2))
-    assert by_name.plan.allocator == "milp"
+    assert by_name.plan.allocator == "makespan"
     assert len(by_name.goals) == 2 and len(by_name.statements) == 2
 
 
@@ -216,3 +220,31 @@ def test_a_robot_that_cannot_drive_is_refused(tmp_path: Path) -> None:
     path.write_text("robot: r\nmodel: hsr\nskills: navigate\ncapabilities: {drive: 1}\n")
     with pytest.raises(BadFile, match=r"skills: expected a list, got text"):
         load_robot(path)
+
+
+@pytest.mark.parametrize("name", ["a/b", "r$*", "röbot", "", "x" * 64])
+def test_a_robot_with_a_name_that_can_be_no_key_is_told_the_rule(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "r.yaml"
+    path.write_text(
+        f"robot: '{name}'\nmodel: hsr\nskills: [navigate]\ncapabilities: {{drive: 1}}\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(BadFile, match=r"robot: expected a name \(1 to 63 ASCII letters, digits"):
+        load_robot(path)
+
+
+def test_what_lies_in_the_middle_of_a_wide_table_is_said_to_be_out_of_reach(
+    tmp_path: Path,
+) -> None:
+    path = mission(tmp_path, f"  - {{spec: {HSR}, start: {{at_m: [8.0, 3.0]}}}}\n")
+    assert out_of_reach(load_mission(path)) == ()
+    with path.open("a") as file:
+        file.write("objects: {cup_2: {on: kitchen_table, at_m: [0.3, 0.0]}}\n")
+    [sentence] = out_of_reach(load_mission(path))
+    assert sentence.startswith(
+        "cup_2 lies on kitchen_table at [0.3, 0.0], where no hand gets to: for hsr, it must stand "
+        "0.43 to 0.55 m away, and there is room only 0.6"
+    )
+    only_drives = tmp_path / "only.yaml"
+    only_drives.write_text(path.read_text().replace(str(HSR), str(HSR.with_name("locobot.yaml"))))
+    assert out_of_reach(load_mission(only_drives)) == ()

@@ -13,6 +13,7 @@ from typing import Protocol
 
 import pytest
 
+from keyexpr_schema.errors import UndecodablePayload
 from keyexpr_schema.goals import GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.keyspace import (
     ANSWER,
@@ -22,14 +23,16 @@ from keyexpr_schema.keyspace import (
     PLAN_SPEC,
     PLAN_STATUS,
     PLANNER_ALIVE,
+    PLANNER_STATUS,
     ROBOT_ALIVE,
+    ROBOT_SPEC,
     ROBOT_STATE,
     TASK_RECORD,
 )
 from keyexpr_schema.plans import Plan, PlanAddress, PlanState, PlanStatus, Task, Violation
-from keyexpr_schema.requests import Answer, RequestAddress
+from keyexpr_schema.requests import Answer, PlanRequest, RequestAddress
 from keyexpr_schema.robots import AliveAddress, RobotActivity, RobotAddress, RobotState
-from keyexpr_schema.service import PlannerAliveAddress
+from keyexpr_schema.service import PlannerAddress, PlannerAliveAddress, PlannerStatus
 from keyexpr_schema.session import Session, SessionConfig, open_session
 from keyexpr_schema.tasks import TaskAddress, TaskRecord, TaskState
 from tests.robotctl import Robotctl
@@ -118,6 +121,9 @@ def test_a_goal_without_a_planner_is_stored_and_said_so(robotctl: Robotctl) -> N
     assert "use another --id" in robotctl("goal", "add", "x", "--id", rows[0]["goal"]).err
     assert robotctl("goal", "delete", rows[0]["goal"]).code == 0
     assert "known are: bring-the-first-cup-to-the-hallway-2" in robotctl("goal", "show", "x").err
+    # Nothing of it can stand in a key; a planner with a language model may understand it.
+    assert robotctl("goal", "add", "把杯子拿到走廊", "--json").data["goal"] == "goal"
+    assert robotctl("goal", "add", "把杯子拿到走廊", "--json").data["goal"] == "goal-2"
 
 
 @pytest.mark.parametrize(
@@ -133,7 +139,11 @@ def test_a_goal_without_a_planner_is_stored_and_said_so(robotctl: Robotctl) -> N
         (["register", "nowhere.yaml"], "nowhere.yaml"),
         (["register", WORLD], "home.yaml"),
         (["world", "load", ROBOTS[0]], "hsr.yaml"),
-        (["goal", "add", "!?"], "is not valid"),
+        (["goal", "add", " "], "say what you want, such as “Bring the first cup"),
+        (["goal", "add", "x", "--id", ""], "goal '' is not valid: use 1 to 63 ASCII letters"),
+        (["goal", "add", "x", "--id", "a/**"], "goal 'a/**' is not valid: use 1 to 63 ASCII"),
+        (["world", "add", ""], "say something, such as “The first cup is in the kitchen.”"),
+        (["plan", "create", "big-dag", "milp", "--id", "a/b"], "plan 'a/b' is not valid: use 1"),
         (["demo", "three-cups"], "there is no mission 'three-cups'; there are"),
         (["demo", "two-cups", "--backend", "bullet"], "known are: kinematic, mujoco"),
         (["sim", "two-cups", "--speed", "fast"], "neither 'max' nor a number above 0"),
@@ -259,6 +269,44 @@ async def test_a_goal_is_answered_by_the_planner(
         assert said.err.strip() == f"Error: goal g1 rejected: {reason}"
     else:
         assert "goal g1 is waiting" in said.out
+
+
+async def test_a_robot_with_a_skill_that_no_planner_models_is_not_registered(
+    robotctl: Robotctl, session_config: MakeConfig, tmp_path: Path
+) -> None:
+    wrong = tmp_path / "r.yaml"
+    wrong.write_text("robot: r\nmodel: hsr\nskills: [navigate, serch]\ncapabilities: {drive: 1}\n")
+    assert (await robotctl.soon("register", str(wrong))).code == 0  # nobody can tell
+    assert (await robotctl.soon("unregister", "r")).code == 0
+    async with open_session(session_config(component="planner")) as session:
+        status = PlannerStatus(
+            epoch=1,
+            incarnation="run1",
+            planners=("symbolic",),
+            strategies=("big-dag",),
+            allocators=("milp",),
+            skills=("navigate", "search"),
+        )
+        await session.confirm(PLANNER_STATUS, PlannerAddress(), status)
+        said = await robotctl.soon("register", ROBOTS[1], str(wrong))
+        assert said.code == 1
+        assert said.err.strip() == (
+            "Error: robot 'r': the planner knows no skill 'serch' (did you mean 'search'?); "
+            "it knows navigate, search; teach it more with `robotctl planner --skills FILE`"
+        )
+        assert await session.list(ROBOT_SPEC) == {}
+        page = (await robotctl.soon("status")).out
+        assert "planner  not running" in page
+
+
+async def test_what_no_reader_could_read_is_not_put(session_config: MakeConfig) -> None:
+    async with open_session(session_config()) as session:
+        asked = PlanRequest(request="r1", plan="a/b", goals=())
+        with pytest.raises(
+            UndecodablePayload, match=r"is not a PlanRequest: Expected a name \(1 to"
+        ):
+            await session.confirm(PLAN_REQUEST, RequestAddress("r1"), asked)
+        assert await session.get(PLAN_REQUEST, RequestAddress("r1")) is None
 
 
 async def test_a_refused_plan_says_every_reason(

@@ -12,17 +12,26 @@ import pytest
 from keyexpr_schema.goals import Goal, GoalAddress, GoalState
 from keyexpr_schema.keyspace import (
     ANSWER,
+    FACT,
     GOAL_SPEC,
     GOAL_STATUS,
     ORDER,
     PLAN_REQUEST,
+    PLAN_STATUS,
     PLANNER_STATUS,
     REJECT,
+    ROBOT_ALIVE,
+    ROBOT_SPEC,
+    TASK_RECORD,
 )
+from keyexpr_schema.plans import PlanAddress
 from keyexpr_schema.requests import PlanRequest, RequestAddress
+from keyexpr_schema.robots import AliveAddress, RobotAddress
 from keyexpr_schema.service import PlannerAddress
 from keyexpr_schema.session import SessionConfig, open_session
 from keyexpr_schema.tasks import OrderAddress
+from keyexpr_schema.world import FactAddress
+from tests.household import fact, manipulator
 from tests.planner_process import (
     DEADLINE_S,
     PlannerProcess,
@@ -35,6 +44,7 @@ from tests.planner_process import (
     until,
     value,
 )
+from tests.robotctl import Robotctl
 
 
 async def test_a_goal_is_planned_ordered_and_reached(router: Any, tmp_path: Path) -> None:
@@ -81,6 +91,52 @@ async def test_a_planner_that_lost_its_journal_repeats_nothing(router: Any, tmp_
             answer = await value(session, ANSWER, RequestAddress("r2"), accepted=False)
             assert "no goal that waits" in answer.sentence
             assert await session.list(ORDER) == {}
+
+
+async def test_durations_are_learned_and_outlive_the_planners_journal(
+    router: Any, tmp_path: Path
+) -> None:
+    robotctl = Robotctl(router.endpoint, tmp_path, realm="test")
+    async with person(router.endpoint) as session:
+        async with planner(router.endpoint, tmp_path / "one"):
+            await ask_for_plan(session)
+            await finish(session, set(), took_s=73.0)
+        (known,) = (await robotctl.soon("durations", "--json")).data
+        assert known["model"] == "hsr"
+        assert known["skills"]["pick"]["mean"] == (27.0 + 73.0) / 2
+        assert "50.0 s  23.0 s  1" in (await robotctl.soon("durations")).out
+        shutil.rmtree(tmp_path / "one")
+        async with planner(router.endpoint, tmp_path / "two"):
+            again = Goal(goal="g2", text="Bring cup 1 to the kitchen")
+            await session.confirm(GOAL_SPEC, GoalAddress("g2"), again)
+            await value(session, GOAL_STATUS, GoalAddress("g2"), state=GoalState.WAITING)
+            request = PlanRequest(request="r2", plan="p2", goals=("g2",))
+            await session.confirm(PLAN_REQUEST, RequestAddress("r2"), request)
+            await value(session, ANSWER, RequestAddress("r2"), accepted=True)
+            tasks = (await session.list(TASK_RECORD, plan="p2")).values()
+            assert [task.duration_s for task in tasks if task.skill == "pick"] == [50.0]
+
+
+async def test_what_a_lost_robot_was_to_do_goes_to_another(router: Any, tmp_path: Path) -> None:
+    async with (
+        person(router.endpoint) as session,
+        planner(router.endpoint, tmp_path, "--lost-after", "0.5"),
+    ):
+        async with (
+            open_session(session.config) as robot,
+            robot.token(ROBOT_ALIVE, AliveAddress("near", "i1")),
+        ):
+            await robot.confirm(ROBOT_SPEC, RobotAddress("near"), manipulator("near"))
+            for known in (fact("near", "at", "kitchen"), fact("near", "holding", "nothing")):
+                await robot.confirm(FACT, FactAddress(known.subject, known.relation), known)
+            await ask_for_plan(session)
+            await until(lambda: session.list(ORDER, robot="near"), "an order for the nearest")
+        # Its worker is gone now, and does not come back.
+        await finish(session, set())
+        status = await session.get(PLAN_STATUS, PlanAddress("p"))
+        assert status is not None
+        assert status.revision == 2
+        assert set(status.allocation.values()) == {"hsr"}
 
 
 async def test_a_second_planner_takes_charge_and_the_first_stops(

@@ -64,8 +64,8 @@ class Processes:
         assert "running" in process.stdout.readline()
         return process
 
-    def worker(self, robot: str = "hsr") -> subprocess.Popen[str]:
-        return self.start(WORKER, robot, str(self.data_dir))
+    def worker(self, robot: str = "hsr", data: str = "") -> subprocess.Popen[str]:
+        return self.start(WORKER, robot, str(self.data_dir / data))
 
     def end(self) -> None:
         for process in self._all:
@@ -166,17 +166,47 @@ async def test_a_worker_waits_for_its_robot_and_ends_cleanly_when_told(
         assert "Traceback" not in errors
 
 
+@pytest.mark.parametrize(
+    ("data", "why"),
+    [
+        ("", "another worker runs for this robot with the same data directory"),
+        ("elsewhere", "a worker of locobot is connected already (locobot-"),
+    ],
+)
 async def test_a_second_worker_for_a_robot_is_turned_away(
-    processes: Processes, session_config: Callable[..., SessionConfig]
+    processes: Processes, session_config: Callable[..., SessionConfig], data: str, why: str
 ) -> None:
+    """Also one that has a journal of its own, as on another host: each order would run twice."""
     processes.sim(speed=4.0)
     async with open_session(session_config(component="test")) as session:
-        await Planner(session, load_mission("two-cups")).register()
+        planner = Planner(session, load_mission("two-cups"))
+        await planner.register()
         first = processes.worker("locobot")
-        await ready(first, "locobot")
-        second = processes.worker("locobot")
-        _, errors = await asyncio.to_thread(second.communicate, timeout=DEADLINE_S)
+        incarnation = await ready(first, "locobot")
+        second = processes.worker("locobot", data)
+        out, errors = await asyncio.to_thread(second.communicate, timeout=DEADLINE_S)
         assert second.returncode == 1
-        assert "another worker runs for this robot with the same data directory" in errors
+        assert why in errors
         assert "Traceback" not in errors
+        assert "ready" not in out
         assert first.poll() is None
+        order = await planner.order("locobot", "t1", "navigate", to="kitchen")
+        report = await planner.report(order)
+        assert (report.state, report.incarnation) == (ReportState.SUCCEEDED, incarnation)
+
+
+async def test_a_worker_without_a_router_says_what_it_waits_for(tmp_path: Path) -> None:
+    worker = subprocess.Popen(
+        [sys.executable, "-c", WORKER, "tcp/127.0.0.1:9", "hsr", str(tmp_path)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert worker.stderr is not None
+        async with asyncio.timeout(DEADLINE_S):
+            said = await asyncio.to_thread(worker.stderr.readline)
+        assert "no router answers at tcp/127.0.0.1:9; waiting for one" in said
+    finally:
+        worker.kill()
+        worker.communicate(timeout=10)

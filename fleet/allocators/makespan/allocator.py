@@ -20,7 +20,7 @@ from fleet.allocators.milp import MilpAllocator
 
 DEADLINE_S = 1.0
 """Wall time that the search may take, s."""
-RESCHEDULE_SHARE = 0.7
+RESCHEDULE_SHARE = 0.5
 """Of that time, how much mending a schedule takes: robots wait meanwhile."""
 NOBODY = -1
 """The machine of actors whose robot is gone."""

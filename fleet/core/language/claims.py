@@ -16,7 +16,7 @@ class Claims(Clauses):
     """Collects facts; a later one may not contradict an earlier one."""
 
     def __init__(self, text: str, words: Vocabulary) -> None:
-        super().__init__(text, words)
+        super().__init__(text, words, "a fact")
         self.facts: dict[tuple[str, str], Value] = {}
 
     def fact(self, relation: str, subject: str, value: Value) -> None:
@@ -32,8 +32,10 @@ class Claims(Clauses):
                 f"it says two things of {relation}({subject}): {' and '.join(shown)}"
             )
 
-    def put(self, things: Sequence[Subject], target: str | None) -> None:
-        """These are at the target."""
+    def put(
+        self, things: Sequence[Subject], target: str | None, surface: str | None = None
+    ) -> None:
+        """These are at the target, on a surface there if one is named."""
         if self.cursor.word() == "or":
             raise self.cursor.refusal("")
         mentions = [self.subjects.settle(thing) for thing in things]
@@ -47,6 +49,8 @@ class Claims(Clauses):
                 raise NotUnderstood("a robot is at a place, not on a robot: name the place")
             for name in mention.subjects:
                 self.fact("at", name, target)
+                if surface is not None and mention.sort == "object":
+                    self.fact("on", name, surface)
         self.subjects.remember(mentions)
 
     def lost(self, things: Sequence[Subject]) -> None:

@@ -1,86 +1,21 @@
-"""What single verbs ask for: finding, searching, picking up, tidying."""
+"""What single verbs ask for: finding, searching, picking up, patrolling."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from fleet.core.language.locations import PLACES
 from fleet.core.language.mentions import Mention
-from fleet.core.language.moving import HOME_HINT, Moving
-from fleet.core.language.refusals import one_of
 from fleet.core.language.subjects import Subject
-from fleet.core.language.verbs import EXAMPLE
+from fleet.core.language.tidying import Tidying
 from fleet.core.language.wordlists import ANYWHERE, WHOLE_HOUSE
 from fleet.errors import NotUnderstood
 
 _ROBOTS_TELL = "robots say themselves where they are; see their states"
 
 
-class Clauses(Moving):
+class Clauses(Tidying):
     """Turns the clauses of one text into wishes."""
-
-    def tidy(self) -> None:
-        """`tidy up`, `tidy up the kitchen`, `put the cups away`."""
-        cursor = self.cursor
-        cursor.take("up")
-        start = cursor.at
-        preposed = cursor.preposition() is not None
-        about_things = cursor.word() in ("it", "them") or (
-            not cursor.next_of(WHOLE_HOUSE) and self.nouns.starts(("object",))
-        )
-        if not preposed and about_things:
-            return self.move(tidy=True)
-        where: Sequence[str] | None = None
-        if preposed or not (cursor.at_border() or cursor.word() == "and"):
-            where = self._tidied()
-            cursor.take("up")
-        cursor.take_word(("up", "away"))
-        homes = {
-            o.object: o.home
-            for o in self.words.objects.values()
-            if o.movable and o.home and o.home in self.words.places
-        }
-        names = tuple(homes) if where is None else self._misplaced(homes, where)
-        if not names:
-            raise NotUnderstood(f"nothing has a home: {HOME_HINT}")
-        for name in names:
-            self.draft.add("at", Mention((name,), "object", start), homes[name])
-        self.subjects.remember([Mention(names, "object", start)])
-        return None
-
-    def _tidied(self) -> tuple[str, ...] | None:
-        """The places that come next; `None` for all of them."""
-        named = self.place_mentions()
-        for mention in named or ():
-            if mention.sort == "surface":
-                raise self.by_surface(self.cursor.said(self.began), mention.subjects)
-        names = dict.fromkeys(n for m in named or () for n in m.subjects)
-        everywhere = named is None or (len(names) > 1 and set(names) == set(self.words.places))
-        return None if everywhere else tuple(names)
-
-    def _misplaced(self, homes: Mapping[str, str], where: Sequence[str]) -> tuple[str, ...]:
-        """What is believed to be in these places and belongs elsewhere.
-
-        Raises:
-            NotUnderstood: there is nothing of that kind in one of them.
-        """
-        at = self.words.whereabouts
-        names = tuple(n for n, home in homes.items() if at.get(n) in where and at[n] != home)
-        if tidy := [place for place in where if place not in {at[name] for name in names}]:
-            raise NotUnderstood(
-                f"nothing that belongs elsewhere is believed to be in {one_of(tidy)}: have it "
-                'searched first, or say where things belong with the field "home" of the object'
-            )
-        return names
-
-    @staticmethod
-    def by_surface(said: str, places: Sequence[str]) -> NotUnderstood:
-        """Things on a surface cannot be told from other things in its place."""
-        return NotUnderstood(
-            f"{said!r}: name the things and where to bring them, or say "
-            f'"tidy up {one_of(places)}"; it is known in which place things are, not on which '
-            "surface"
-        )
 
     # --- finding, picking up, searching -----------------------------------------------------------
     def find(self) -> None:
@@ -92,16 +27,36 @@ class Clauses(Moving):
         if any(isinstance(s, Mention) and s.sort == "robot" for s in found):
             raise NotUnderstood(_ROBOTS_TELL)
         mentions = [self.subjects.settle(subject) for subject in found]
-        if not cursor.take_of(ANYWHERE):
-            parts, _ = self.parts()
-            where = self.where(parts)
-            if where.target_sort == "robot" or any(p.preposition == "to" for p in parts):
-                raise NotUnderstood(f"{cursor.said(start)!r}: things are looked for in places")
-            if place := where.target or where.source:
-                self.searched((place,), start)
+        if not cursor.take_of(ANYWHERE) and (places := self._where_to_look(start)):
+            self.searched(places, start)
         for mention in mentions:
             self.draft.add("located", mention, True)
         self.subjects.remember(mentions)
+
+    def _where_to_look(self, start: int) -> tuple[str, ...]:
+        """`in PLACE`, `in PLACE and PLACE`, `everywhere`; nothing if nothing of it comes next."""
+        cursor, here = self.cursor, self.cursor.at
+        cursor.take_word(("in", "throughout"))
+        if self.words.places and cursor.take_of(WHOLE_HOUSE):
+            return tuple(self.words.places)
+        cursor.at = here
+        parts, _ = self.parts()
+        where = self.where(parts, each=True)
+        if where.target_sort == "robot" or any(p.preposition == "to" for p in parts):
+            raise NotUnderstood(f"{cursor.said(start)!r}: things are looked for in places")
+        if where.each:
+            return where.each
+        found = [place] if (place := where.target or where.source) else []
+        while found:
+            here = cursor.at
+            if not (cursor.take(",", "and") or cursor.take("and") or cursor.take(",")):
+                break
+            cursor.preposition()
+            if not self.nouns.starts(PLACES):
+                cursor.at = here
+                break
+            found.extend(self.places())
+        return tuple(dict.fromkeys(found))
 
     def pick(self) -> None:
         """`pick up NP`, perhaps with where it is."""
@@ -171,23 +126,3 @@ class Clauses(Moving):
         self.draft.add("searched", Mention(tuple(places), "place", key), True)
         if len(places) == 1:
             self.last_place = places[0]
-
-    def places(self) -> tuple[str, ...]:
-        """The places that come next: one, several, or all of them."""
-        named = self.place_mentions()
-        if named is None:
-            return tuple(self.words.places)
-        return tuple(dict.fromkeys(name for m in named for name in m.subjects))
-
-    def place_mentions(self) -> list[Mention] | None:
-        """The places that come next, and places of surfaces; `None` for the whole house."""
-        cursor = self.cursor
-        named = cursor.lexicon.exact(cursor.tokens, cursor.at, PLACES)[1]
-        if not named and self.words.places and cursor.take_of(WHOLE_HOUSE):
-            return None
-        found = self.subjects.read("a place", PLACES)
-        mentions = [self.subjects.settle(subject) for subject in found]
-        for mention in mentions:
-            if mention.open or mention.sort not in PLACES:
-                raise NotUnderstood(f"it does not say which place: {EXAMPLE}")
-        return mentions

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from fleet.core.language.lexicon import Lexicon, Sort
 from fleet.core.language.refusals import listed, reason_for, suggestion
-from fleet.core.language.tokens import SENTENCE_ENDS, Token, tokens_of
+from fleet.core.language.tokens import ORDINALS, SENTENCE_ENDS, Token, tokens_of, words_of
 from fleet.core.language.wordlists import FROM, IN, TO, Phrase
 from fleet.errors import NotUnderstood
 
@@ -18,7 +18,9 @@ _BORDERS |= {"is", "are", "should", "has", "have"}
 class Cursor:
     """Walks over the words of one text; `at` counts tokens."""
 
-    def __init__(self, text: str, lexicon: Lexicon) -> None:
+    def __init__(self, text: str, lexicon: Lexicon, what: str = "a goal") -> None:
+        """`what` is read: "a goal" or "a fact"."""
+        self.what = what
         self.text = text
         self.lexicon = lexicon
         self.tokens = tokens_of(text)
@@ -93,11 +95,12 @@ class Cursor:
     def refusal(self, otherwise: str) -> NotUnderstood:
         """What is wrong with the words that come next; `otherwise` if nothing special is."""
         _, end = self.phrase()
-        special = reason_for(
+        words = [
             (token.word, self.text[token.start : token.end])
             for token in self.tokens[self.at : end]
             if not (token.word in ("right", "left") and end - self.at > 1)
-        )
+        ]
+        special = reason_for(words, self.what)
         return NotUnderstood(special or otherwise)
 
     def unknown(self, what: str, sorts: Sequence[Sort]) -> NotUnderstood:
@@ -108,8 +111,10 @@ class Cursor:
         start, end = self.phrase()
         shown = self.said(start, end)
         hint = ""
-        names = self.lexicon.names_in(sorts)
-        for part in (shown, *shown.split()):
+        names = self.lexicon.names_in(sorts) | set(ORDINALS)
+        # What is known was hardly mistyped: a word that is not comes first.
+        single = sorted(shown.split(), key=lambda word: word.casefold() in names)
+        for part in (shown, " ".join(words_of(shown)), *single):
             hint = hint or suggestion(part, names)
         return self.refusal(f"{shown!r} is not a known {_bare(what)}{hint}; known are {known}")
 

@@ -13,9 +13,11 @@ from fleet.core.language.vocabulary import Vocabulary
 from fleet.core.language.wordlists import (
     ASKING_WHERE,
     CLOSERS,
+    ENOUGH,
     ENSURING,
     NEXT,
     OPENERS,
+    REMARKS,
     TELLING,
     WANTING,
 )
@@ -32,11 +34,13 @@ class Reading:
     `stages` come one after the other; all conditions of a stage hold together at its end.
     `presumed` are facts that the sentence takes for granted, as (relation, subject, value): "bring
     the first cup from the kitchen …" presumes `at(cup_1) = kitchen`. They are no part of the goal.
+    `remarks` are parts of the text that ask for nothing, as it was written: "I have a headache".
     """
 
     text: str
     stages: tuple[tuple[Condition, ...], ...]
     presumed: tuple[Fact, ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 def read_goal(text: str, words: Vocabulary) -> Reading:
@@ -60,6 +64,10 @@ def goal_conditions(text: str, words: Vocabulary) -> tuple[Condition, ...]:
 class _Goals(Sentences):
     """Joins clauses, and tells them apart."""
 
+    def __init__(self, text: str, words: Vocabulary) -> None:
+        super().__init__(text, words)
+        self.remarks: list[str] = []
+
     def read(self) -> Reading:
         cursor = self.cursor
         if not any(token.word[0].isalnum() for token in cursor.tokens):
@@ -73,13 +81,48 @@ class _Goals(Sentences):
                     )
                 break
             self.began = cursor.at
+            if self._remark():
+                continue
             self._clause()
             while cursor.take_of(CLOSERS) or cursor.take(",", "please"):
                 pass
             if not (cursor.at_border() or cursor.word() == "and" or cursor.next_of(NEXT)):
                 raise self._left_over()
         presumed = tuple(dict.fromkeys(self.subjects.presumed))
-        return Reading(self.cursor.line, self.draft.conditions(), presumed)
+        stages = self.draft.conditions()
+        return Reading(self.cursor.line, stages, presumed, tuple(self.remarks))
+
+    def _remark(self) -> bool:
+        """Go past a sentence in which a person speaks of themselves, up to its end or a command.
+
+        One that names something known, or has a word for which goals are refused, is none: what it
+        says may matter.
+        """
+        cursor, start = self.cursor, self.cursor.at
+        begins = start == 0 or cursor.tokens[start - 1].word in SENTENCE_ENDS
+        opening = cursor.next_of(REMARKS) if begins else None
+        if opening is None or cursor.word(len(opening)) == "to":
+            return False
+        cursor.at += len(opening)
+        while not cursor.ended and cursor.word() not in SENTENCE_ENDS:
+            if cursor.word() == "," and self._command_after(1):
+                break
+            if cursor.lexicon.starts_name(cursor.tokens, cursor.at) or str(cursor.refusal("")):
+                shown = cursor.said(start, cursor.phrase()[1])
+                raise NotUnderstood(
+                    f"{shown!r} is no goal, and may matter: leave it out, or tell it as a fact"
+                )
+            cursor.at += 1
+        self.remarks.append(cursor.said(start))
+        return True
+
+    def _command_after(self, words: int) -> bool:
+        cursor, start = self.cursor, self.cursor.at
+        cursor.at += words
+        cursor.take_of(OPENERS)
+        found = verb_next(cursor)
+        cursor.at = start
+        return found
 
     def _join(self) -> bool:
         """Go past what joins clauses; whether something must follow."""
@@ -134,15 +177,53 @@ class _Goals(Sentences):
         elif cursor.next_of(TELLING) and not verb_next(cursor):
             cursor.take_of(TELLING)
             self.declarative(told=True)
+        elif cursor.word() in ("clear", "empty") and self._table_next():
+            self.clear()
         elif verb_next(cursor):
             self.imperative()
         elif cursor.word() in ("can", "could", "would", "will", "should", "may"):
             cursor.at += 1
             self.declarative(told=True)
+        elif self._enough():
+            pass
         elif self.nouns.starts((*THINGS, *PLACES)) or cursor.word() in ("it", "they", "them"):
             self.declarative()
         else:
             raise self.no_clause()
+
+    def _table_next(self) -> bool:
+        """Whether the next word is a verb, and a place or surface is what it is about; past it."""
+        cursor, start = self.cursor, self.cursor.at
+        cursor.at += 1
+        cursor.take_word(("off", "up"))
+        if self.nouns.starts(PLACES):
+            return True
+        cursor.at = start
+        return False
+
+    def _enough(self) -> bool:
+        """`a bottle in the kitchen would do`: which of what was asked for before, and where to."""
+        cursor, start = self.cursor, self.cursor.at
+        try:
+            noun = self.subjects.read("an object", ("object",), several=False)[0]
+            parts, home = self.parts()
+        except NotUnderstood:
+            cursor.at = start
+            return False
+        if not cursor.take_of(ENOUGH):
+            cursor.at = start
+            return False
+        will_do = self.subjects.settle(self.subjects.movable(noun)).subjects
+        asked = [m for m in self.subjects.recent if m.open and set(m.subjects) & set(will_do)]
+        if len(asked) != 1:
+            raise NotUnderstood(
+                f"{cursor.said(start)!r}: nothing was asked for before that it could do for"
+            )
+        meant = self.draft.narrow(asked[0], will_do)
+        self.subjects.remember([meant])
+        if parts or home:
+            self.to_target([meant], self.where(parts), home)
+        return True
 
     def _same(self) -> list[Subject]:
         """Those that were moved last, as they were settled then."""

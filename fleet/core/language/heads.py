@@ -99,6 +99,7 @@ class Heads:
             plural, found = kind[0], of_kind
             generic = end - begin == 1 and len(found) == len(kind[1]) and self._is_category(begin)
         cursor.at = end
+        found = self._of_what(found)
         self._remember_kind(found[0], sorts)
         one = not cursor.ended and cursor.tokens[cursor.at].spoken in ("one", "ones")
         if kind is None and one:
@@ -111,6 +112,18 @@ class Heads:
         chosen = tuple(e for number in numbers for e in self._numbered(found, number, start))
         quantity = Quantity.ALL if len(numbers) > 1 else Quantity.BARE
         return self.made(chosen, start, quantity=quantity, exact=True)
+
+    def _of_what(self, found: tuple[Entity, ...]) -> tuple[Entity, ...]:
+        """Those with a name that has the words of `of …` in it: "bottle of water"."""
+        cursor, start = self.cursor, self.cursor.at
+        if cursor.take("of"):
+            end, named = cursor.lexicon.described(cursor.tokens, cursor.at, ("object",))
+            narrower = tuple(e for e in found if e in named)
+            if narrower:
+                cursor.at = end
+                return narrower
+        cursor.at = start
+        return found
 
     def _is_category(self, at: int) -> bool:
         word = self.cursor.tokens[at].word

@@ -32,6 +32,9 @@ class Entity:
     names: frozenset[Words]
     kinds: frozenset[Words]
     ordinal: int | None = None
+    kin: frozenset[Words] = frozenset()
+    """The kinds that tell who else "the other one" may be; `kinds` has wider ones, too."""
+    uses: frozenset[str] = frozenset()
 
     @property
     def rank(self) -> tuple[int, str]:
@@ -136,9 +139,8 @@ class Lexicon:
 
     def kin(self, entity: Entity) -> tuple[Entity, ...]:
         """All of the same kind; the entity too."""
-        general = {(word,) for word in CATEGORIES[entity.sort]}
-        own = entity.kinds - general
-        kin = {e for e in self.entities if e.sort == entity.sort and (e == entity or own & e.kinds)}
+        own = entity.kin
+        kin = {e for e in self.entities if e.sort == entity.sort and (e == entity or own & e.kin)}
         return tuple(sorted(kin, key=lambda e: e.rank))
 
     def starts_name(self, tokens: Sequence[Token], at: int) -> bool:
@@ -168,8 +170,10 @@ def _entities(words: Vocabulary) -> Iterator[Entity]:
             "object",
             thing.object,
             _names(thing.object, thing.label, *thing.aliases),
-            _kinds("object", thing.kind),
+            _kinds("object", thing.kind, *thing.categories),
             thing.ordinal,
+            _names(thing.kind),
+            frozenset(thing.uses),
         )
     for spec in words.robots.values():
         yield Entity(
@@ -178,6 +182,7 @@ def _entities(words: Vocabulary) -> Iterator[Entity]:
             spec.robot,
             _names(spec.robot, spec.label),
             _kinds("robot", spec.model),
+            kin=_names(spec.model),
         )
     for place in words.places.values():
         yield Entity(

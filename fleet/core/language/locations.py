@@ -28,11 +28,19 @@ class Part:
 
 @dataclass(frozen=True)
 class Where:
-    """What the prepositional phrases of one clause say: places or robots, by id."""
+    """What the prepositional phrases of one clause say: places or robots, by id.
+
+    `source_surface` and `target_surface` are the surfaces in those places, where one is named.
+    `each`: instead of one target, all of several ("to every room"); `said` are their words.
+    """
 
     source: str | None = None
     target: str | None = None
     target_sort: Sort = "place"
+    source_surface: str | None = None
+    target_surface: str | None = None
+    each: tuple[str, ...] = ()
+    said: str = ""
 
 
 class Locations:
@@ -107,10 +115,15 @@ class Locations:
                 sources = [targets[0], *sources]
                 targets = targets[1:]
         source, _ = self._one(sources) if sources else (None, "place")
+        if len(targets) == 1 and targets[0].noun.quantity is Quantity.ALL:
+            each = targets[0].noun.settle()
+            if each.sort == "place" and len(each.subjects) > 1:
+                return Where(source, each=each.subjects, said=targets[0].noun.text)
         target, sort = self._one(targets) if targets else (None, "place")
         if source is not None and source == target:
             raise NotUnderstood(f"the sentence says both from and to {source}: say where to")
-        return Where(source, target, "robot" if sort == "robot" else "place")
+        kind: Sort = "robot" if sort == "robot" else "place"
+        return Where(source, target, kind, _surface(sources, source), _surface(targets, target))
 
     def _one(self, parts: Sequence[Part]) -> tuple[str, Sort]:
         """The one place or robot that all the phrases mean."""
@@ -127,6 +140,17 @@ class Locations:
                     f"{part.noun.text!r} could be {one_of(mention.subjects)}: say which"
                 )
         return mention.subjects[0], mention.sort
+
+
+def _surface(parts: Sequence[Part], place: str | None) -> str | None:
+    """The one surface of the place that the phrases name, if they name one."""
+    found = {
+        entity.id
+        for part in parts
+        for entity in part.noun.found
+        if entity.sort == "surface" and entity.stands_for == place
+    }
+    return found.pop() if len(found) == 1 else None
 
 
 def _shared(parts: Sequence[Part]) -> frozenset[str]:

@@ -26,6 +26,7 @@ class Mention:
 
     `key` tells one mention from another: two that say "a cup" may mean different cups.
     `selective`: other words would narrow it down, as in "all cups" but not in "the first cup".
+    `surfaces` are those by which places were named.
     """
 
     subjects: tuple[str, ...]
@@ -33,6 +34,7 @@ class Mention:
     key: int
     open: bool = False
     selective: bool = False
+    surfaces: tuple[str, ...] = ()
 
     @property
     def single(self) -> bool:
@@ -66,6 +68,11 @@ class Noun:
     def names(self) -> tuple[str, ...]:
         """Everybody who could be meant."""
         return tuple(dict.fromkeys(e.stands_for for e in self.found))
+
+    @property
+    def surfaces(self) -> tuple[str, ...]:
+        """The surfaces that could be meant."""
+        return tuple(e.id for e in self.found if e.sort == "surface")
 
     def among(self, subjects: Collection[str]) -> Noun:
         """The same phrase, said of some of those that it could be."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from fleet.core.language.cursor import Cursor
 from fleet.core.language.lexicon import Lexicon, Sort
@@ -10,7 +11,7 @@ from fleet.core.language.locations import SPOTS, Locations, Part, Where
 from fleet.core.language.mentions import Mention, Noun
 from fleet.core.language.morphology import gerund
 from fleet.core.language.nouns import Nouns
-from fleet.core.language.refusals import listed
+from fleet.core.language.refusals import listed, one_of
 from fleet.core.language.stages import Draft
 from fleet.core.language.subjects import THINGS, Subject, Subjects
 from fleet.core.language.verbs import PARTICLES
@@ -32,9 +33,9 @@ _OFFERING = frozenset(
 class Moving:
     """Turns clauses about where things and robots shall be into wishes."""
 
-    def __init__(self, text: str, words: Vocabulary) -> None:
+    def __init__(self, text: str, words: Vocabulary, what: str = "a goal") -> None:
         self.words = words
-        self.cursor = Cursor(text, Lexicon(words))
+        self.cursor = Cursor(text, Lexicon(words), what)
         self.nouns = Nouns(self.cursor)
         self.subjects = Subjects(self.cursor, self.nouns, words)
         self.locations = Locations(self.cursor, self.nouns, words)
@@ -65,13 +66,14 @@ class Moving:
             moved = self.subjects.read("an object", ("object",))
             return self.to_target(moved, Where(None, *self._receiver(first)), False)
         parts, home = self.parts()
-        where = self.where(parts)
+        where = self.where(parts, each=not give)
         if give and where.target is not None and where.target_sort != "robot":
             raise NotUnderstood(
                 f"{where.target!r} is no robot that something could be given to; known are "
                 f"{listed(cursor.lexicon.known(('robot',)))}"
             )
-        if fetch and where.target is None and not home and cursor.at_border() | self._and_next():
+        whereto = where.target is not None or bool(where.each) or home
+        if fetch and not whereto and (cursor.at_border() or self._and_next()):
             return self._fetched(moved, where)
         return self.to_target(moved, where, home or (tidy and where.target is None))
 
@@ -81,10 +83,14 @@ class Moving:
     def _fetched(self, moved: Sequence[Subject], where: Where) -> None:
         if any(subject.sort == "robot" for subject in moved):
             raise self._no_target()
-        mentions = [self.subjects.settle(self.subjects.movable(s), where.source) for s in moved]
+        mentions = [self._from(self.subjects.movable(s), where) for s in moved]
         for mention in mentions:
             self.draft.add("held", mention, True, whereto=True)
         self.subjects.remember(mentions)
+
+    def _from(self, subject: Subject, where: Where) -> Mention:
+        """Who is meant, told apart by where they are."""
+        return self.subjects.settle(subject, where.source, where.source_surface)
 
     def _receiver(self, noun: Noun) -> tuple[str, Sort]:
         mention = noun.settle()
@@ -140,20 +146,54 @@ class Moving:
         found = tuple(e for e in found if e.sort == "place")
         return Part("to", Noun(found, self.cursor.said(start), start, exact=True))
 
-    def where(self, parts: Sequence[Part]) -> Where:
-        """Source and target of prepositional phrases; the target is what "there" means next."""
+    def where(self, parts: Sequence[Part], each: bool = False) -> Where:
+        """Source and target of prepositional phrases; the target is what "there" means next.
+
+        Raises:
+            NotUnderstood: they say "every room", and not `each` of several can be meant.
+        """
         where = self.locations.where(parts)
+        if where.each and not each:
+            raise self._which_of(where)
         if where.target is not None and where.target_sort == "place":
             self.last_place = where.target
         elif where.source in self.words.places:
             self.last_place = where.source
         return where
 
+    @staticmethod
+    def _which_of(where: Where) -> NotUnderstood:
+        return NotUnderstood(f"{where.said!r} could be {one_of(where.each)}: say which")
+
+    def _to_each(self, moved: Sequence[Subject], where: Where) -> None:
+        """Wish that another one is in each of several places: "a cup in every room".
+
+        Raises:
+            NotUnderstood: what is moved is said by name, and cannot be everywhere.
+        """
+        able = [self.subjects.drivers(self.subjects.movable(subject)) for subject in moved]
+        mentions = [self._from(subject, where) for subject in able]
+        if len(mentions) != 1 or not mentions[0].open:
+            raise self._which_of(where)
+        if len(mentions[0].subjects) < len(where.each):
+            raise NotUnderstood(
+                f"{where.said!r} are {len(where.each)}, and there are only "
+                f"{len(mentions[0].subjects)} for them: {one_of(mentions[0].subjects)}"
+            )
+        for number, place in enumerate(where.each, 1):
+            # Each is one of its own: negative keys are those of no word.
+            one = replace(mentions[0], key=-(1000 * (mentions[0].key + 1) + number))
+            self.draft.add("at", one, place)
+        self.moved = []
+        self.subjects.remember([])
+
     def to_target(self, moved: Sequence[Subject], where: Where, home: bool) -> None:
         """Wish that these are at the target, or at home."""
+        if where.each:
+            return self._to_each(moved, where)
         self.moved = list(moved)
         able = [self.subjects.drivers(self.subjects.movable(subject)) for subject in moved]
-        mentions = [self.subjects.settle(subject, where.source) for subject in able]
+        mentions = [self._from(subject, where) for subject in able]
         for mention in mentions:
             if home:
                 self.home(mention)
@@ -168,6 +208,7 @@ class Moving:
         if where.target is not None and where.target_sort == "robot":
             receiver = Mention((where.target,), "robot", self.cursor.at)
             self.subjects.recent = [*self.subjects.recent, receiver]
+        return None
 
     def _no_target(self) -> NotUnderstood:
         cursor = self.cursor

@@ -16,19 +16,19 @@ _WHY: dict[str, str] = {
         (
             "if when whenever unless while until till once before after because since whether "
             "depending otherwise else provided",
-            "makes it depend on something else, which a goal cannot; give it when it is time, "
+            "makes it depend on something else, which {what} cannot; give it when it is time, "
             'or put one thing after the other with "then"',
         ),
         (
-            "am pm oclock o'clock clock minute minutes hour hours sec secs seconds day days week "
+            "pm oclock o'clock clock minute minutes hour hours sec secs seconds day days week "
             "weeks month today tomorrow tonight yesterday morning afternoon evening night noon "
             "midnight later soon daily weekly hourly monday tuesday wednesday thursday friday "
             "saturday sunday always constantly",
-            "names a time, which a goal cannot: work begins as soon as there is a plan",
+            "names a time, which {what} cannot: leave it out",
         ),
         (
             "again twice thrice times repeatedly forever continuously",
-            "asks for repetition, which a goal cannot: give it again when it was reached",
+            "asks for repetition, which {what} cannot: give it again when it was reached",
         ),
         (
             "or rather instead",
@@ -48,7 +48,11 @@ _WHY: dict[str, str] = {
             "names somebody whose place is not known; name a place or a robot",
         ),
         (
-            "with using via",
+            "quickly slowly carefully gently fast quietly silently cautiously safely together",
+            "says how it is to be done, which {what} cannot: leave it out",
+        ),
+        (
+            "with using use via",
             "says how or by whom it is to be done; who does what is found by the allocator, "
             "so leave it out",
         ),
@@ -58,11 +62,17 @@ _WHY: dict[str, str] = {
 }
 
 
-def reason_for(words: Iterable[tuple[str, str]]) -> str | None:
-    """What is special about words (word, as spoken) that could not be read, if anything is."""
+def reason_for(words: Iterable[tuple[str, str]], what: str = "a goal") -> str | None:
+    """What is special about words (word, as spoken) that could not be read, if anything is.
+
+    `what` could not be read: a goal or a fact.
+    """
+    before = ""
     for word, shown in words:
-        if word in _WHY:
-            return f"{shown!r} {_WHY[word]}"
+        known = "pm" if word == "am" and before.isdecimal() else word  # not of "I am"
+        if known in _WHY:
+            return f"{shown!r} {_WHY[known].format(what=what)}"
+        before = word
     return None
 
 

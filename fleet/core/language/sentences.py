@@ -180,7 +180,7 @@ class Sentences(Clauses):
                 else f"{shown!r} is a place, and places stay where they are: {EXAMPLE}"
             )
         parts, home = self.parts()
-        return self.to_target(who, self.where(parts), home or Doing.TIDY in done)
+        return self.to_target(who, self.where(parts, each=True), home or Doing.TIDY in done)
 
     def _belongs(self, who: Sequence[Subject]) -> None:
         """`NP belongs in PLACE`, after the verb."""
@@ -236,13 +236,14 @@ class Sentences(Clauses):
         cursor.at = here
         special = cursor.refusal("")
         cursor.at = first
+        if cursor.word() == "another" or cursor.word(1) == "other":
+            self.nouns.noun("an object", THINGS)  # says itself what is wrong with it
+            cursor.at = first
         shown = cursor.said(*cursor.phrase())
         if shown and shown.split()[0].casefold() in _QUESTIONS:
             return NotUnderstood(
                 f"{self.cursor.line!r} is a question; a goal says what should hold: {EXAMPLE}"
             )
-        if cursor.take_word(("clear", "empty")) and self.nouns.starts(PLACES):
-            return self.by_surface(shown, self.nouns.noun("a place", PLACES).names)
         hint = suggestion(shown.split()[0], BASE_VERBS) if shown and start is None else ""
         if str(special):
             return special

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 from fleet.core.language.mentions import Mention
@@ -73,6 +73,17 @@ class Draft:
             Wish(relation, subjects, value, mention.key, mention.open, on_robot, means, whereto)
             for subjects in each
         )
+
+    def narrow(self, mention: Mention, subjects: Collection[str]) -> Mention:
+        """Of those whom an open mention may mean, only these will do."""
+        left = tuple(s for s in mention.subjects if s in subjects)
+        meant = replace(mention, subjects=left, open=len(left) > 1)
+        for stage in self.stages:
+            stage[:] = [
+                replace(wish, subjects=left, open=meant.open) if wish.key == mention.key else wish
+                for wish in stage
+            ]
+        return meant
 
     def conditions(self) -> tuple[tuple[Condition, ...], ...]:
         """The stages, each free of contradictions and of what another wish implies.
@@ -154,6 +165,7 @@ def _settled(stage: Sequence[Wish]) -> list[Wish]:
         for i, wish in enumerate(stage)
         if not any(_implies(other, wish, later=j > i) for j, other in enumerate(stage) if i != j)
     ]
+    kept = [_left_for(wish, kept) for wish in kept]
     fixed: dict[tuple[str, str], Wish] = {}
     for wish in kept:
         if not wish.open:
@@ -181,6 +193,17 @@ def _implies(wish: Wish, other: Wish, later: bool) -> bool:
     return same and other.relation == "held" and wish.relation == "at" and later
 
 
+def _left_for(wish: Wish, others: Sequence[Wish]) -> Wish:
+    """An open wish without those that another one names: "the first cup and another cup"."""
+    if not wish.open or wish.relation != "at":
+        return wish
+    named = {w.subjects[0] for w in others if w.relation == "at" and not w.open}
+    left = tuple(s for s in wish.subjects if s not in named)
+    if not left:
+        raise NotUnderstood(f"it wants more of {one_of(wish.subjects)} than there are; {_THEN}")
+    return replace(wish, subjects=left, open=len(left) > 1)
+
+
 def _check_open(kept: Sequence[Wish], fixed: dict[tuple[str, str], Wish]) -> None:
     """Whether somebody is left for every open wish: each is in one place only.
 
@@ -193,6 +216,12 @@ def _check_open(kept: Sequence[Wish], fixed: dict[tuple[str, str], Wish]) -> Non
                 raise NotUnderstood(
                     f"it wants one of {one_of(wish.subjects)} in two places: {wish.value} and "
                     f"{other.value}; {_THEN}"
+                )
+            same = (wish.subjects, wish.value) == (other.subjects, other.value)
+            if wish.key != other.key and same:
+                raise NotUnderstood(
+                    f"it wants one of {one_of(wish.subjects)} in {wish.value} more than once: "
+                    "say how many, or which ones"
                 )
     taken = {name: wish for (relation, name), wish in fixed.items() if relation == "at"}
     open_wishes = list(dict.fromkeys(replace(wish, key=0) for wish in at))

@@ -127,7 +127,8 @@ class _Statements(Claims):
         if not cursor.take_word(("is", "are", "stands", "lies", "stand", "lie", "'s")):
             raise self._unread()
         things = self._things()
-        self.put(things, self.where(parts).target)
+        where = self.where(parts)
+        self.put(things, where.target, where.target_surface)
 
     def _of_things(self) -> None:
         cursor, start = self.cursor, self.cursor.at
@@ -153,6 +154,7 @@ class _Statements(Claims):
                     )
                 held = self.subjects.read("an object", ("object",))
                 return self.holding(things, held, in_hand=holding is not None)
+        found = cursor.take("can", "be", "found") or cursor.take("could", "be", "found")
         could = cursor.take("could", "be") or cursor.take("may", "be") or cursor.take("might", "be")
         if could:
             if cursor.take_of(ANYWHERE):
@@ -164,6 +166,7 @@ class _Statements(Claims):
                 return self.lost(things)
         elif not (
             standing
+            or found
             or cursor.take_word(STANDING)
             or cursor.take("has", "gone", "missing")
             or cursor.word() in ("in", "on", "at", "inside")
@@ -184,7 +187,7 @@ class _Statements(Claims):
         where = self.where(parts)
         if where.source is not None or where.target is None:
             raise NotUnderstood(f"{cursor.said(self.began)!r} does not say one place: {_EXAMPLE}")
-        self.put(things, where.target)
+        self.put(things, where.target, where.target_surface)
 
     def _ofplaces(self) -> None:
         """`The kitchen has been searched`, `the kitchen contains two cups`."""

@@ -21,6 +21,21 @@ _AFTER_PRONOUNS = PREPOSITIONS | frozenset({"and", "then", "back", "away", "up",
 Fact = tuple[str, str, str]
 
 
+def _determined(subject: Subject, before: Subject) -> Subject:
+    """The same, with the determiner of the one before if it has none: "all cups and books"."""
+    if (
+        isinstance(subject, Noun)
+        and isinstance(before, Noun)
+        and subject.plural
+        and subject.quantity is Quantity.BARE
+        and subject.count is None
+        and before.quantity in (Quantity.ALL, Quantity.THE)
+        and before.ordinal is None
+    ):
+        return replace(subject, quantity=before.quantity)
+    return subject
+
+
 class Subjects:
     """Reads lists of noun phrases, and settles who is meant by them."""
 
@@ -46,11 +61,13 @@ class Subjects:
             if not joined or verb_next(self.cursor) or not self._starts(sorts):
                 self.cursor.at = start
                 break
-            found.append(self._one(what, sorts))
+            found.append(_determined(self._one(what, sorts), found[-1]))
         return found
 
-    def settle(self, subject: Subject, source: str | None = None) -> Mention:
-        """Who is meant; with `source`, by those who are believed to be there.
+    def settle(
+        self, subject: Subject, source: str | None = None, surface: str | None = None
+    ) -> Mention:
+        """Who is meant; with `source`, by those who are believed to be there (on a `surface`).
 
         Raises:
             NotUnderstood: it does not say which of several, or counts wrongly.
@@ -60,7 +77,7 @@ class Subjects:
         elif source is None:
             mention = subject.settle()
         else:
-            mention = self._at_source(subject, source)
+            mention = self._at_source(subject, source, surface)
         if source is not None and not mention.open:
             self.presumed.extend(("at", name, source) for name in mention.subjects)
         return mention
@@ -174,7 +191,7 @@ class Subjects:
         )
         return Noun(both, f"{first.text} or {second.text}", first.key, Quantity.ANY)
 
-    def _at_source(self, noun: Noun, source: str) -> Mention:
+    def _at_source(self, noun: Noun, source: str, surface: str | None) -> Mention:
         """Who is meant by "all cups" when it is said that they come from a place."""
         try:
             mention = noun.settle()
@@ -185,8 +202,25 @@ class Subjects:
         else:
             reason = None
         there = [name for name in noun.names if self.words.whereabouts.get(name) == source]
+        if surface is not None:
+            there = self._on(surface, there, all_of_them=reason is None and not mention.open)
         if there:
             return replace(noun.among(there).settle(), key=noun.key)
+        where = f"on {surface}" if surface is not None else f"in {source}"
         raise NotUnderstood(
-            reason or f"it is not known which of {one_of(noun.names)} are in {source}: name them"
+            reason or f"it is not known which of {one_of(noun.names)} are {where}: name them"
         )
+
+    def _on(self, surface: str, there: Sequence[str], all_of_them: bool) -> list[str]:
+        """Those that are believed to lie on a surface.
+
+        Raises:
+            NotUnderstood: all of them are meant, and of some it is not known what they lie on.
+        """
+        unsure = [name for name in there if name not in self.words.rests]
+        if unsure and all_of_them:
+            raise NotUnderstood(
+                f"it is not known whether {one_of(unsure)} lies on {surface}: name the things, or "
+                "have the place searched first"
+            )
+        return [name for name in there if self.words.rests.get(name) == surface] or unsure

@@ -31,10 +31,10 @@ class Doing(Enum):
 _VERBS: dict[Doing, tuple[str, tuple[str, ...]]] = {
     Doing.MOVE: (
         "bring take deliver carry move transport return get fetch haul transfer relocate shift "
-        "put place set lay stow store leave collect retrieve drop deposit load send drive",
-        (),
+        "put place set lay stow store leave collect gather retrieve drop deposit load send drive",
+        ("put down", "set down", "lay down", "drop off"),
     ),
-    Doing.FETCH: ("take get fetch collect retrieve", ()),
+    Doing.FETCH: ("take get fetch collect gather retrieve", ()),
     Doing.GO: ("go navigate head travel proceed come drive move return", ()),
     Doing.FIND: ("find locate seek spot detect", ("look for", "search for", "hunt for")),
     Doing.SEARCH: (

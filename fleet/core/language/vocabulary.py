@@ -15,10 +15,12 @@ class Vocabulary:
 
     `whereabouts` may say at which place (or robot) an object is believed to be; phrases such as
     "the cup in the kitchen" or "all cups from the kitchen" are told apart by it, and "tidy up the
-    kitchen" is said of what is believed to be there; nothing else depends on it.
+    kitchen" is said of what is believed to be there; nothing else depends on it. `rests` may say on
+    which surface (or `floor`) it is believed to lie there: "everything on the coffee table".
     """
 
     places: Mapping[str, Place]
     objects: Mapping[str, Object]
     robots: Mapping[str, RobotSpec]
     whereabouts: Mapping[str, str] = field(default_factory=dict)
+    rests: Mapping[str, str] = field(default_factory=dict)

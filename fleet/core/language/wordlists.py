@@ -42,6 +42,7 @@ SINGULAR_PRONOUNS = frozenset({"it", "this", "that"})
 PLURAL_PRONOUNS = frozenset(words_in("them they these those both all each"))
 EVERYTHING = phrases("everything")
 ANYTHING = phrases("anything|something")
+EVERYONE = phrases("everyone|everybody")
 
 # --- politeness: words that change nothing of what must hold -------------------------------------
 OPENERS = phrases(
@@ -52,11 +53,14 @@ OPENERS = phrases(
     "do you mind|let us|let 's|lets|go and|come and|go on and|hey|hello|hi|hello there|ok|okay|so|"
     "now|just|also|try to|be so kind and|be so kind as to|i would appreciate it if you could|"
     "start by|how about|somebody|someone|firstly|first of all|all right|alright|well|oh|"
+    "somebody should|someone should|somebody must|someone must|somebody has to|someone has to|"
+    "somebody needs to|someone needs to|somebody please|someone please|one of you should|"
     "it would be nice if you could|i would be glad if you could"
 )
 CLOSERS = phrases(
     "please|thanks|thank you|thank you very much|many thanks|thanks a lot|for me|for us|now|"
-    "right now|right away|immediately|at once|too|as well|also|will you|would you|could you|"
+    "right now|right away|immediately|at once|as soon as possible|as soon as you can|asap|too|"
+    "as well|also|will you|would you|could you|"
     "can you|ok|okay|if you please|if you would|if you can|if possible|when you can|cheers"
 )
 NEXT = phrases(
@@ -67,7 +71,8 @@ NEXT = phrases(
 )
 WANTING = phrases(
     "i want|i need|we want|we need|i would like|we would like|i would like to have|i want to have|"
-    "i would like to see|i want to see|we would like to have"
+    "i would like to see|i want to see|we would like to have|i would love|i would love to have|"
+    "we would love to have"
 )
 ENSURING = phrases(
     "make sure|make sure that|ensure|ensure that|see to it that|see to it|be sure that|"
@@ -75,6 +80,13 @@ ENSURING = phrases(
     "it must be true that|the goal is for|guarantee that|making sure that"
 )
 TELLING = phrases("let|have|tell|ask|order|command|instruct|make")
+ENOUGH = phrases(
+    "would do|will do|would suffice|would be fine|is fine|would be enough|is enough|would be ok|"
+    "is ok|would be okay|is okay|would be good|would be great|would be nice|would be perfect|"
+    "would be all right|is all right"
+)
+REMARKS = phrases("i am|i have|i feel|i have got|we are|we have|we feel|we have got")
+"""How a sentence begins in which a person speaks of themselves, which asks for nothing."""
 MODALS = phrases(
     "should|must|shall|has to|have to|needs to|need to|ought to|is to|are to|can|could|would|will|"
     "is supposed to|are supposed to"

@@ -1,0 +1,180 @@
+"""A running plan of 1,000 tasks on 50 robots: what an event takes, and what losing a robot takes.
+
+Run from anywhere: `python benchmarks/bench_running_plan.py` (or `make bench`). The planner's own
+core and desk, without keys: a lost robot is mended as in the field, and beside that, in the same
+run, everything is planned again, as a person's replan does. Wall times; numbers are of this machine
+and of whatever else it was doing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import dataclass
+from typing import Any
+
+from msgspec.structs import replace
+from rich.console import Console
+from rich.table import Table
+
+from fleet.core import events
+from fleet.core.effects import MakePlan
+from fleet.core.events import PlanMade
+from fleet.core.lateness import FACTOR, MARGIN_S
+from fleet.core.state import OUTSTANDING, PlanBook, Policy, State
+from fleet.core.step import step
+from fleet.service.composition import Composition, compose
+from fleet.service.planning_desk import carry_out
+from keyexpr_schema.goals import Condition, Goal
+from keyexpr_schema.plans import PlanChange
+from keyexpr_schema.requests import PlanRequest, ReplanRequest
+from keyexpr_schema.robots import RobotSpec
+from keyexpr_schema.tasks import Report, ReportState, TaskRecord
+from keyexpr_schema.world import Fact, Object, Place
+
+PLACES = 6
+STEP_M = 4.0
+DONE_BEFORE = 60
+"""Tasks that have succeeded when the robot is lost."""
+
+
+def main() -> None:
+    """Print the table."""
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--robots", type=int, default=50)
+    options.add_argument("--goals", type=int, default=250, help="of four tasks each")
+    given = options.parse_args()
+    table = Table(
+        "what happens", "time", "makespan left", "least found", "actors moved", "tasks kept",
+        "dropped", "added", title=f"{4 * given.goals} tasks on {given.robots} robots",
+    )  # fmt: skip
+    for happens in (lost, late, planned_again):
+        running = Running(compose(), given.robots, given.goals)
+        began_s = time.perf_counter()
+        for _ in range(DONE_BEFORE):
+            running.succeed()
+        each_s = (time.perf_counter() - began_s) / (2 * DONE_BEFORE)
+        before = running.book.allocation
+        happens(running)
+        book, made = running.book, running.made
+        moved = sum(before.get(actor, robot) != robot for actor, robot in book.allocation.items())
+        changed = book.change or PlanChange()
+        changes = [str(n) for n in (changed.kept, changed.dropped, changed.added)]
+        least = next((n.split(" is ")[-1] for n in book.notes if "least found" in n), "")
+        table.add_row(
+            (happens.__doc__ or "").split(".")[0],
+            f"{made.planning_time_s:.2f} s",
+            f"{made.makespan_s:.0f} s",
+            least,
+            str(moved) if made.mended else "",
+            *changes,
+        )
+    console = Console(width=140)
+    console.print(table)
+    console.print(f"an event of the running plan (a task starts, or ends): {1000 * each_s:.1f} ms")
+
+
+@dataclass
+class Running:
+    """The planner in the middle of a plan; robots do what they are told, as long as predicted."""
+
+    parts: Composition
+    robots: int
+    goals: int
+
+    def __post_init__(self) -> None:
+        self.state, self.time_s, self.made = State(), 0.0, PlanMade
+        self.tell(events.PlannerStarted, epoch=1, incarnation="bench")
+        for number in range(PLACES):
+            ways = {f"room_{n}": abs(n - number) * STEP_M for n in range(PLACES) if n != number}
+            place = Place(place=f"room_{number}", label=f"room {number}", travel_m=ways)
+            self.tell(events.PlaceTold, place=place)
+        for number in range(self.robots):
+            spec = RobotSpec(
+                robot=f"r{number}", model="hsr",
+                skills=("navigate", "pick", "place"),
+                capabilities={"drive": 0.6, "see": 4.0, "grip": 1.2, "reach": 1.0},
+            )  # fmt: skip
+            self.tell(events.RobotTold, spec=spec)
+            self.tell(events.RobotSeen, robot=spec.robot, incarnation="i1")
+            self.learn(spec.robot, "holding", "nothing")
+            self.learn(spec.robot, "at", f"room_{number % PLACES}")
+        for number in range(self.goals):
+            self.tell(
+                events.ObjectTold,
+                object=Object(object=f"c{number}", kind="cup", label=f"c{number}"),
+            )
+            self.learn(f"c{number}", "at", f"room_{number % PLACES}")
+            wanted = f"room_{(number + 1 + number // PLACES % (PLACES - 1)) % PLACES}"
+            condition = Condition(relation="at", subject=f"c{number}", value=wanted)
+            goal = Goal(goal=f"g{number}", text="", conditions=(condition,), ordinal=number)
+            self.tell(events.GoalTold, goal=goal)
+        self.tell(events.PlanAsked, request=PlanRequest(request="r", plan="p"))
+
+    @property
+    def book(self) -> PlanBook:
+        """What is kept of the plan."""
+        return self.state.plans["p"]
+
+    def tell(self, kind: type[events.Event], wait_s: float = 0.0, **fields: Any) -> None:
+        """One event; planning jobs are done at once."""
+        self.time_s += wait_s
+        at = {"time_s": self.time_s, "wall_time_s": self.time_s}
+        self.state, effects = step(self.state, kind(**at, **fields), self.parts.skills)
+        for effect in effects:
+            if isinstance(effect, MakePlan):
+                made = carry_out(effect.job, self.state, self.parts, at)
+                if not isinstance(made, PlanMade):
+                    raise SystemExit(f"there is no plan: {made.reason}")
+                self.made = made
+                self.state, _ = step(self.state, made, self.parts.skills)
+
+    def learn(self, subject: str, relation: str, value: str) -> None:
+        """Something is told."""
+        fact = Fact(subject=subject, relation=relation, value=value, source="bench")
+        self.tell(events.FactTold, fact=fact)
+
+    def outstanding(self) -> list[TaskRecord]:
+        """Tasks that robots are at."""
+        return [record for record in self.book.records.values() if record.state in OUTSTANDING]
+
+    def succeed(self) -> None:
+        """Some robot starts its task and ends it."""
+        record = self.outstanding()[0]
+        report = self.report_of(record)
+        self.tell(events.ReportTold, report=report)
+        done = replace(report, state=ReportState.SUCCEEDED, ended_s=self.time_s + record.duration_s)
+        self.tell(events.ReportTold, report=done)
+
+    def report_of(self, record: TaskRecord) -> Report:
+        """The report that the task has begun."""
+        assert record.robot is not None
+        return Report(
+            robot=record.robot, plan="p", revision=record.revision, task=record.task,
+            attempt=record.attempt, epoch=1, incarnation="i1", state=ReportState.STARTED,
+            started_s=self.time_s,
+        )  # fmt: skip
+
+
+def lost(running: Running) -> None:
+    """A robot is lost: what is left is mended."""
+    robot = running.outstanding()[-1].robot
+    running.tell(events.RobotGone, robot=robot, incarnation="i1")
+    running.tell(events.TimePassed, wait_s=Policy().lost_after_s + 1.0)
+
+
+def late(running: Running) -> None:
+    """A robot is ten minutes late: what is left is mended."""
+    record = running.outstanding()[-1]
+    running.tell(events.ReportTold, report=running.report_of(record))
+    running.tell(events.TimePassed, wait_s=FACTOR * record.duration_s + MARGIN_S + 600.0)
+
+
+def planned_again(running: Running) -> None:
+    """A person wants another plan: everything is planned again."""
+    ask = ReplanRequest(request="again", plan="p", reason="because")
+    running.tell(events.ReplanAsked, request=ask)
+
+
+if __name__ == "__main__":
+    main()

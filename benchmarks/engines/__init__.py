@@ -1,0 +1,1 @@
+"""Classical planners beside our own search, on the same household problems."""

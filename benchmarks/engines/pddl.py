@@ -1,0 +1,167 @@
+"""Household problems in PDDL, made from the skill models, specs and facts that our planner has.
+
+Every relation becomes a predicate `(is-relation subject value)`; a skill that overwrites a variable
+gets one more parameter, its old value. Capabilities become static predicates, the room in a basket
+so many slots. What is unknown is left out, so every fact that a skill needs must be known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from fleet.core.skills import Action, Need, SkillModel
+from fleet.core.world_model import WorldModel
+from keyexpr_schema.goals import Condition
+from keyexpr_schema.world import NOTHING, Value
+
+Step = tuple[str, tuple[str, ...]]
+"""A step of a plan: the action's name and its arguments, as PDDL has them."""
+
+
+def domain(world: WorldModel) -> str:
+    """The skills as a typed STRIPS domain."""
+    skills = [world.skills[name] for name in sorted(world.skills)]
+    relations = sorted(
+        {row[0] for skill in skills for row in (*skill.before, *skill.after)} | {"at", "holding"}
+    )
+    predicates = [f"(is-{relation} ?subject - thing ?value - thing)" for relation in relations]
+    predicates += ["(slot ?slot - thing ?robot - thing)", "(empty ?slot - thing)"]
+    predicates += ["(other ?one - thing ?two - thing)"]
+    statics = {_static(need): need for _, need in _needs(skills)}
+    predicates += [
+        f"({name} ?robot - thing{' ?of - thing' if need.of else ''})"
+        for name, need in sorted(statics.items())
+    ]
+    predicates += [f"(skilled-{skill.name} ?robot - thing)" for skill in skills]
+    words = sorted(
+        {
+            _word(row[2])
+            for s in skills
+            for row in (*s.before, *s.after)
+            if row[2] not in s.parameters
+        }
+    )
+    return "\n".join(
+        [
+            "(define (domain household)",
+            "(:requirements :strips :typing)",
+            "(:types a-robot a-object a-place a-word a-slot - thing)",
+            f"(:constants {' '.join(words)} - a-word)",
+            f"(:predicates {' '.join(predicates)})",
+            *(_action(skill) for skill in skills),
+            ")",
+        ]
+    )
+
+
+def problem(world: WorldModel, conditions: Iterable[Condition]) -> str:
+    """The facts, what robots can do, and the conditions that must all hold."""
+    slots = [
+        (f"slot-{robot}-{number}", robot)
+        for robot in world.team
+        for number in range(int(world.capability(robot, "basket") or 0))
+    ]
+    known = [
+        f"(is-{variable.relation} {variable.subject} {_word(value)})"
+        for variable, value in world.facts.items()
+        if value is not None
+    ]
+    known += [f"(slot {slot} {robot}) (empty {slot})" for slot, robot in slots]
+    known += [f"(other {a} {b})" for a in world.team for b in world.team if a != b]
+    known += _abilities(world)
+    goals = " ".join(f"(is-{c.relation} {c.subject} {_word(c.value)})" for c in conditions)
+    names = [
+        f"{' '.join(world.team)} - a-robot",
+        f"{' '.join(world.objects)} - a-object",
+        f"{' '.join(world.places)} - a-place",
+        f"{' '.join(slot for slot, _ in slots)} - a-slot" if slots else "",
+    ]
+    return "\n".join(
+        [
+            "(define (problem mission) (:domain household)",
+            f"(:objects {' '.join(names)})",
+            f"(:init {' '.join(known)})",
+            f"(:goal (and {goals})))",
+        ]
+    )
+
+
+def actions(steps: Sequence[Step], world: WorldModel) -> list[Action]:
+    """The ground actions of a plan; parameters that were added for PDDL are left out."""
+    found = []
+    for name, values in steps:
+        skill = world.skills[name]
+        found.append(skill.ground(dict(zip(skill.parameters, values, strict=False))))
+    return found
+
+
+def _action(skill: SkillModel) -> str:
+    parameters = [f"?{name} - a-{kind}" for name, kind in skill.parameters.items()]
+    known = {(row[0], row[1]): row[2] for row in skill.before}
+    before = [f"(is-{r} ?{s} {_term(v, skill)})" for r, s, v in skill.before]
+    before += [f"(skilled-{skill.name} ?{skill.actor_parameter})"]
+    robots = skill.robot_parameters
+    before += [f"(other ?{a} ?{b})" for i, a in enumerate(robots) for b in robots[i + 1 :]]
+    for parameter, need in _needs([skill]):
+        of = f" ?{need.of}" if need.of else ""
+        before.append(f"({_static(need)} ?{parameter}{of})")
+    after = []
+    for relation, subject, value in skill.after:
+        old = known.get((relation, subject))
+        if old is None:
+            name = f"old-{relation}-{subject}"
+            parameters.append(f"?{name} - thing")
+            before.append(f"(is-{relation} ?{subject} ?{name})")
+            term = f"?{name}"
+        else:
+            term = _term(old, skill)
+        after.append(f"(not (is-{relation} ?{subject} {term}))")
+        after.append(f"(is-{relation} ?{subject} {_term(value, skill)})")
+    for carrier in skill.space_in:
+        parameters.append(f"?slot-{carrier} - a-slot")
+        before += [f"(slot ?slot-{carrier} ?{carrier})", f"(empty ?slot-{carrier})"]
+        after.append(f"(not (empty ?slot-{carrier}))")
+    return (
+        f"(:action {skill.name} :parameters ({' '.join(parameters)}) "
+        f":precondition (and {' '.join(before)}) :effect (and {' '.join(after)}))"
+    )
+
+
+def _abilities(world: WorldModel) -> list[str]:
+    found = [
+        f"(skilled-{skill} {robot})"
+        for robot in world.team
+        for skill in world.robots[robot].skills
+        if skill in world.skills
+    ]
+    for need in {need for _, need in _needs(world.skills.values())}:
+        for robot in world.team:
+            has = world.capability(robot, need.capability)
+            if has is None:
+                continue
+            if need.measure is None:
+                found.append(f"({_static(need)} {robot})")
+                continue
+            things = world.objects if need.measure == "mass" else world.places
+            found += [
+                f"({_static(need)} {robot} {thing})"
+                for thing in things
+                if world.measure(need.measure, thing) <= has
+            ]
+    return sorted(found)
+
+
+def _needs(skills: Iterable[SkillModel]) -> list[tuple[str, Need]]:
+    return [(p, need) for skill in skills for p, needs in skill.needs.items() for need in needs]
+
+
+def _static(need: Need) -> str:
+    return f"can-{need.capability}" + (f"-{need.measure}" if need.measure else "")
+
+
+def _term(value: str | Value, skill: SkillModel) -> str:
+    return f"?{value}" if value in skill.parameters else _word(value)
+
+
+def _word(value: Value) -> str:
+    return f"w-{str(value).lower()}" if value in (True, False, NOTHING) else str(value)

@@ -1,0 +1,43 @@
+"""What lies, at the start of a mission, where none of its robots' hands gets to."""
+
+from __future__ import annotations
+
+from sim.mujoco_world.description import load_description
+from sim.mujoco_world.driving import REACH_MARGIN_M
+from sim.navigation.clearance import Clearance
+from sim.navigation.lattice import Lattice
+from sim.navigation.spots import Spots
+from sim.world_model import Mission
+
+
+def out_of_reach(mission: Mission) -> tuple[str, ...]:
+    """A sentence for each object that no robot of the mission can pick up where it lies.
+
+    Of a mission without a robot that picks things up there is nothing to say. What stands in the
+    way besides furniture (other robots, other objects) is not looked at.
+
+    Raises:
+        BadFile: a robot's model is missing or wrong.
+    """
+    hands = []
+    for robot in mission.robots:
+        about = load_description(robot.spec.model).description
+        if "pick" in robot.spec.skills and about.arm is not None:
+            least, greatest = about.arm.reach_m
+            reach_m = (least + REACH_MARGIN_M, greatest - REACH_MARGIN_M)
+            hands.append((robot.spec.robot, about.clearance_m, reach_m))
+    if not hands:
+        return ()
+    clearance = Clearance(mission.world)
+    spots = Spots(mission.world, Lattice(mission.world, clearance), clearance)
+    said = []
+    for name, entry in mission.world.object_entries.items():
+        point = mission.world.start_point_m(name)
+        if any(spots.stances(point, radius_m, reach_m) for _, radius_m, reach_m in hands):
+            continue
+        robot_name, radius_m, reach_m = hands[0]
+        said.append(
+            f"{name} lies on {entry.on} at {list(entry.at_m)}, where no hand gets to: "
+            f"for {robot_name}, {spots.why_not(point, radius_m, reach_m)}"
+        )
+    return tuple(said)

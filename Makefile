@@ -33,8 +33,8 @@ bench: $(VENV)/development ## measure the key-space and the planner; prints tabl
 bench-planning: $(VENV)/development ## the suite of household missions; writes docs/benchmarks/planning.md
 	$(BIN)/python -m benchmarks.planning.run --out docs/benchmarks
 
-bench-allocation: $(VENV)/development ## allocators and schedulers, beside each other
-	for file in benchmarks/allocation/bench_*.py; do $(BIN)/python $$file || exit 1; done
+bench-allocation: $(VENV)/development ## allocators and schedulers; writes docs/benchmarks/allocation.md
+	$(BIN)/python -m benchmarks.allocation.run --out docs/benchmarks
 
 docs: $(VENV)/development ## write the generated pages under docs/
 	$(BIN)/python -m keyexpr_schema.document

@@ -1,4 +1,4 @@
-"""Idle time of strategies and allocators on households: the RobotFleet paper's table, and more.
+"""Idle time of strategies and allocators on households, as in the table of the RobotFleet paper.
 
 `python -m benchmarks.allocation.bench_household` prints it. Schedules are those that the allocators
 predict; every one of them has passed the checker. `--llm-config FILE` adds the language model.
@@ -32,6 +32,7 @@ from fleet.allocators.base import Allocated, Allocator
 from fleet.allocators.cost_based import CostBasedAllocator
 from fleet.allocators.llm import LlmAllocator
 from fleet.allocators.makespan import MakespanAllocator
+from fleet.allocators.makespan.allocator import DEADLINE_S
 from fleet.allocators.milp import MilpAllocator
 from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.core.idle_time import predicted_unit, union_s
@@ -60,10 +61,10 @@ class Run:
     """Of the fleet, if the same work were done in `bound_s`."""
 
 
-def allocators(llm_file: Path | None = None) -> tuple[Allocator, ...]:
+def allocators(limit_s: float = DEADLINE_S, llm_file: Path | None = None) -> tuple[Allocator, ...]:
     """Those that are compared; the language model only where one is configured."""
     own: tuple[Allocator, ...] = (
-        MakespanAllocator(),
+        MakespanAllocator(limit_s),
         BalancedAllocator(),
         MilpAllocator(),
         CostBasedAllocator(),
@@ -171,10 +172,11 @@ def main() -> None:
     """Print the tables."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--seeds", type=int, default=SEEDS)
+    options.add_argument("--limit-s", type=float, default=DEADLINE_S, help="for `makespan`")
     options.add_argument("--llm-config", type=Path, help="add the allocator llm with this model")
     given = options.parse_args()
     console = Console(width=180)
-    found = runs(given.seeds, allocators(given.llm_config), console)
+    found = runs(given.seeds, allocators(given.limit_s, given.llm_config), console)
     for scenario in scenarios():
         table = Table(*HEAD, title=f"{scenario}; the paper's best: {100 * PAPER[scenario]:.1f} %")
         for row in rows(found, scenario):

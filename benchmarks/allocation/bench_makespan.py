@@ -1,5 +1,5 @@
-"""How good and how fast makespan scheduling is, by size: the pure core on random shops, public
-job-shop instances, and rescheduling after a loss.
+"""How good and how fast makespan scheduling is, by size, beside plain alternatives; on public
+instances; and when a robot is lost or late.
 
 `python -m benchmarks.allocation.bench_makespan` prints the tables. Wall times are of this machine
 and of whatever else it was doing. `bound` is proven, so that the ratio says how far from optimal at
@@ -11,126 +11,201 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from random import Random
 
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.allocation.alternatives import big_m, in_turn, makespan_s, nearest, papers_milp
 from benchmarks.allocation.shop_files import NAMES, load
 from benchmarks.allocation.shops import random_shop
 from fleet.allocators.makespan.compiled import Compiled
 from fleet.allocators.makespan.lists import construct
 from fleet.allocators.makespan.portfolio import solve
-from fleet.allocators.makespan.problem import Shop
+from fleet.allocators.makespan.problem import Machine, Shop
 from fleet.allocators.makespan.reschedule import reschedule, without_machines
 
-SIZES = ((8, 3), (50, 5), (100, 10), (1000, 50), (10_000, 1000))
-DEADLINES_S = {8: (1.0,), 50: (1.0, 10.0), 100: (1.0, 10.0), 1000: (1.0, 10.0), 10_000: (1.0, 10.0)}
+SIZES = ((8, 3), (10, 3), (20, 4), (50, 5), (100, 10), (1000, 50), (10_000, 1000))
+LIMITS_S = (1.0, 10.0)
+MEETINGS = 0.2
+"""Share of goals that are hand-overs, which need two robots at once, where there is travel."""
+COALITIONS = 0.5
+"""The same at 8 x 3."""
+LOST, LATE_S = 2, 300.0
+"""The robot that is lost, or late by so much [s]."""
 LOSS = (1000, 50)
+PUBLIC_S = 30.0
 
 
-def main() -> None:
-    """Print the tables that were asked for."""
-    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--largest", type=int, default=10_000, help="leave out more tasks")
-    options.add_argument("--only", choices=("random", "public", "loss"))
-    options.add_argument("--public-s", type=float, default=30.0, help="deadline of an instance")
-    chosen = options.parse_args()
-    console = Console(width=140)
-    if chosen.only in (None, "random"):
-        console.print(_random_table(chosen.largest))
-    if chosen.only in (None, "public"):
-        console.print(_public_table(chosen.public_s))
-    if chosen.only in (None, "loss"):
-        console.print(_loss_table())
+@dataclass(frozen=True)
+class Size:
+    """One random shop: makespans [s] and how long each took [s], by who made them."""
+
+    tasks: int
+    robots: int
+    travel: bool
+    bound_s: float
+    makespan_s: dict[str, float]
+    took_s: dict[str, float]
+    proven: bool
+    how: dict[str, str] = field(default_factory=dict)
 
 
-def _random_table(largest: int) -> Table:
-    table = Table(
-        "tasks x robots", "travel", "meetings", "deadline", "list schedule / bound", "list took",
-        "makespan / bound", "took", "how", title="makespan against a proven lower bound",
-    )  # fmt: skip
+@dataclass(frozen=True)
+class Public:
+    """One public instance; `found_s` is None where the optimum was not met."""
+
+    name: str
+    optimum: float
+    makespan: float
+    bound: float
+    took_s: float
+    how: str
+
+
+@dataclass(frozen=True)
+class Mended:
+    """One robot lost or late in a plan of 1,000 tasks for 50 robots; times in s."""
+
+    what: str
+    travel: bool
+    before_s: float
+    had: int
+    """Blocks of that robot."""
+    under_way: int
+    stayed: int
+    after_s: float
+    best_s: float
+    moved: int
+    scratch_s: float
+    scratch_moved: int
+    took_s: float
+
+
+def sizes(largest: int, limits_s: Sequence[float], tell: Callable[[str], None]) -> list[Size]:
+    """Every size with and without travel."""
+    found = []
     for tasks, robots in SIZES:
-        if tasks > largest:
-            continue
-        for travel, meetings in ((False, 0.0), (True, 0.2)):
-            shop = random_shop(tasks, robots, travel, meetings)
-            began_s = time.perf_counter()
-            listed = construct(Compiled(shop))
-            listed_s = time.perf_counter() - began_s
-            assert listed is not None
-            for deadline_s in DEADLINES_S[tasks]:
-                began_s = time.perf_counter()
-                found = solve(shop, deadline_s)
-                took_s = time.perf_counter() - began_s
-                assert found is not None and found.makespan_s <= listed.rated.makespan_s + 1e-6
-                table.add_row(
-                    f"{tasks} x {robots}",
-                    "yes" if travel else "no",
-                    f"{meetings:.0%}",
-                    f"{deadline_s:g} s",
-                    f"{listed.rated.makespan_s / found.lower_bound_s:.4f}",
-                    f"{listed_s:.3f} s",
-                    f"{found.makespan_s / found.lower_bound_s:.4f}",
-                    f"{took_s:.2f} s",
-                    ", ".join(found.notes),
-                )
-    return table
+        for travel in (False, True):
+            if tasks <= largest:
+                tell(f"{tasks} x {robots}{', travel' if travel else ''}")
+                found.append(size(tasks, robots, travel, limits_s))
+    return found
 
 
-def _public_table(deadline_s: float) -> Table:
-    table = Table(
-        "instance", "optimum", "makespan", "bound", "took", "how",
-        title=f"public instances, {deadline_s:g} s each",
-    )  # fmt: skip
+def size(tasks: int, robots: int, travel: bool, limits_s: Sequence[float], seed: int = 0) -> Size:
+    """One shop by all of them; none of ours may be worse than the list schedule."""
+    meetings = (COALITIONS if tasks == 8 else MEETINGS) if travel else 0.0
+    shop = random_shop(tasks, robots, travel, meetings, seed)
+    ready = Compiled(shop)
+    made: dict[str, float] = {}
+    took: dict[str, float] = {}
+    how: dict[str, str] = {}
+
+    def timed(name: str, run: Callable[[], float | None]) -> None:
+        began_s = time.perf_counter()
+        found_s = run()
+        if found_s is not None:
+            made[name], took[name] = found_s, time.perf_counter() - began_s
+
+    def by_hand(choose: Callable[[Compiled], list[int] | None]) -> float | None:
+        machine_of = choose(ready)
+        return None if machine_of is None else makespan_s(shop, machine_of)
+
+    def listed() -> float | None:
+        found = construct(Compiled(shop))
+        return None if found is None else found.rated.makespan_s
+
+    timed("greedy nearest", lambda: by_hand(nearest))
+    timed("round-robin", lambda: by_hand(in_turn))
+    timed("paper's MILP", lambda: by_hand(papers_milp))
+    timed("big-M MILP", lambda: big_m(ready))
+    timed("list schedule", listed)
+    bound_s, proven = 0.0, False
+    for limit_s in limits_s:
+        name = f"makespan, {limit_s:g} s"
+        began_s = time.perf_counter()
+        found = solve(shop, limit_s)
+        took[name] = time.perf_counter() - began_s
+        assert found is not None
+        made[name], how[name] = found.makespan_s, ", ".join(found.notes)
+        bound_s = max(bound_s, found.lower_bound_s)
+        proven = proven or found.gap < 1e-4
+        assert found.makespan_s <= made["list schedule"] + 1e-6, "worse than the list schedule"
+    return Size(tasks, robots, travel, bound_s, made, took, proven, how)
+
+
+def coalitions(limit_s: float = 10.0, seeds: int = 10) -> list[tuple[float, float]]:
+    """8 tasks, half of the goals hand-overs, 3 robots: gap, and how long it took [s]."""
+    found = []
+    for seed in range(seeds):
+        shop = random_shop(8, 3, True, COALITIONS, seed)
+        began_s = time.perf_counter()
+        made = solve(shop, limit_s)
+        assert made is not None
+        found.append((made.gap, time.perf_counter() - began_s))
+    return found
+
+
+def public(limit_s: float, tell: Callable[[str], None]) -> list[Public]:
+    """The public instances; how long until the proof, or the limit."""
+    found = []
     for name in NAMES:
+        tell(name)
         instance = load(name)
         began_s = time.perf_counter()
-        found = solve(instance.shop, deadline_s)
+        made = solve(instance.shop, limit_s)
         took_s = time.perf_counter() - began_s
-        assert found is not None
-        table.add_row(
-            name,
-            f"{instance.optimum_s:g}",
-            f"{found.makespan_s:g}",
-            f"{found.lower_bound_s:g}",
-            f"{took_s:.1f} s",
-            ", ".join(found.notes),
+        assert made is not None and instance.optimum_s is not None
+        how = ", ".join(made.notes)
+        found.append(
+            Public(name, instance.optimum_s, made.makespan_s, made.lower_bound_s, took_s, how)
         )
-    return table
+    return found
 
 
-def _loss_table() -> Table:
-    tasks, robots = LOSS
-    table = Table(
-        "travel", "before", "orphans", "after", "best found", "moved", "from scratch", "moves",
-        "took", title=f"one of {robots} robots lost before {tasks} tasks",
-    )  # fmt: skip
+def mended() -> list[Mended]:
+    """A robot lost, and one late, before 1,000 tasks, without and with travel."""
+    found = []
     for travel in (False, True):
-        shop = random_shop(tasks, robots, travel, 0.2 if travel else 0.0)
+        shop = random_shop(*LOSS, travel, MEETINGS if travel else 0.0)
         planned = solve(shop, 2.0, exact=False)
         assert planned is not None
-        lost = 2
-        left = without_machines(shop, frozenset({lost}))
-        frozen = under_way(shop, planned.machine_of, planned.order, lost)
-        began_s = time.perf_counter()
-        found = reschedule(left, planned.machine_of, planned.order, frozen)
-        took_s = time.perf_counter() - began_s
-        scratch = construct(Compiled(left))
-        assert found is not None and scratch is not None
-        afresh = sum(a != b for a, b in zip(scratch.machine_of, planned.machine_of, strict=True))
-        table.add_row(
-            "yes" if travel else "no",
-            f"{planned.makespan_s:.0f} s",
-            str(planned.machine_of.count(lost)),
-            f"{found.timed.makespan_s:.0f} s",
-            f"{found.best_makespan_s:.0f} s",
-            str(len(found.moved)),
-            f"{scratch.rated.makespan_s:.0f} s",
-            str(afresh),
-            f"{took_s:.2f} s",
-        )
-    return table
+        for what in ("lost", "late"):
+            left = without_machines(shop, frozenset({LOST})) if what == "lost" else _late(shop)
+            frozen = under_way(shop, planned.machine_of, planned.order, LOST)
+            began_s = time.perf_counter()
+            made = reschedule(left, planned.machine_of, planned.order, frozen)
+            took_s = time.perf_counter() - began_s
+            scratch = construct(Compiled(left))
+            assert made is not None and scratch is not None
+            pairs = zip(scratch.machine_of, planned.machine_of, strict=True)
+            found.append(
+                Mended(
+                    what,
+                    travel,
+                    planned.makespan_s,
+                    planned.machine_of.count(LOST),
+                    len(frozen),
+                    sum(made.timed.machine_of[b] == planned.machine_of[b] for b in frozen),
+                    made.timed.makespan_s,
+                    made.best_makespan_s,
+                    len(made.moved),
+                    scratch.rated.makespan_s,
+                    sum(a != b for a, b in pairs),
+                    took_s,
+                )
+            )
+    return found
+
+
+def _late(shop: Shop) -> Shop:
+    machines = list(shop.machines)
+    one = machines[LOST]
+    machines[LOST] = Machine(one.kind, one.site, one.ready_s + LATE_S)
+    return Shop(shop.operations, shop.blocks, tuple(machines), shop.travel_s)
 
 
 def under_way(
@@ -149,6 +224,93 @@ def under_way(
     ]
     Random(0).shuffle(chosen)
     return frozenset(chosen)
+
+
+Rows = tuple[tuple[str, ...], list[tuple[str, ...]]]
+"""Headings, and rows."""
+
+
+def size_rows(found: Sequence[Size]) -> Rows:
+    """Makespan by the best bound, and how long it took."""
+    names = tuple(dict.fromkeys(name for one in found for name in one.makespan_s))
+    rows = []
+    for one in found:
+        cells = [
+            f"{one.makespan_s[name] / one.bound_s:.3f} ({one.took_s[name]:.2f} s)"
+            if name in one.makespan_s
+            else "-"
+            for name in names
+        ]
+        travel = "yes" if one.travel else "no"
+        proven = "yes" if one.proven else "no"
+        rows.append((f"{one.tasks} x {one.robots}", travel, *cells, proven))
+    return ("tasks x robots", "travel", *names, "proven optimal"), rows
+
+
+def public_rows(found: Sequence[Public]) -> Rows:
+    """Optimum, what was found and proven, and when."""
+    return ("instance", "optimum", "makespan", "bound", "ended after", "how"), [
+        (
+            one.name,
+            f"{one.optimum:g}",
+            f"{one.makespan:g}",
+            f"{one.bound:g}",
+            f"{one.took_s:.1f} s",
+            one.how,
+        )
+        for one in found
+    ]
+
+
+def mended_rows(found: Sequence[Mended]) -> Rows:
+    """What was before, what is now, what a new plan would have been."""
+    head = (
+        "robot", "travel", "before", "its blocks", "under way, stayed", "after", "best found",
+        "moved", "from scratch", "moved by that", "took",
+    )  # fmt: skip
+    return head, [
+        (
+            one.what,
+            "yes" if one.travel else "no",
+            f"{one.before_s:.0f} s",
+            str(one.had),
+            f"{one.under_way}, {one.stayed}",
+            f"{one.after_s:.0f} s",
+            f"{one.best_s:.0f} s",
+            str(one.moved),
+            f"{one.scratch_s:.0f} s",
+            str(one.scratch_moved),
+            f"{one.took_s:.2f} s",
+        )
+        for one in found
+    ]
+
+
+def as_table(title: str, rows: Rows) -> Table:
+    """For a terminal."""
+    table = Table(*rows[0], title=title)
+    for row in rows[1]:
+        table.add_row(*row)
+    return table
+
+
+def main() -> None:
+    """Print the tables that were asked for."""
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--largest", type=int, default=10_000, help="leave out more tasks")
+    options.add_argument("--only", choices=("random", "public", "loss"))
+    options.add_argument("--public-s", type=float, default=PUBLIC_S, help="limit of an instance")
+    chosen = options.parse_args()
+    console = Console(width=180)
+    if chosen.only in (None, "random"):
+        rows = size_rows(sizes(chosen.largest, LIMITS_S, console.print))
+        console.print(as_table("makespan ÷ proven lower bound (time)", rows))
+    if chosen.only in (None, "public"):
+        console.print(
+            as_table("public instances", public_rows(public(chosen.public_s, console.print)))
+        )
+    if chosen.only in (None, "loss"):
+        console.print(as_table("one of 50 robots, 1,000 tasks", mended_rows(mended())))
 
 
 if __name__ == "__main__":

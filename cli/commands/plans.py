@@ -47,6 +47,12 @@ async def create(
     no_start: Annotated[
         bool, typer.Option("--no-start", help="Do not carry it out; see `plan start`.")
     ] = False,
+    fallback: Annotated[
+        bool,
+        typer.Option(
+            "--fallback-round-robin", help="With milp: where it finds nothing, take turns instead."
+        ),
+    ] = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only show the plan; leave nothing behind.")
     ] = False,
@@ -69,6 +75,9 @@ async def create(
     from keyexpr_schema.keyspace import GOAL_SPEC
     from keyexpr_schema.requests import PlanRequest
 
+    if fallback and allocator != "milp":
+        raise BadArgument("--fallback-round-robin goes with the allocator milp")
+    allocator = "milp-or-round-robin" if fallback else allocator
     if out is not None and not dry_run:
         raise BadArgument("--out goes with --dry-run; see a plan that was made with `plan show`")
     if out is not None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import msgspec
 
-from fleet.core.binding import able_robots, actors_apart, task_counts
+from fleet.core.binding import able_robots, actors_apart, task_counts, tasks_nobody_can_do
 from fleet.core.checker import CheckedPlan, check_plan
 from fleet.core.schedule import Schedule, schedule, valid_schedule
 from fleet.core.world_model import WorldModel
@@ -124,7 +124,8 @@ class Allocator(ABC):
     ) -> Allocated | NotAllocated:
         checked = check_plan(plan, world)
         if not checked.valid:
-            return NotAllocated(checked.violations)
+            lacking = tasks_nobody_can_do(plan, checked, world) if checked.actions else ()
+            return NotAllocated((*lacking, *checked.violations))
         problem = _problem(plan, world, checked, told)
         chosen = self._assign(problem)
         if isinstance(chosen, NotAllocated):

@@ -32,6 +32,7 @@ class MilpAllocator(Allocator):
     """
 
     name = "milp"
+    name_with_fallback = "milp-or-round-robin"
 
     def __init__(
         self,
@@ -40,6 +41,8 @@ class MilpAllocator(Allocator):
         solver: str | None = None,
     ) -> None:
         self._fallback = fallback_round_robin
+        if fallback_round_robin:
+            self.name = self.name_with_fallback
         self._time_limit_s = time_limit_s
         self._solver = solver
 

@@ -5,38 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 
 from fleet.allocators.base import AllocationProblem, NotAllocated
-from fleet.core.checker import CheckedPlan
-from fleet.core.world_model import WorldModel
 from keyexpr_schema.ids import ACTOR_PREFIX
-from keyexpr_schema.plans import Plan, Violation
+from keyexpr_schema.plans import Violation
 
 NAMED = 6
 """So many names are listed; the rest are counted."""
-
-
-def tasks_nobody_can_do(
-    plan: Plan, checked: CheckedPlan, world: WorldModel
-) -> tuple[Violation, ...]:
-    """Tasks with a part that no connected robot can take, each with what is lacking.
-
-    `checked` must have actions: the plan's form is right.
-    """
-    found = []
-    for task in plan.tasks:
-        action = checked.actions[task.task]
-        for parameter in action.skill.robot_parameters:
-            lacks = [world.lacks(robot, action, parameter) for robot in world.team]
-            if all(lacks):
-                told = "; ".join(dict.fromkeys(map(str, lacks))) or "no robot is connected"
-                part = "" if parameter == action.skill.actor_parameter else f" (as its {parameter})"
-                found.append(
-                    Violation(
-                        code="no-robot",
-                        sentence=f"no robot can do task {task.task}, {task.skill}{part}: {told}",
-                        task=task.task,
-                    )
-                )
-    return tuple(found)
 
 
 def not_apart(problem: AllocationProblem, actors: Collection[str], proven: bool) -> NotAllocated:

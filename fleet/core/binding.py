@@ -9,7 +9,7 @@ from fleet.core.schedule import actors_of
 from fleet.core.standing import carried_at_end
 from fleet.core.world_model import WorldModel
 from keyexpr_schema.ids import ACTOR_PREFIX
-from keyexpr_schema.plans import Plan
+from keyexpr_schema.plans import Plan, Violation
 
 Pair = tuple[str, str]
 
@@ -40,6 +40,31 @@ def actors_apart(plan: Plan, checked: CheckedPlan) -> frozenset[Pair]:
 def able_robots(plan: Plan, checked: CheckedPlan) -> dict[str, tuple[str, ...]]:
     """The robots of the team that can be each actor, in the order of the plan's actors."""
     return {actor: checked.able[actor] for actor in actors_of(plan)}
+
+
+def tasks_nobody_can_do(
+    plan: Plan, checked: CheckedPlan, world: WorldModel
+) -> tuple[Violation, ...]:
+    """Tasks with a part that no connected robot can take, each with what is lacking.
+
+    `checked` must have actions: the plan's form is right.
+    """
+    found = []
+    for task in plan.tasks:
+        action = checked.actions[task.task]
+        for parameter in action.skill.robot_parameters:
+            lacks = [world.lacks(robot, action, parameter) for robot in world.team]
+            if all(lacks):
+                told = "; ".join(dict.fromkeys(map(str, lacks))) or "no robot is connected"
+                part = "" if parameter == action.skill.actor_parameter else f" (as its {parameter})"
+                found.append(
+                    Violation(
+                        code="no-robot",
+                        sentence=f"no robot can do task {task.task}, {task.skill}{part}: {told}",
+                        task=task.task,
+                    )
+                )
+    return tuple(found)
 
 
 def task_counts(plan: Plan) -> dict[str, int]:

@@ -66,6 +66,7 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
     own: tuple[Allocator, ...] = (
         MakespanAllocator(),
         MilpAllocator(),
+        MilpAllocator(fallback_round_robin=True),
         BalancedAllocator(),
         CostBasedAllocator(),
         RoundRobinAllocator(),

@@ -16,6 +16,7 @@ from fleet.allocators.makespan.cpsat_process import Model
 from fleet.allocators.makespan.cpsat_request import helps, request_of
 from fleet.allocators.makespan.exhaustive import exhaust
 from fleet.allocators.makespan.graphs import cheapest_assignment
+from fleet.allocators.makespan.keeping import keep
 from fleet.allocators.makespan.lists import construct
 from fleet.allocators.makespan.portfolio import blocks_in_order, solve
 from fleet.allocators.makespan.problem import BadShop, Block, Machine, Operation, Place, Shop, Timed
@@ -213,6 +214,21 @@ def test_the_model_of_cp_sat_has_the_optimum_of_brute_force(shop: Shop) -> None:
     assert solver.solve(Model(cp_model, data).model) == cp_model.OPTIMAL
     least_s = min(one.makespan_s for one in every_schedule(shop))
     assert solver.objective_value == pytest.approx(least_s)
+
+
+@settings(max_examples=150, deadline=None)
+@given(shops())
+def test_who_can_stay_stays(shop: Shop) -> None:
+    """With no machine gone and the old makespan as the target nobody moves, and nothing is late."""
+    assume(sound(shop))
+    ready = Compiled(shop)
+    listed = construct(ready)
+    assume(listed is not None)
+    assert listed is not None
+    again = keep(ready, listed.order, listed.machine_of, listed.rated.makespan_s)
+    assert again is not None
+    assert again.machine_of == listed.machine_of
+    assert again.rated.makespan_s <= listed.rated.makespan_s + NEAR
 
 
 @settings(max_examples=60, deadline=None)

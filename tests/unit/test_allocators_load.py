@@ -16,7 +16,6 @@ from fleet.allocators.cost_based import CostBasedAllocator
 from fleet.allocators.llm import Choice, LlmAllocator
 from fleet.allocators.milp import MilpAllocator
 from fleet.allocators.min_max_load import Bound, min_max_load
-from fleet.allocators.reasons import tasks_nobody_can_do
 from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.allocators.solver_run import Found, available_solver, solve
 from fleet.core.checker import check_plan
@@ -25,6 +24,7 @@ from fleet.planners.base import PlanningProblem
 from fleet.planners.llm import LlmConfig, ModelCaller
 from fleet.planners.symbolic import SymbolicPlanner
 from fleet.service.allocation_asker import AllocationAsker
+from fleet.service.composition import compose
 from keyexpr_schema.plans import Plan, Task, Violation
 from tests.household import bring, carrier, fact, home, manipulator
 from tests.llm_server import LlmServer, Reply
@@ -213,14 +213,18 @@ def test_the_papers_fallback_is_off_unless_asked_for_and_says_so() -> None:
     assert made.allocation == {"a0": "r1", "a1": "r2"}
     (note,) = made.notes
     assert note.endswith("by round-robin and not by the MILP: the solver found nothing in time")
+    offered = compose().allocators
+    assert type(offered["milp-or-round-robin"]) is type(offered["milp"]) is MilpAllocator
 
 
 def test_tasks_that_nobody_can_do_are_named_with_what_is_lacking() -> None:
     plan = plan_for(home(), 1)
     world = home((carrier("c1"), manipulator("weak", grip_kg=0.1)))
-    told = tasks_nobody_can_do(plan, check_plan(plan, world), world)
+    refused = MilpAllocator().allocate(plan, world)
+    assert isinstance(refused, NotAllocated)
     pick = next(row.task for row in plan.tasks if row.skill == "pick")
-    sentence = next(violation.sentence for violation in told if violation.task == pick)
+    assert refused.violations[0].task == pick, "that comes first"
+    sentence = refused.violations[0].sentence
     assert sentence.startswith(f"no robot can do task {pick}, pick: ")
     assert "c1 does not have the skill pick" in sentence
     assert "weak's grip is 0.1 kg" in sentence

@@ -73,6 +73,9 @@ async def test_a_dry_run_shows_the_plan_and_leaves_nothing_behind(
             "plan", "create", "big-dag", "milp", "g", "--dry-run", "--json", "--out", str(out)
         )
         refused = await robotctl.soon("plan", "create", "big-dag", "milp", "--out", str(out))
+        flag = "--fallback-round-robin"
+        turns = await robotctl.soon("plan", "create", "big-dag", "milp", "g", "--dry-run", flag)
+        misplaced = await robotctl.soon("plan", "create", "big-dag", "makespan", flag)
         answers = await session.list(ANSWER)
         left = [
             *await session.list(PLAN_SPEC),
@@ -92,7 +95,9 @@ async def test_a_dry_run_shows_the_plan_and_leaves_nothing_behind(
     assert left == []
     assert status is not None
     assert status.state is GoalState.WAITING
-    assert len(answers) == 2
+    assert len(answers) == 3
+    assert turns.code == 0 and "milp-or-round-robin" in turns.out
+    assert misplaced.code == 1 and "goes with the allocator milp" in misplaced.err
     assert "--out goes with --dry-run" in refused.err
 
 

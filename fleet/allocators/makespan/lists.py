@@ -33,20 +33,9 @@ class Answer(NamedTuple):
     rated: Rated
 
 
-class Habit(NamedTuple):
-    """A schedule that is to be kept to: knots in its order, each block at `home` if it ends there
-    by `latest_s`, or nowhere else earlier by more than `slack_s`."""
-
-    order: Sequence[int]
-    home: Sequence[int]
-    slack_s: float = 0.0
-    latest_s: Sequence[float] | None = None
-
-
 def construct(
     shop: Compiled,
     alpha: float | None = None,
-    habit: Habit | None = None,
     at_random: Random | None = None,
     until_s: float = inf,
 ) -> Answer | None:
@@ -56,16 +45,11 @@ def construct(
     Deterministic. `None` if it leads to where some block finds no machine, or if it is not done at
     `until_s` (on `time.perf_counter`).
     """
-    board = _Board(shop, habit, at_random)
-    if habit is not None:
-        if any(board.place(knot) is None for knot in habit.order):
-            return None
-        rated = rate(shop, habit.order, board.machine_of)
-        return None if rated is None else Answer(list(habit.order), board.machine_of, rated)
+    board = Board(shop, at_random)
     order: list[int] = []
     missing = [len(befores) for befores in shop.knot_befores]
     ready: list[tuple[int, float, int]] = []
-    guesses: dict[int, _Guess] = {}
+    guesses: dict[int, Guess] = {}
     for knot, count in enumerate(missing):
         if count == 0:
             insort(ready, (shop.knot_place[knot], -shop.knot_rank[knot], knot))
@@ -89,7 +73,7 @@ def construct(
     return None if rated is None else Answer(order, board.machine_of, rated)
 
 
-class _Guess(NamedTuple):
+class Guess(NamedTuple):
     """Where a ready block would be done best: finish [s], start [s] with the way, machine."""
 
     finish_s: float
@@ -97,11 +81,11 @@ class _Guess(NamedTuple):
     machine: int
 
 
-class _Board:
+class Board:
     """What is placed so far."""
 
-    def __init__(self, shop: Compiled, habit: Habit | None, at_random: Random | None) -> None:
-        self.shop, self.habit, self.random = shop, habit, at_random
+    def __init__(self, shop: Compiled, at_random: Random | None = None) -> None:
+        self.shop, self.random = shop, at_random
         machines = shop.shop.machines
         self.free = [machine.ready_s for machine in machines]
         self.site = [machine.site for machine in machines]
@@ -115,7 +99,7 @@ class _Board:
         first = self.shop.steps_of[block][0]
         return max((self.ends[before] for before in self.shop.befores[first]), default=0.0)
 
-    def guess(self, block: int, machine: int, ready_s: float) -> _Guess:
+    def guess(self, block: int, machine: int, ready_s: float) -> Guess:
         """The block on this machine."""
         shop = self.shop
         kind = shop.kinds[machine]
@@ -125,9 +109,9 @@ class _Board:
         if target >= 0:
             start_s += shop.shop.travel_s[kind][self.site[machine]][target]
         own = shop.own_s[block]
-        return _Guess(start_s + (own[kind] if own else 0.0), start_s, machine)
+        return Guess(start_s + (own[kind] if own else 0.0), start_s, machine)
 
-    def best(self, block: int) -> _Guess | None:
+    def best(self, block: int) -> Guess | None:
         """The machine on which the block ends first; of equals the one that idles least before."""
         shop = self.shop
         others = {self.machine_of[other] for other in shop.shop.blocks[block].apart}
@@ -142,17 +126,7 @@ class _Board:
         if self.random is not None:
             return self.guess(block, self.random.choice(machines), ready_s)
         machine = self._first_done(block, machines, ready_s)
-        found = self.guess(block, machine, ready_s)
-        if self.habit is not None:
-            home = self.habit.home[block]
-            if home != machine and home in machines:
-                there = self.guess(block, home, ready_s)
-                enough_s = found.finish_s + self.habit.slack_s
-                if self.habit.latest_s is not None:
-                    enough_s = max(enough_s, self.habit.latest_s[block])
-                if there.finish_s <= enough_s:
-                    return there
-        return found
+        return self.guess(block, machine, ready_s)
 
     def _first_done(self, block: int, machines: Sequence[int], ready_s: float) -> int:
         """`guess` for all machines, of which the least is taken: the innermost loop of all."""
@@ -177,7 +151,7 @@ class _Board:
         return self.taken[machine] != LAST and self.taken[machine] <= place
 
     def choose(
-        self, ready: Sequence[tuple[int, float, int]], guesses: dict[int, _Guess], alpha: float
+        self, ready: Sequence[tuple[int, float, int]], guesses: dict[int, Guess], alpha: float
     ) -> int:
         """The index in `ready` of the knot that the dispatch rule takes."""
         chosen, least = 0, inf
@@ -196,7 +170,7 @@ class _Board:
                 chosen, least = index, score
         return chosen
 
-    def update(self, guesses: dict[int, _Guess], changed: set[int]) -> None:
+    def update(self, guesses: dict[int, Guess], changed: set[int]) -> None:
         """A machine only gets busier, so a guess stands unless its machine, or a nearer one, is
         among the changed."""
         for knot, found in list(guesses.items()):

@@ -1,7 +1,7 @@
 """A schedule mended after a machine is lost or late, with few blocks changing hands.
 
-Candidates: the old order gone through again, each block where it was if it ends there early enough
-for a target, for a range of targets; the orphans put where there is time; a schedule from scratch;
+Candidates: the old order gone through again for a range of targets, where everybody stays who does
+not stand in the way of the target; the orphans put where there is time; a schedule from scratch;
 and the best of those annealed. Of all that are within `WITHIN` of the shortest, the one with the
 fewest moves is taken, moves that it can do without are taken back, and what time is left goes into
 a search with a price on moves.
@@ -16,7 +16,8 @@ from math import inf
 
 from fleet.allocators.makespan.anneal import anneal
 from fleet.allocators.makespan.compiled import Compiled
-from fleet.allocators.makespan.lists import Answer, Habit, construct
+from fleet.allocators.makespan.keeping import keep
+from fleet.allocators.makespan.lists import Answer, construct
 from fleet.allocators.makespan.portfolio import blocks_in_order
 from fleet.allocators.makespan.problem import BadShop, Place, Shop, Timed
 from fleet.allocators.makespan.timing import rate, timed
@@ -25,13 +26,12 @@ WITHIN = 0.02
 """Share of the best makespan that fewer moves may cost."""
 PRICE = 0.002
 """Share of the makespan that one move costs while annealing: ten moves for `WITHIN`."""
-TARGETS = (1.0, 0.99, 0.98, 0.97, 0.96, 0.95, 0.93)
+TARGETS = (1.0, 0.99, 0.98, 0.97, 0.95)
 """Of the longest makespan that is allowed; tried one after the other."""
-ALWAYS = 3
+ALWAYS = 4
 """So many of them whatever the time."""
-TARGETS_SHARE, REPAIR_SHARE, SHORTEN_SHARE, MORE_TARGETS_SHARE, TAKE_BACK_SHARE = (
-    0.4, 0.5, 0.6, 0.7, 0.9,
-)  # fmt: skip
+TARGETS_SHARE, REPAIR_SHARE, SHORTEN_SHARE = 0.4, 0.5, 0.6
+MORE_TARGETS_SHARE, TAKE_BACK_SHARE = 0.75, 0.85
 """When each step is over, as a share of the time."""
 TRIED = 4
 """Machines that are tried for an orphan: those that are done first."""
@@ -90,7 +90,7 @@ def reschedule(
     shop = _pinned(shop, home, frozen)
     ready = Compiled(shop)
     knots = _knots_in_order(ready, order)
-    first = [construct(ready), construct(ready, habit=Habit(knots, home, inf))]
+    first = [construct(ready), keep(ready, knots, home, inf)]
     found = [answer for answer in first if answer is not None]
     if not found and (repaired := _repair(ready, home, knots, at(1.0))) is not None:
         found.append(repaired)
@@ -123,7 +123,6 @@ class _Mending:
         self.found, self.seed = found, seed
         self.targeted_s = 0.0
         """The limit that targets were last taken from."""
-        self.tails_s = [shop.tails[steps[-1]] for steps in shop.steps_of]
 
     @property
     def best_s(self) -> float:
@@ -136,8 +135,8 @@ class _Mending:
         return self.best_s * (1 + WITHIN)
 
     def keep_to_targets(self, until_s: float) -> None:
-        """Everybody stays where the target can be met there. That misses it by a little, since
-        those who come later are not asked, so that shorter ones are tried, too."""
+        """Everybody stays where the target can be met. That may miss it by a little, where there
+        are ways or partners, so that shorter ones are tried, too."""
         tried = 0
         while tried < len(TARGETS):
             if tried >= ALWAYS and time.perf_counter() > until_s:
@@ -149,8 +148,7 @@ class _Mending:
                 break
             target_s = TARGETS[tried] * self.targeted_s
             tried += 1
-            latest_s = [target_s - tail_s for tail_s in self.tails_s]
-            made = construct(self.shop, habit=Habit(self.knots, self.home, 0.0, latest_s))
+            made = keep(self.shop, self.knots, self.home, target_s)
             if made is not None:
                 self.found.append(made)
 

@@ -31,6 +31,24 @@ def advance(state: State, skills: Skills) -> State:
             state = plan_again(state, book)
         elif book.state is PlanState.RUNNING and book.job is None:
             state = _run(state, book, skills)
+    return _loosened(state, skills)
+
+
+def _loosened(state: State, skills: Skills) -> State:
+    """Where nobody moves, since plans keep robots from each other in a circle, one task gets its
+    robots all the same; what that upsets is planned again."""
+    alive = [book for book in state.plans.values() if not book.ended]
+    if any(book.job is not None or book.outstanding() for book in alive):
+        return state
+    for book in sorted(alive, key=lambda each: _priority(state, each.plan.plan)):
+        if book.state is not PlanState.RUNNING or book.replan_reason is not None:
+            continue
+        for record in book.current():
+            if record.state is not TaskState.WAITING:
+                continue
+            after = _dispatch(state, book.plan.plan, record, skills, kept=False)
+            if after is not state:
+                return advance(after, skills)
     return state
 
 
@@ -107,8 +125,13 @@ def _mark_reached(state: State, book: PlanBook, skills: Skills) -> State:
     return state
 
 
-def _dispatch(state: State, plan: str, record: TaskRecord, skills: Skills) -> State:
-    """Order a waiting task if nothing holds it back; replan if the world is not as it must be."""
+def _dispatch(
+    state: State, plan: str, record: TaskRecord, skills: Skills, kept: bool = True
+) -> State:
+    """Order a waiting task if nothing holds it back; replan if the world is not as it must be.
+
+    See `_free` for `kept`.
+    """
     book = state.plans[plan]
     befores = (*record.after, *record.behind)
     if any(
@@ -121,7 +144,7 @@ def _dispatch(state: State, plan: str, record: TaskRecord, skills: Skills) -> St
     if action is None:
         reason = f"{record.task} cannot start: there is no skill {record.skill} any more"
         return give_up(state, book, reason)
-    if not all(_free(state, robot, plan) for robot in action.participants):
+    if not all(_free(state, robot, plan, kept) for robot in action.participants):
         return state
     if _touches_what_is_dropped(book, action, skills):
         return state
@@ -160,12 +183,12 @@ def _touches_what_is_dropped(book: PlanBook, action: Action, skills: Skills) -> 
     return False
 
 
-def _free(state: State, robot: str, plan: str) -> bool:
+def _free(state: State, robot: str, plan: str, kept: bool) -> bool:
     """Whether a robot is connected and neither works now nor is in the middle of other work.
 
     A robot that carries what a plan wants brought somewhere is that plan's until it is delivered:
     between a pick and its place no other plan may have the hand. Without a load, a robot that has
-    begun an actor's work keeps to that plan until it has nothing left to do there.
+    begun an actor's work is `kept` by that plan until it has nothing left to do there.
     """
     if not state.alive.get(robot):
         return False
@@ -184,7 +207,7 @@ def _free(state: State, robot: str, plan: str) -> bool:
                 unfinished.add(record.actor)
         if book.plan.plan == plan or book.ended or carries:
             continue
-        if begun & unfinished or _carries_for(state, robot, book):
+        if (kept and begun & unfinished) or _carries_for(state, robot, book):
             return False
     return True
 

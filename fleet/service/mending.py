@@ -46,7 +46,8 @@ def mended_plan(
         return None
     tasks = tuple(task for task in remaining.tasks if task.goal not in broken)
     kept = {task.task for task in tasks}
-    first = 1 + max((int(task.task.removeprefix("t")) for task in remaining.tasks), default=0)
+    numbers = [int(task.task.removeprefix("t")) for task in remaining.tasks]
+    first = max([problem.first_task, *(number + 1 for number in numbers)])
     anew = tuple(goal for goal in problem.goals if goal.goal in broken)
     part = plan_what_can_be(planner, judge, changed(problem, goals=anew, first_task=first))
     mended = replace(

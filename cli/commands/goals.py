@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, Group, command
+from cli.command import Call, command
+from cli.parsing import Group
 
 if TYPE_CHECKING:
     from keyexpr_schema.goals import Goal, GoalStatus

@@ -61,7 +61,7 @@ async def status(call: Call) -> None:
 async def watch(
     call: Call,
     plan: Annotated[
-        str | None, typer.Argument(metavar="[PLAN]", help="Only this plan; else all.")
+        str | None, typer.Argument(metavar="PLAN", help="Only this plan; else all.")
     ] = None,
 ) -> None:
     """Follow goals, plans and tasks until Ctrl-C.

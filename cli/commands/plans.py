@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, FactWords, Group, command
+from cli.command import Call, command
 from cli.commands.plan_files import check, diff, propose
+from cli.parsing import FactWords, Group
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -40,7 +41,7 @@ async def create(
     ] = "makespan",
     goals: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[GOAL]…", help="Which goals; else every goal that waits."),
+        typer.Argument(metavar="GOAL", help="Which goals; else every goal that waits."),
     ] = None,
     planner: Annotated[str, typer.Option("--planner", help="Who plans.")] = "symbolic",
     name: Annotated[str | None, typer.Option("--id", help="Name of the plan.")] = None,
@@ -150,7 +151,7 @@ async def list_(call: Call) -> None:
 async def show(
     call: Call,
     plan: Annotated[
-        str | None, typer.Argument(metavar="[PLAN]", help="Its name; else the latest plan.")
+        str | None, typer.Argument(metavar="PLAN", help="Its name; else the latest plan.")
     ] = None,
     dot: Annotated[
         bool, typer.Option("--dot", help="Only the graph, in Graphviz' language (`| dot -Tsvg`).")

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, Group, command
+from cli.command import Call, command
+from cli.parsing import Group
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -24,7 +25,7 @@ def task() -> None:
 async def list_(
     call: Call,
     plan: Annotated[
-        str | None, typer.Argument(metavar="[PLAN]", help="Of one plan; else of all.")
+        str | None, typer.Argument(metavar="PLAN", help="Of one plan; else of all.")
     ] = None,
 ) -> None:
     """Tasks and how they stand."""
@@ -89,7 +90,7 @@ async def add(
     skill: Annotated[str, typer.Argument(metavar="SKILL", help="Such as navigate.")],
     args: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[NAME=VALUE]…", help="Its parameters, such as place=kitchen."),
+        typer.Argument(metavar="NAME=VALUE", help="Its parameters, such as place=kitchen."),
     ] = None,
     after: Annotated[
         list[str] | None,

@@ -105,7 +105,14 @@ def _sizes(results: list[dict[str, Any]], path: Path) -> None:
         axis.set_title("with travel: the bound is loose" if travel else "without travel")
         axis.spines[["top", "right"]].set_visible(False)
     axes[0].set_ylabel("makespan ÷ proven lower bound")
-    axes[0].legend(frameon=False, fontsize=8)
+    entries = {
+        label: handle
+        for axis in axes
+        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(
+        entries.values(), entries.keys(), loc="outside lower center", ncols=4, frameon=False
+    )
     figure.savefig(path, dpi=130)
     plt.close(figure)
 

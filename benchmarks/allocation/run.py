@@ -60,9 +60,19 @@ def main() -> None:
         }
         report.show(part, told[part], console)
         if known is not None:
-            known.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+            known.write_text(as_json(told), encoding="utf-8")
     if given.out is not None:
         report.write(given.out, told)
+
+
+def as_json(told: dict[str, Any]) -> str:
+    """A line a part, numbers to six digits."""
+    rounded = json.loads(json.dumps(told), parse_float=lambda text: float(f"{float(text):.6g}"))
+    parts = (
+        f"{json.dumps(part)}: {json.dumps(about, separators=(',', ':'))}"
+        for part, about in rounded.items()
+    )
+    return "{\n" + ",\n".join(parts) + "\n}\n"
 
 
 def _runs(given: argparse.Namespace, console: Console) -> dict[str, Callable[[], Any]]:

@@ -16,15 +16,12 @@ from keyexpr_schema.plans import Task
 class Strand:
     """Consecutive actions for one goal; each robot in it becomes an actor of its own.
 
-    `named` are robots that the goal itself speaks of: their actors are pinned to them. `continues`
-    are robots that are ready for it only once an earlier strand is done, as one whose hand is full
-    now: they go on as the actor that they were there.
+    `named` are robots that the goal itself speaks of: their actors are pinned to them.
     """
 
     goal: str
     actions: tuple[Action, ...]
     named: frozenset[str] = frozenset()
-    continues: frozenset[str] = frozenset()
 
 
 def tasks_from(
@@ -34,17 +31,15 @@ def tasks_from(
 
     A task waits for the last one before it that wrote what it reads, for those that read what it
     overwrites, and for its robots' earlier tasks in the same strand (deordering by causal links).
-    Each robot becomes a new actor in every strand (but for those that it continues), or with
-    `one_actor_each` one in all of them.
+    Each robot becomes a new actor in every strand, or with `one_actor_each` one in all of them.
     """
     rows: list[tuple[str, str, Action]] = []
     pins: dict[str, str] = {}
     actor_count = 0
     actors: dict[str, str] = {}
-    latest: dict[str, str] = {}
     for strand in strands:
         if not one_actor_each:
-            actors = {robot: latest[robot] for robot in strand.continues if robot in latest}
+            actors = {}
         for action in strand.actions:
             args = dict(action.args)
             for parameter in action.skill.robot_parameters:
@@ -56,7 +51,6 @@ def tasks_from(
                     actors[robot] = f"a{revision}{actor_count}"
                     if robot in strand.named:
                         pins[actors[robot]] = robot
-                latest[robot] = actors[robot]
                 args[parameter] = ACTOR_PREFIX + actors[robot]
             lifted = action.skill.ground(args)
             rows.append((f"t{first_task + len(rows)}", strand.goal, lifted))

@@ -11,7 +11,7 @@ from fleet.core.lifting import Strand
 from fleet.core.schedule import predicted_duration_s
 from fleet.core.skills import Action, Variable
 from fleet.core.telling import SEARCHED
-from fleet.core.world_model import HELD, WorldModel, known_value
+from fleet.core.world_model import HELD, WorldModel
 from fleet.planners.base import PlanningProblem
 from fleet.planners.search import Facts, Found, cheapest, ground_actions, within_reach
 from keyexpr_schema.goals import Condition
@@ -104,27 +104,8 @@ def options_for(
         spoken_of = (condition.subject, condition.value, rides_with)
         named = frozenset(robot for robot in world.robots if robot in spoken_of)
         content = tuple(_signature(action) for action in result.actions)
-        continues = _continuing(result.actions, facts, world)
-        strands.setdefault(content, Strand(aim.goal, result.actions, named, continues))
+        strands.setdefault(content, Strand(aim.goal, result.actions, named))
     return Options(tuple(strands.values())[:ALTERNATIVES], found[0][0].facts)
-
-
-def _continuing(actions: Sequence[Action], facts: Facts, world: WorldModel) -> frozenset[str]:
-    """Robots that are ready for the actions only after what earlier strands did to them.
-
-    Where a robot stands does not count: every strand begins with the way to its work.
-    """
-    written: set[Variable] = set()
-    found: set[str] = set()
-    for action in actions:
-        for variable, _ in action.before:
-            about_a_robot = variable.subject in world.robots and variable.relation != "at"
-            if about_a_robot and variable not in written:
-                now = known_value(variable, world.facts, world)
-                if known_value(variable, facts, world) != now:
-                    found.add(variable.subject)
-        written.update(variable for variable, _ in action.after)
-    return frozenset(found)
 
 
 def _unloading_s(found: Found, condition: Condition, world: WorldModel) -> float:
@@ -234,7 +215,6 @@ def _representatives(named: Set[Value], subject: str, facts: Facts, world: World
             spec.skills,
             tuple(sorted(spec.capabilities.items())),
             facts.get(Variable("holding", robot)),
-            world.value("holding", robot),
             robot if robot in named or facts.get(Variable("at", subject)) == robot else None,
         )
         kinds.setdefault(kind, robot)

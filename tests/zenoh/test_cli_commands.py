@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Protocol
 
 import pytest
+import zenoh
 
 from keyexpr_schema.errors import UndecodablePayload
-from keyexpr_schema.goals import GoalAddress, GoalState, GoalStatus
+from keyexpr_schema.goals import Goal, GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.keyspace import (
     ANSWER,
     GOAL_SPEC,
@@ -24,6 +25,7 @@ from keyexpr_schema.keyspace import (
     PLAN_STATUS,
     PLANNER_ALIVE,
     PLANNER_STATUS,
+    REJECT,
     ROBOT_ALIVE,
     ROBOT_SPEC,
     ROBOT_STATE,
@@ -35,6 +37,7 @@ from keyexpr_schema.robots import AliveAddress, RobotActivity, RobotAddress, Rob
 from keyexpr_schema.service import PlannerAddress, PlannerAliveAddress, PlannerStatus
 from keyexpr_schema.session import Session, SessionConfig, open_session
 from keyexpr_schema.tasks import TaskAddress, TaskRecord, TaskState
+from keyexpr_schema.wire import zenoh_config
 from tests.robotctl import Robotctl
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -297,6 +300,30 @@ async def test_a_robot_with_a_skill_that_no_planner_models_is_not_registered(
         assert await session.list(ROBOT_SPEC) == {}
         page = (await robotctl.soon("status")).out
         assert "planner  not running" in page
+
+
+async def test_status_tells_what_is_unreadable_as_long_as_it_is(
+    robotctl: Robotctl, router: Router, session_config: MakeConfig
+) -> None:
+    async with open_session(session_config(component="planner")) as session:
+        bad = zenoh_config("client", connect=[router.endpoint], namespace="robotfleet")
+        with await asyncio.to_thread(zenoh.open, bad) as foreign:
+            foreign.put("goals/g1/spec", b"{}")
+            foreign.put("goals/g2/spec", b"{}")
+            foreign.put("planner/status", b"nonsense")
+        async with session.watch(GOAL_SPEC, REJECT) as watch:
+            seen: set[str] = set()
+            async for change in watch:
+                if change.key is REJECT and change.value is not None:
+                    seen.add(change.value.keyexpr)
+                if {"goals/g1/spec", "goals/g2/spec"} <= seen:
+                    break
+        status = (await robotctl.soon("status", "--json")).data
+        assert {"goals/g1/spec", "goals/g2/spec"} <= {r["keyexpr"] for r in status["rejects"]}
+        await session.confirm(GOAL_SPEC, GoalAddress("g1"), Goal(goal="g1", text="Bring the cup."))
+        await session.delete(GOAL_SPEC, GoalAddress("g2"))
+        status = (await robotctl.soon("status", "--json")).data
+        assert {r["keyexpr"] for r in status["rejects"]} <= {"planner/status"}
 
 
 async def test_what_no_reader_could_read_is_not_put(session_config: MakeConfig) -> None:

@@ -7,6 +7,10 @@ class SimError(Exception):
     """Root of every error this package raises. The message is one sentence for a person."""
 
 
+class WorldRuns(SimError):
+    """Another simulated world runs in the realm: robots of the same name would be in both."""
+
+
 class BadFile(SimError):
     """A world, robot or mission file is missing or says something that cannot be."""
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from keyexpr_schema.session import SessionConfig, open_session
 from sim.backend import Backend
 from sim.errors import SimError
+from sim.rivals import no_other_world
 from sim.server import GRACE_S, WATCHDOG_S, SimServer
 from sim.world_file import load_mission
 from sim.world_model import Mission
@@ -42,6 +43,7 @@ def run(
     Raises:
         BadFile: the mission, its world or one of its robots is missing or wrong.
         SimError: there is no such backend, or the speed is not above 0.
+        WorldRuns: a simulated world runs in the realm already.
         InvalidId: `realm` cannot stand in a key.
     """
     if backend not in BACKENDS:
@@ -56,6 +58,7 @@ def run(
 
     async def serve() -> None:
         async with open_session(config) as session:
+            await no_other_world(session)
             server = SimServer(session, world, speed, grace_s, watchdog_s, idle_speed)
             serving = asyncio.create_task(server.run())
             ready = asyncio.create_task(server.ready())

@@ -26,6 +26,7 @@ async def status(call: Call) -> None:
     from cli.show.fleet_tables import goal_rows, robot_row
     from cli.show.status_page import status_page
     from cli.telling import planner_status
+    from cli.unreadable import still_unreadable
     from keyexpr_schema.keyspace import REJECT
 
     async with call.session() as session:
@@ -34,12 +35,12 @@ async def status(call: Call) -> None:
         planner = await planner_status(session)
         planning = await planner_alive(session)
         alive = await robots_alive(session)
+        rejects = await still_unreadable(session, board.rejects.values())
     robots = [
         robot_row(name, board.specs.get(name), board.robots.get(name), name in alive)
         for name in sorted(set(board.specs) | alive)
     ]
     goals = goal_rows(board.goals, board.goal_status)
-    rejects = list(board.rejects.values())
     settings = call.settings
     call.show(
         {

@@ -73,6 +73,23 @@ async def test_a_process_that_cannot_start_says_why(tmp_path: Path) -> None:
     assert str(fleet.log("ghost")) in str(error.value)
 
 
+async def test_a_second_simulation_in_a_realm_is_turned_away(tmp_path: Path) -> None:
+    async with make(tmp_path) as fleet:
+        await fleet.start("router")
+        await fleet.guard(router_up(fleet))
+        for name in ("sim", "sim-again"):
+            fleet.declare(name, "sim", "two-cups", "--backend", "kinematic")
+        await fleet.start("sim")
+        await until(lambda: "running" in fleet.log("sim").read_text())
+        await fleet.kill("sim")
+        await fleet.start("sim")  # the dead one's scene is there still, and keeps nobody out
+        await until(lambda: fleet.log("sim").read_text().count("running") == 2)
+        await fleet.start("sim-again")
+        with pytest.raises(ProcessDied, match=r"sim-again .*a simulated world runs in realm demo"):
+            await fleet.guard(asyncio.Event().wait())
+        assert fleet.pid("sim") is not None
+
+
 async def test_a_killed_process_can_be_started_again(tmp_path: Path) -> None:
     async with make(tmp_path) as fleet:
         await fleet.start("router")

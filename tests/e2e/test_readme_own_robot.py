@@ -1,0 +1,49 @@
+"""The README's five minutes: a third robot and a goal of one's own, as it tells a newcomer."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.demo_process import demo, left_behind
+
+pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(300)]
+
+ROOT = Path(__file__).parents[2]
+
+
+def mission_of_the_readme(folder: Path) -> Path:
+    """The copied mission, with the robot and the goal of the README's example put into it."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    section = text.split("## Your own robot and goal")[1].split("\n## ")[0]
+    blocks = re.findall(r"```yaml\n(.*?)```", section, re.DOTALL)
+    assert len(blocks) == 1
+    added = yaml.safe_load(blocks[0])
+    mission = yaml.safe_load((ROOT / "configs/missions/two-cups.yaml").read_text(encoding="utf-8"))
+    mission["mission"] = added["mission"]
+    mission["robots"] += added["robots"]
+    mission["goals"] = added["goals"]
+    (folder / "missions").mkdir(parents=True)
+    for name in ("robots", "worlds"):
+        (folder / name).symlink_to(ROOT / "configs" / name)
+    path = folder / "missions" / "mine.yaml"
+    path.write_text(yaml.safe_dump(mission), encoding="utf-8")
+    return path
+
+
+def test_a_third_robot_and_an_own_goal(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    done = demo(str(mission_of_the_readme(tmp_path / "configs")), out, "mujoco")
+    logs = "\n".join(f"{log.name}:\n{log.read_text()[-1500:]}" for log in out.glob("*.log"))
+    assert done.returncode == 0, f"{done.stdout}\n{done.stderr}\n{logs}"
+    told = json.loads(done.stdout)
+    [verdict] = told["goals"]
+    assert (verdict["physics"], verdict["planner"]) == ("holds", "reached")
+    assert told["contacts"]["robot_robot"] == 0
+    done_by = {task["robot"] for task in told["tasks"] if task["state"] == "succeeded"}
+    assert {"hsr_2", "locobot"} <= done_by
+    assert left_behind(out) == []

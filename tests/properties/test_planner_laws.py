@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from fleet.core import events
-from keyexpr_schema.goals import ENDED_GOALS
+from keyexpr_schema.goals import ENDED_GOALS, Condition, Goal
 from keyexpr_schema.plans import ENDED_PLANS, PlanState
 from keyexpr_schema.requests import ReplanRequest
 from keyexpr_schema.tasks import ReportState, TaskState
@@ -78,6 +78,23 @@ class Planner(RuleBasedStateMachine):
         number = len(self.model.state.answers)
         request = ReplanRequest(request=f"again-{number}", plan="plan-1", reason="because")
         self.model.tell(events.ReplanAsked, request=request)
+
+    @rule(room=st.sampled_from(["kitchen", "hallway", "living_room"]))
+    def a_goal_comes_up_in_the_middle(self, room: str) -> None:
+        number = len(self.model.state.answers)
+        wanted = Condition(relation="searched", subject=room, value=True)
+        goal = Goal(goal=f"look-{number}", text="", conditions=(wanted,), ordinal=100 + number)
+        self.model.tell(events.GoalTold, goal=goal)
+        request = ReplanRequest(
+            request=f"more-{number}", plan="plan-1", reason="more", goals=(goal.goal,)
+        )
+        self.model.tell(events.ReplanAsked, request=request)
+
+    @precondition(lambda self: len(self.model.state.goals) > 1)
+    @rule(pick=PICK)
+    def a_goal_is_deleted(self, pick: int) -> None:
+        goals = sorted(self.model.state.goals)
+        self.model.tell(events.GoalForgotten, goal=goals[pick % len(goals)])
 
     @rule()
     def the_planner_crashes(self) -> None:

@@ -11,7 +11,7 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.core import events
 from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.state import Policy, State
+from fleet.core.state import OUTSTANDING, PlanBook, Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
 from fleet.service.planning_desk import carry_out
@@ -19,7 +19,7 @@ from keyexpr_schema.goals import Goal
 from keyexpr_schema.keyspace import ORDER
 from keyexpr_schema.requests import PlanRequest
 from keyexpr_schema.robots import RobotSpec
-from keyexpr_schema.tasks import Order, Report, ReportState
+from keyexpr_schema.tasks import Order, Report, ReportState, TaskState
 from keyexpr_schema.world import Fact, Value
 from tests.household import PLACES, SKILLS, cup
 
@@ -73,6 +73,10 @@ class FleetModel:
             assert effects == ()
             return
         self.journal.append(encode_event(event))
+        for plan, book in self.state.plans.items():
+            old = before.plans.get(plan)
+            if old is not None and book.plan.revision > old.plan.revision:
+                check_revision(old, book)
         self._take(effects)
 
     def _take(self, effects: tuple[Effect, ...]) -> None:
@@ -221,6 +225,20 @@ class FleetModel:
         self.state = state
         self.tell(events.PlannerStarted, epoch=state.epoch + 1, incarnation="again")
         self._take(effects_of(self.state))
+
+
+def check_revision(old: PlanBook, new: PlanBook) -> None:
+    """What a revision says of itself is so, and what it keeps of running work is left alone."""
+    assert new.change is not None
+    names = {task.task for task in new.plan.tasks}
+    unfinished = {n for n, r in old.records.items() if r.state in {TaskState.WAITING, *OUTSTANDING}}
+    done_already = {n for n in names if new.records[n].reason == "it is so already"}
+    assert new.change.dropped == len(unfinished - names), "dropped"
+    assert new.change.added == len(names - old.records.keys() - done_already), "added"
+    for name in names & old.records.keys():
+        was, now = old.records[name], new.records[name]
+        if was.state in OUTSTANDING and now.state in OUTSTANDING:
+            assert (was.robot, was.attempt) == (now.robot, now.attempt), "running work disturbed"
 
 
 def _robots(order: Order, state: State) -> set[str]:

@@ -64,17 +64,25 @@ def main() -> None:
     options.add_argument("--largest", type=int, default=50, help="leave out more goals than this")
     chosen = options.parse_args()
     parts = compose()
+    console = Console(width=140)
     rows: list[Row] = []
+
+    def tell(row: Row) -> None:
+        """As it comes: the table is there only at the end."""
+        rows.append(row)
+        spent = row.outcome if row.planning_s is None else f"{row.planning_s:.2f} s"
+        console.print(f"{row.size[0]} x {row.size[1]}  {row.planner}: {spent}", highlight=False)
+
     _own((1, 1), parts)  # what is loaded at the first use is no planning time
     given_up: set[str] = set()
     for size in (size for size in SIZES if size[0] <= chosen.largest):
-        rows.extend(_own(size, parts))
+        for row in _own(size, parts):
+            tell(row)
         for engine in (engine for engine in ENGINES if engine not in given_up):
-            row = _engine(size, engine, parts, chosen.python, chosen.timeout)
-            rows.append(row)
+            tell(row := _engine(size, engine, parts, chosen.python, chosen.timeout))
             if row.planning_s is None:
                 given_up.add(engine)
-    Console(width=140).print(_table(rows))
+    console.print(_table(rows))
 
 
 def _own(size: tuple[int, int], parts: Composition) -> list[Row]:

@@ -66,9 +66,9 @@ def revise(
         elif record.state is TaskState.WAITING:
             dropped += 1
             records[name] = replace(record, state=TaskState.CANCELLED, reason="not in the new plan")
-    change = PlanChange(
-        kept=len(names), dropped=dropped, added=len(plan.tasks) - len(names) - len(skipped)
-    )
+    # A task that is so already may have been waiting: then it is kept, and counts once.
+    added = sum(task.task not in {*names, *skipped} for task in event.plan.tasks)
+    change = PlanChange(kept=len(names), dropped=dropped, added=added)
     return Revision(plan, records, tuple(dropping), change)
 
 

@@ -79,7 +79,7 @@ class SmallModel:
 
 @pytest.mark.e2e
 @pytest.mark.slow
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(2400)
 @pytest.mark.parametrize("strategy", ["big-dag", "per-goal", "monolithic"])
 def test_a_bad_model_makes_no_bad_plan(strategy: str) -> None:
     world = home()
@@ -91,8 +91,8 @@ def test_a_bad_model_makes_no_bad_plan(strategy: str) -> None:
                 model="openai/smollm2",
                 api_base=server.api_base,
                 max_tokens=250,
-                timeout_s=120.0,
-                max_wall_s=300.0,
+                timeout_s=900.0,  # a slow machine only takes longer
+                max_wall_s=1800.0,
                 max_repairs=1,
                 retries=0,
             )

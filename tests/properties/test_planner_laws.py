@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from fleet.core import events
-from keyexpr_schema.goals import ENDED_GOALS, GoalState
+from keyexpr_schema.goals import ENDED_GOALS, Condition, Goal, GoalState
 from keyexpr_schema.plans import ENDED_PLANS, PlanState
 from keyexpr_schema.requests import ReplanRequest
 from keyexpr_schema.tasks import ReportState, TaskState
@@ -19,6 +19,7 @@ from tests.fleet_model import FleetModel
 from tests.household import bring, carrier, manipulator
 
 PICK = st.integers(0, 10)
+MOST_GOALS = 4
 
 
 class Undisturbed(RuleBasedStateMachine):
@@ -77,6 +78,24 @@ class Undisturbed(RuleBasedStateMachine):
     @rule(pick=PICK)
     def a_worker_crashes_at_the_end_of_its_work(self, pick: int) -> None:
         self.model.interrupt(self.order(pick), done=True)
+
+    @precondition(lambda self: len(self.model.state.goals) < MOST_GOALS)
+    @rule(room=st.sampled_from(["kitchen", "hallway", "living_room"]))
+    def a_goal_comes_up_in_the_middle(self, room: str) -> None:
+        number = len(self.model.state.answers)
+        wanted = Condition(relation="searched", subject=room, value=True)
+        goal = Goal(goal=f"look-{number}", text="", conditions=(wanted,), ordinal=100 + number)
+        self.model.tell(events.GoalTold, goal=goal)
+        request = ReplanRequest(
+            request=f"more-{number}", plan="plan-1", reason="more", goals=(goal.goal,)
+        )
+        self.model.tell(events.ReplanAsked, request=request)
+
+    @precondition(lambda self: len(self.model.state.goals) > 1)
+    @rule(pick=PICK)
+    def a_goal_is_deleted(self, pick: int) -> None:
+        goals = sorted(self.model.state.goals)
+        self.model.tell(events.GoalForgotten, goal=goals[pick % len(goals)])
 
     @rule()
     def the_planner_crashes(self) -> None:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace as model_replace
 
 import pytest
 from msgspec.structs import replace
 
 from fleet.core.checker import check_plan
+from fleet.core.skills import skills_from_data
 from keyexpr_schema.goals import Condition
 from keyexpr_schema.plans import Plan, Task
-from tests.household import PLACES, at, carrier, cup, fact, home, manipulator
+from keyexpr_schema.world import Surface
+from tests.household import PLACES, SKILLS, at, carrier, cup, fact, home, manipulator
 
 A1, A2 = "?a1", "?a2"
 
@@ -168,6 +171,87 @@ def test_weight_and_skills_decide_who_can_be_an_actor() -> None:
     assert codes(fetch(), robots=(manipulator(grip_kg=0.1),)) == ["no-robot"]
     heavy = check_plan(plan(fetch()), home((manipulator(grip_kg=0.1), manipulator("strong"))))
     assert heavy.valid
+
+
+def test_a_hand_must_reach_as_high_as_the_highest_surface() -> None:
+    shelf = Surface(surface="shelf", x_m=0, y_m=0, z_m=1.4, yaw_rad=0, length_m=1, width_m=1)
+    world = home((manipulator(),))
+    high = replace(world.places["kitchen"], surfaces=(shelf,))
+    world = model_replace(world, places={**world.places, "kitchen": high})
+    (violation,) = check_plan(plan(fetch()), world).violations
+    assert violation.code == "no-robot"
+    assert "kitchen has a height of 1.4 m, hsr's reach is 1 m" in violation.sentence
+    tall = replace(manipulator(), capabilities={**manipulator().capabilities, "reach": 1.4})
+    assert check_plan(plan(fetch()), model_replace(world, robots={"hsr": tall})).valid
+
+
+def test_a_robot_lacks_a_capability_or_a_skill() -> None:
+    blind = replace(manipulator(), capabilities={"drive": 0.6, "grip": 1.2, "reach": 1.0})
+    (violation,) = check_plan(plan(fetch()), home((blind,))).violations
+    assert violation.sentence.endswith("hsr has no see")
+    unable = replace(manipulator(), skills=("navigate", "place"))
+    (violation,) = check_plan(plan(fetch()), home((unable,))).violations
+    assert violation.sentence.endswith("hsr does not have the skill pick")
+
+
+def test_a_task_needs_different_robots() -> None:
+    tasks = without(handover(), "give", args={"robot": A1, "object": "cup_1", "carrier": A1,
+                                              "place": "kitchen"})  # fmt: skip
+    assert "robot-in-two-places" in codes(tasks)
+
+
+def test_what_is_in_the_basket_at_the_start_takes_room() -> None:
+    full = (fact("cup_2", "at", "locobot"),)
+    robots = (manipulator(), carrier(basket=1))
+    assert codes(handover(), robots=robots, facts=full) == ["no-robot"]
+    bound = {"a1": "hsr", "a2": "locobot"}
+    found = check_plan(plan(handover()), home(robots, facts=full), bound)
+    assert [violation.code for violation in found.violations] == ["no-space"]
+
+
+def test_an_open_end_reaches_no_goal() -> None:
+    """Two tasks make it this and that in no order: neither is what the goal finds."""
+    switch = {
+        name: {
+            "parameters": {"robot": "robot", "place": "place"},
+            "after": [f"lit(place) = {value}"],
+        }
+        for name, value in (("light", "true"), ("darken", "false"))
+    }
+    robots = tuple(
+        replace(manipulator(name), skills=(*manipulator().skills, *switch))
+        for name in ("hsr", "r2")
+    )
+    world = model_replace(
+        home(robots), skills={**SKILLS, **skills_from_data({"skills": switch}, "here")}
+    )
+    lit = Condition(relation="lit", subject="kitchen", value=True)
+    one, two = (
+        task("one", "light", "a1", place="kitchen"),
+        task("two", "darken", "a2", place="kitchen"),
+    )
+    assert check_plan(plan([one], lit), world).valid
+    for tasks in ([one, two], [two, one]):
+        assert [v.code for v in check_plan(plan(tasks, lit), world).violations] == ["goal-unmet"]
+    ordered = [two, replace(one, after=("two",))]
+    assert check_plan(plan(ordered, lit), world).valid
+
+
+def test_an_actor_that_must_hold_something_at_the_start() -> None:
+    tasks = [
+        task("go", "navigate", "a1", to="hallway"),
+        task("put", "place", "a1", "go", object="cup_1", place="hallway"),
+    ]
+    holds = (fact("cup_1", "at", "hsr"), fact("hsr", "holding", "cup_1"))
+    assert codes(tasks, at("cup_1", "hallway"), facts=holds) == []
+    assert codes(tasks, at("cup_1", "hallway")) == ["no-robot"]
+
+
+def test_an_able_robot_that_is_bound_to_what_it_cannot() -> None:
+    world = home((manipulator(), manipulator("weak", grip_kg=0.1)))
+    found = check_plan(plan(fetch()), world, {"a1": "weak"})
+    assert [violation.code for violation in found.violations] == ["no-robot"]
+    assert "cup_1 has a mass of 0.15 kg, weak's grip is 0.1 kg" in found.violations[0].sentence
 
 
 def test_an_allocated_plan_is_checked_with_robots_for_actors() -> None:

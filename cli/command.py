@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-import typer.core
 
 from cli.errors import CliError
+from cli.parsing import Command
 from cli.settings import Settings, load_settings, one_line
 
 if TYPE_CHECKING:
@@ -104,40 +104,10 @@ class Call:
 Body = Callable[..., Coroutine[Any, Any, None] | None]
 
 
-class Group(typer.core.TyperGroup):
-    """A group of commands that converts no options of its own where none are given.
-
-    typer converts option values with pydantic, those of options that were not given, too, and
-    importing it takes longer than all the rest of `robotctl COMMAND --help`.
-    """
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Where a command comes first, no option of the group was given."""
-        if args and args[0] in self.commands:
-            self.params, self.add_help_option = [], False
-        return super().parse_args(ctx, args)
-
-
-class FactWords(typer.core.TyperCommand):
-    """A command whose `--fact` takes three words, or the same in one."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Make one word of the three: typer has no option that is both repeatable and a triple."""
-        joined: list[str] = []
-        rest = list(args)
-        while rest:
-            word = rest.pop(0)
-            joined.append(word)
-            if word == "--fact" and rest and " " not in rest[0] and "(" not in rest[0]:
-                fact, rest = rest[:3], rest[3:]
-                joined.append(" ".join(fact))
-        return super().parse_args(ctx, joined)
-
-
 def command(
     app: typer.Typer,
     name: str | None = None,
-    cls: type[typer.core.TyperCommand] | None = None,
+    cls: type[Command] = Command,
 ) -> Callable[[Body], Body]:
     """Register `body(call, …)`, plain or async, as a command of `app` with the global options."""
 

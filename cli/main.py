@@ -13,7 +13,8 @@ import typer
 import typer.core
 import typer.main
 
-from cli.command import GlobalFlags, Group, JsonOption, RealmOption, RouterOption
+from cli.command import GlobalFlags, JsonOption, RealmOption, RouterOption
+from cli.parsing import Group
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "status": ("cli.commands.overview:status_app", "The whole fleet on one page."),

@@ -44,6 +44,7 @@ from keyexpr_schema.world import (
 
 if TYPE_CHECKING:
     from keyexpr_schema.robots import RobotSpec
+    from keyexpr_schema.service import PlannerStatus
     from keyexpr_schema.session import Session
 
 
@@ -96,13 +97,21 @@ async def statement_read(session: Session, statement: str) -> StatementStatus | 
     return None
 
 
+async def planner_status(session: Session) -> PlannerStatus | None:
+    """What the latest planner says that it can do; `None` where none ever ran, or nobody can tell.
+
+    A value that is no status is reported on its reject key, and is no reason to refuse a command.
+    """
+    return (await session.list(PLANNER_STATUS)).get(PlannerAddress())
+
+
 async def check_skills(session: Session, specs: Iterable[RobotSpec]) -> None:
     """Do nothing if the planner has a model of each skill, or if no planner ever ran here.
 
     Raises:
         Unknown: it lacks one, so that no plan could ever ask a robot for it.
     """
-    planner = await session.get(PLANNER_STATUS, PlannerAddress())
+    planner = await planner_status(session)
     if planner is None or not planner.skills:
         return
     for spec in specs:

@@ -72,6 +72,12 @@ class _Selection:
             # A wildcard put or delete: it concerns the keys that exist, which a listing shows.
             self.watch.relist()
             return
+        try:
+            address = self.key.parse(wire.keyexpr)
+        except ForeignKey as error:
+            # The pattern matches it and the store may keep it, but nobody can have an id in it.
+            self.watch.reader.reject(wire.keyexpr, wire.data, str(error))
+            return
         if known is not None and stamp <= known and stamp:
             return
         if stamp:
@@ -79,9 +85,8 @@ class _Selection:
         self.missing.discard(wire.keyexpr)
         (self.live.discard if wire.deleted else self.live.add)(wire.keyexpr)
         try:
-            address = self.key.parse(wire.keyexpr)
             value = None if wire.deleted else self.watch.reader.decode(self.key, wire)
-        except (ForeignKey, UndecodablePayload) as error:
+        except UndecodablePayload as error:
             self.watch.reader.reject(wire.keyexpr, wire.data, str(error))
             return
         self.watch.deliver(wire.keyexpr, Change(self.key, address, value, text_of_stamp(stamp)))

@@ -127,6 +127,8 @@ class SkillContext:
         self.learn("holding", self.robot, NOTHING if held is None else held)
         if held is not None:
             self.learn("at", held, self.robot)
+            if self._believed(held, "on") is not None:
+                self.learn("on", held, None)
         return held
 
     async def be_in(self, place: str) -> Senses:

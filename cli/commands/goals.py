@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, Group, command
+from cli.command import Call, command
+from cli.parsing import Group
 
 if TYPE_CHECKING:
     from keyexpr_schema.goals import Goal, GoalStatus
@@ -127,7 +128,8 @@ def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
     hint = ""
     if status.state is GoalState.WAITING and not planned:
         hint = f"; plan it with `robotctl plan create big-dag makespan {spec.goal}`"
-    return f"goal {spec.goal} is {status.state.value}{meaning}{hint}"
+    note = f" ({status.note})" if status.note else ""
+    return f"goal {spec.goal} is {status.state.value}{meaning}{note}{hint}"
 
 
 @command(app, "list")
@@ -156,7 +158,7 @@ async def show(call: Call, goal: GoalArgument) -> None:
 
 @command(app, "delete")
 async def delete(call: Call, goal: GoalArgument) -> None:
-    """Take a goal back. A plan that was made for it goes on; cancel that with `plan cancel`."""
+    """Take a goal back; its plan goes on without it, and ends if it had no other goal."""
     from cli.errors import check_known
     from keyexpr_schema.goals import GoalAddress
     from keyexpr_schema.keyspace import GOAL_SPEC

@@ -25,13 +25,13 @@ async def status(call: Call) -> None:
     from cli.presence import planner_alive, robots_alive
     from cli.show.fleet_tables import goal_rows, robot_row
     from cli.show.status_page import status_page
-    from keyexpr_schema.keyspace import PLANNER_STATUS, REJECT
-    from keyexpr_schema.service import PlannerAddress
+    from cli.telling import planner_status
+    from keyexpr_schema.keyspace import REJECT
 
     async with call.session() as session:
         async with following(session, *FLEET, REJECT) as board:
             pass
-        planner = await session.get(PLANNER_STATUS, PlannerAddress())
+        planner = await planner_status(session)
         planning = await planner_alive(session)
         alive = await robots_alive(session)
     robots = [
@@ -61,7 +61,7 @@ async def status(call: Call) -> None:
 async def watch(
     call: Call,
     plan: Annotated[
-        str | None, typer.Argument(metavar="[PLAN]", help="Only this plan; else all.")
+        str | None, typer.Argument(metavar="PLAN", help="Only this plan; else all.")
     ] = None,
 ) -> None:
     """Follow goals, plans and tasks until Ctrl-C.

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, FactWords, Group, command
+from cli.command import Call, command
 from cli.commands.plan_files import check, diff, propose
+from cli.parsing import FactWords, Group
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -40,7 +41,7 @@ async def create(
     ] = "makespan",
     goals: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[GOAL]…", help="Which goals; else every goal that waits."),
+        typer.Argument(metavar="GOAL", help="Which goals; else every goal that waits."),
     ] = None,
     planner: Annotated[str, typer.Option("--planner", help="Who plans.")] = "symbolic",
     name: Annotated[str | None, typer.Option("--id", help="Name of the plan.")] = None,
@@ -70,10 +71,10 @@ async def create(
     from cli.errors import BadArgument, check_known
     from cli.naming import request_name
     from cli.plans.files import check_suffix, write_plan
+    from cli.telling import planner_status
     from keyexpr_schema.ids import check_id
-    from keyexpr_schema.keyspace import GOAL_SPEC, PLANNER_STATUS
+    from keyexpr_schema.keyspace import GOAL_SPEC
     from keyexpr_schema.requests import PlanRequest
-    from keyexpr_schema.service import PlannerAddress
 
     if fallback and allocator != "milp":
         raise BadArgument("--fallback-round-robin goes with the allocator milp")
@@ -88,7 +89,7 @@ async def create(
         known = [address.goal for address in await session.list(GOAL_SPEC)]
         for goal in goals or ():
             check_known("goal", goal, known, "say one with `robotctl goal add`")
-        can = await session.get(PLANNER_STATUS, PlannerAddress())
+        can = await planner_status(session)
         if can is not None:
             # A planner that lists nothing has not said what it offers; then its answer decides.
             for what, asked, offered in (
@@ -150,7 +151,7 @@ async def list_(call: Call) -> None:
 async def show(
     call: Call,
     plan: Annotated[
-        str | None, typer.Argument(metavar="[PLAN]", help="Its name; else the latest plan.")
+        str | None, typer.Argument(metavar="PLAN", help="Its name; else the latest plan.")
     ] = None,
     dot: Annotated[
         bool, typer.Option("--dot", help="Only the graph, in Graphviz' language (`| dot -Tsvg`).")

@@ -53,7 +53,7 @@ def router(
     run(
         listen=tuple(listen or call.settings.routers[:1]),
         connect=tuple(connect or ()),
-        data_dir=_data(data, "router"),
+        data_dir=data_folder(data, "router"),
     )
 
 
@@ -106,7 +106,7 @@ def planner(
     run(
         endpoints=call.settings.routers,
         realm=call.settings.realm,
-        data_dir=_data(data, "planner"),
+        data_dir=data_folder(data, "planner", call.settings.realm),
         skill_files=tuple(skills or told.skills),
         llm_file=llm_config or told.llm_config,
         policy=Policy(
@@ -136,7 +136,7 @@ def worker(
         robot=robot,
         endpoints=call.settings.routers,
         realm=call.settings.realm,
-        data_dir=_data(data, f"worker-{robot}"),
+        data_dir=data_folder(data, f"worker-{robot}", call.settings.realm),
         embodiment_factory=embodiment_factory(embodiment),
     )
 
@@ -228,10 +228,15 @@ def _first(flag: T | None, told: T | None, default: T) -> T:
     return next((each for each in (flag, told) if each is not None), default)
 
 
-def _data(given: Path | None, name: str) -> Path:
+def data_folder(given: Path | None, name: str, realm: str = "") -> Path:
+    """Where a process keeps what must last: `given`, else a folder of its own.
+
+    A store serves several realms. What a planner or a worker remembers is of one: in another it
+    would carry on with plans that nobody made there.
+    """
     import os
 
     if given is not None:
         return given
     home = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
-    return Path(home) / "robotfleet" / name
+    return Path(home) / "robotfleet" / realm / name

@@ -18,7 +18,7 @@ durations_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 async def register(
     call: Call,
     files: Annotated[
-        list[str], typer.Argument(metavar="FILE…", help="Robot files; see configs/robots.")
+        list[str], typer.Argument(metavar="FILE", help="Robot files; see configs/robots.")
     ],
 ) -> None:
     """Declare robots from YAML files; declaring one again replaces what was said of it."""

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, Group, command
+from cli.command import Call, command
+from cli.parsing import Group
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -24,7 +25,7 @@ def task() -> None:
 async def list_(
     call: Call,
     plan: Annotated[
-        str | None, typer.Argument(metavar="[PLAN]", help="Of one plan; else of all.")
+        str | None, typer.Argument(metavar="PLAN", help="Of one plan; else of all.")
     ] = None,
 ) -> None:
     """Tasks and how they stand."""
@@ -89,7 +90,7 @@ async def add(
     skill: Annotated[str, typer.Argument(metavar="SKILL", help="Such as navigate.")],
     args: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[NAME=VALUE]…", help="Its parameters, such as place=kitchen."),
+        typer.Argument(metavar="NAME=VALUE", help="Its parameters, such as place=kitchen."),
     ] = None,
     after: Annotated[
         list[str] | None,
@@ -104,10 +105,10 @@ async def add(
     from cli.commands.plans import check_plan
     from cli.errors import check_known
     from cli.naming import request_name
-    from keyexpr_schema.keyspace import PLAN_SPEC, PLANNER_STATUS, ROBOT_SPEC
+    from cli.telling import planner_status
+    from keyexpr_schema.keyspace import PLAN_SPEC, ROBOT_SPEC
     from keyexpr_schema.plans import PlanAddress
     from keyexpr_schema.requests import Control, ControlRequest
-    from keyexpr_schema.service import PlannerAddress
 
     given = parse_args(args or [])
     async with call.session() as session:
@@ -118,7 +119,7 @@ async def add(
         if robot is not None:
             robots = [address.robot for address in await session.list(ROBOT_SPEC)]
             check_known("robot", robot, robots, "declare one with `robotctl register FILE`")
-        can = await session.get(PLANNER_STATUS, PlannerAddress())
+        can = await planner_status(session)
         if can is not None and can.skills:
             check_known("skill", skill, can.skills, "")
         answer = await ask_planner(

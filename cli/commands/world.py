@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, Group, command
+from cli.command import Call, command
+from cli.parsing import Group
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -49,7 +50,7 @@ async def add(
     call: Call,
     words: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[STATEMENT]", help="A sentence; or RELATION SUBJECT VALUE."),
+        typer.Argument(metavar="STATEMENT", help="A sentence; or RELATION SUBJECT VALUE."),
     ] = None,
     fact: Annotated[
         bool, typer.Option("--fact", help="The words are a fact: RELATION SUBJECT VALUE.")

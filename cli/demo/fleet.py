@@ -155,12 +155,14 @@ class Fleet:
             child.stdin.close()
         if name in self._ending or self._died is None or self._died.done():
             return
-        how = f"with exit code {code}" if code >= 0 else f"by {signal.Signals(-code).name}"
+        # What a process said before a signal ended it has nothing to do with its end.
+        how = (
+            f"with exit code {code}{_last_words(self.log(name))}"
+            if code >= 0
+            else f"by {signal.Signals(-code).name}"
+        )
         self._died.set_result(
-            ProcessDied(
-                f"{name} ended unexpectedly {how}{_last_words(self.log(name))}; "
-                f"its log is {self.log(name)}"
-            )
+            ProcessDied(f"{name} ended unexpectedly {how}; its log is {self.log(name)}")
         )
 
 

@@ -9,16 +9,18 @@ from cli.demo.summary import Summary
 from cli.judge import Judgement
 from cli.show.page import table
 from cli.show.words import call, seconds
+from keyexpr_schema.goals import GoalState
 
 MARKS = {Judgement.HOLDS: "✓", Judgement.FAILS: "✗", Judgement.NOT_JUDGED: "?"}
 
 
 def summary_page(summary: Summary) -> Group:
     """Verdicts, tasks, times."""
+    width = max((len(verdict.goal) for verdict in summary.goals), default=0)
     goals = [
         Text.assemble(
             (f"{MARKS[verdict.physics]} ", "green" if verdict.agreed else "red"),
-            (verdict.goal, "bold"),
+            (verdict.goal.ljust(width), "bold"),
             f"  physics: {verdict.physics.value}; planner: {verdict.planner.value}; ",
             verdict.sentence,
         )
@@ -61,9 +63,20 @@ def summary_page(summary: Summary) -> Group:
         f"recording         {summary.recording or 'none'}",
         f"logs              {summary.out}",
     ]
-    title = (
-        Text("Every goal is reached: the physics and the planner agree.", "bold green")
-        if summary.ok
-        else Text("Not every goal is reached, or physics and planner disagree.", "bold red")
-    )
-    return Group("", title, *goals, "", tasks, "", robots, "", *facts)
+    return Group("", _title(summary), *goals, "", tasks, "", robots, "", *facts)
+
+
+def _title(summary: Summary) -> Text:
+    if summary.ok:
+        return Text("Every goal is reached: the physics and the planner agree.", "bold green")
+    wrong = [verdict for verdict in summary.goals if not verdict.agreed]
+    if wrong and all(
+        verdict.physics is Judgement.NOT_JUDGED and verdict.planner is GoalState.REACHED
+        for verdict in wrong
+    ):
+        return Text(
+            "The planner says that every goal is reached; the physics cannot see all of it, so it "
+            "does not count as shown.",
+            "bold red",
+        )
+    return Text("Not every goal is reached, or physics and planner disagree.", "bold red")

@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from fleet.core.state import PlanBook, State, put
 from fleet.core.telling import mark_goals
-from keyexpr_schema.goals import GoalState
+from keyexpr_schema.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.plans import PlanState, Violation
 from keyexpr_schema.requests import Answer
 from keyexpr_schema.tasks import TaskRecord, TaskState
@@ -44,6 +44,15 @@ def set_record(state: State, book: PlanBook, record: TaskRecord) -> State:
 def next_task(book: PlanBook) -> int:
     """The first number that no task of the plan has had."""
     return 1 + max((int(name[1:]) for name in book.records if name[1:].isdigit()), default=0)
+
+
+def open_goals(state: State, book: PlanBook) -> list[str]:
+    """The goals of the plan that have not ended."""
+    return [
+        goal
+        for goal in book.plan.goals
+        if goal in state.goal_states and state.goal_states[goal].state not in ENDED_GOALS
+    ]
 
 
 def give_up(state: State, book: PlanBook, reason: str) -> State:

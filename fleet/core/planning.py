@@ -5,7 +5,7 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.books import answer, give_up, next_task, set_book
+from fleet.core.books import answer, give_up, next_task, open_goals, set_book
 from fleet.core.calls import Skills
 from fleet.core.effects import status_of
 from fleet.core.remaining import actors_in_order, begun_actors, remaining_plan
@@ -15,11 +15,11 @@ from fleet.core.telling import mark_goals
 from keyexpr_schema.goals import GoalState
 from keyexpr_schema.plans import PlanState
 from keyexpr_schema.requests import Answer
-from keyexpr_schema.tasks import TaskState
+from keyexpr_schema.tasks import ENDED_TASKS, TaskState
 
 MAX_REPLANS = 12
-"""After this many new revisions without a goal reached, a plan is given up: the world does not go
-along with it."""
+"""After this many new revisions for each of its open goals, without one reached, a plan is given
+up: the world does not go along with it."""
 
 
 def plan_again(state: State, book: PlanBook) -> State:
@@ -27,7 +27,7 @@ def plan_again(state: State, book: PlanBook) -> State:
 
     What is under way goes on meanwhile; nothing new is ordered until the job has ended.
     """
-    if book.replans >= MAX_REPLANS:
+    if book.replans >= MAX_REPLANS * max(1, len(open_goals(state, book))):
         return give_up(
             state, book, f"given up after {book.replans} new plans; the last: {book.replan_reason}"
         )
@@ -48,16 +48,24 @@ def plan_again(state: State, book: PlanBook) -> State:
     )
     if book.amendment is not None:
         job = replace(job, proposal=remaining_plan(book, revision, addition=book.amendment))
-    elif book.replan_reason == book.mend_reason:
+    elif _may_be_mended(book):
         gone = {robot for robot in book.allocation.values() if not state.ready(robot)}
         job = replace(
             job,
             remaining=remaining_plan(book, revision, gone),
+            outside=book.replan_reason == book.outside_reason,
             home=book.allocation,
             sequence=actors_in_order(book),
             begun=tuple(begun_actors(book, gone)),
         )
     return set_book(replace(state, jobs=job.job), replace(book, job=job))
+
+
+def _may_be_mended(book: PlanBook) -> bool:
+    """Whether what is left of a plan may go on. A find ends a search, which takes a whole plan."""
+    if book.replan_reason == book.outside_reason:
+        return True
+    return book.replan_reason != book.anew_reason and not book.plan.seeks
 
 
 def plan_made(state: State, event: events.PlanMade, skills: Skills) -> State:
@@ -69,8 +77,9 @@ def plan_made(state: State, event: events.PlanMade, skills: Skills) -> State:
         return state
     job = book.job
     first = event.plan.revision == 1
+    team = tuple(sorted(robot for robot in state.alive if state.ready(robot)))
     if _as_it_was(book, job, event):
-        book = replace(book, job=None, replan_reason=_new_reason(book, job))
+        book = replace(book, job=None, replan_reason=_new_reason(book, job), team=team)
         return set_book(state, book)
     for goal, reason in event.left_out.items():
         state = mark_goals(state, (goal,), GoalState.FAILED, book.plan.plan, reason)
@@ -92,8 +101,8 @@ def plan_made(state: State, event: events.PlanMade, skills: Skills) -> State:
         replan_reason=_new_reason(book, job),
         amendment=None,
         amendment_request=None,
-        team=tuple(sorted(robot for robot in state.alive if state.ready(robot))),
-        replans=book.replans + (not first and not event.mended),
+        team=team,
+        replans=book.replans + (not first and not (event.mended and job.outside)),
         reason=None,
         violations=(),
     )
@@ -105,11 +114,14 @@ def plan_made(state: State, event: events.PlanMade, skills: Skills) -> State:
 
 def _as_it_was(book: PlanBook, job: Job, event: events.PlanMade) -> bool:
     """Whether another allocation of what is left has turned out to be the one there is."""
+    current = list(book.current())
     return (
         event.mended
+        and job.outside
         and not event.left_out
         and event.allocation.items() <= job.home.items()
-        and not any(r.state in (TaskState.FAILED, TaskState.CANCELLED) for r in book.current())
+        and all(record.state not in (TaskState.FAILED, TaskState.CANCELLED) for record in current)
+        and len(event.plan.tasks) == sum(record.state not in ENDED_TASKS for record in current)
     )
 
 

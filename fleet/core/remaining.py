@@ -18,7 +18,8 @@ HAD_ROBOT = OUTSTANDING | {TaskState.SUCCEEDED}
 def remaining_plan(
     book: PlanBook, revision: int, gone: Set[str] = frozenset(), addition: Task | None = None
 ) -> Plan:
-    """The tasks that have not ended, under new names, and `addition` under its own.
+    """The tasks that have not ended and are for goals that the plan still has, under new names, and
+    `addition` under its own.
 
     Actors whose robot is `gone` begin anew, with everything that they had done. The others stay
     with their robot once they have begun. Whether that is still a plan, the checker has to say.
@@ -27,9 +28,12 @@ def remaining_plan(
     todo = [
         task
         for task in book.plan.tasks
-        if task.actor in anew
-        or task.task not in book.records
-        or book.records[task.task].state not in ENDED_TASKS
+        if (task.goal is None or task.goal in book.plan.goals)
+        and (
+            task.actor in anew
+            or task.task not in book.records
+            or book.records[task.task].state not in ENDED_TASKS
+        )
     ]
     first = next_task(book) + (addition is not None)
     names = {task.task: f"t{first + number}" for number, task in enumerate(todo)}

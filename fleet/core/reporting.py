@@ -5,16 +5,19 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.books import set_record
+from fleet.core.books import open_goals, set_record
 from fleet.core.calls import Skills, action_of, unmet_before
 from fleet.core.durations import learn
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.skills import Action
-from fleet.core.state import OUTSTANDING, PlanBook, State
-from fleet.core.telling import believe, believe_if_newer
+from fleet.core.state import OUTSTANDING, PlanBook, State, put
+from fleet.core.telling import believe, believe_if_newer, mark_goals, without_goal
+from keyexpr_schema.goals import GoalState
 from keyexpr_schema.tasks import Report, ReportState, TaskRecord, TaskState
 from keyexpr_schema.world import Fact
 
+MAX_FAILURES = 6
+"""After so many failed tasks a goal is given up, and the plan goes on without it."""
 MAX_ATTEMPTS = 3
 """Orders given for one task to one robot; each order has the worker's own tries inside."""
 
@@ -112,9 +115,17 @@ def _learned(state: State, record: TaskRecord, report: Report, action: Action | 
 
 def _failed(state: State, book: PlanBook, record: TaskRecord, report: Report) -> State:
     record = _ended(record, report, TaskState.FAILED)
-    if not book.ended and record.task not in book.dropping:
-        reason = f"{record.task} ({record.skill}) failed: {report.reason}"
-        book = replace(book, replan_reason=reason)
+    if book.ended or record.task in book.dropping:
+        return set_record(state, book, record)
+    reason = f"{record.task} ({record.skill}) failed: {report.reason}"
+    book = replace(book, replan_reason=reason)
+    if record.goal is not None and record.goal in book.plan.goals:
+        count = book.failures.get(record.goal, 0) + 1
+        book = replace(book, failures=put(book.failures, record.goal, count))
+        if count >= MAX_FAILURES and len(open_goals(state, book)) > 1:
+            told = f"given up after {count} failed tasks; the last: {reason}"
+            state = mark_goals(state, (record.goal,), GoalState.FAILED, book.plan.plan, told)
+            book = replace(book, plan=without_goal(state, book.plan, record.goal))
     return set_record(state, book, record)
 
 

@@ -131,7 +131,13 @@ def replan_asked(state: State, event: events.ReplanAsked) -> State:
         return answer(state, ask.request, False, reason)
     goals = tuple(dict.fromkeys([*book.plan.goals, *ask.goals]))
     # What a person asks for is no sign that the world does not go along: counting begins anew.
-    book = replace(book, plan=replace(book.plan, goals=goals), replan_reason=ask.reason, replans=0)
+    book = replace(
+        book,
+        plan=replace(book.plan, goals=goals),
+        replan_reason=ask.reason,
+        anew_reason=ask.reason,
+        replans=0,
+    )
     state = set_book(state, book)
     return answer(state, ask.request, True, f"plan {ask.plan} is made again", ask.plan)
 

@@ -8,6 +8,7 @@ from typing import TypeVar
 import msgspec
 
 from fleet.core.language import Vocabulary
+from fleet.core.language.vocabulary import Deed
 from fleet.core.skills import SkillModel
 from fleet.core.world_model import WorldModel
 from keyexpr_schema.durations import Durations
@@ -29,13 +30,14 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     `approval`: a person has to approve every new plan. `auto_plan`: goals that wait are planned
     without being asked for, into a running plan where there is one. `interpreter`: sentences that
     the grammar refuses go to a language model. `lost_after_s`: a robot whose worker is gone for
-    longer (wall time, s) counts as lost.
+    longer (wall time, s) counts as lost. `deeds` are skills that goals can ask for by name.
     """
 
     approval: bool = False
     auto_plan: bool = False
     interpreter: bool = False
     lost_after_s: float = 30.0
+    deeds: tuple[Deed, ...] = ()
 
 
 class Job(msgspec.Struct, frozen=True, kw_only=True):
@@ -55,7 +57,9 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     partial: bool = False
     """Whether goals that cannot be reached are left out, and not the whole plan refused."""
     remaining: Plan | None = None
-    """What is left of the plan, where another allocation of it may do."""
+    """What is left of the plan, where that may do, with goals planned alone that it fails."""
+    outside: bool = False
+    """Whether nothing speaks against the plan, so that another allocation of what is left does."""
     home: dict[str, str] = {}
     """The robot of each actor until now."""
     sequence: tuple[str, ...] = ()
@@ -72,10 +76,12 @@ class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
     """A plan with everything the planner keeps about it.
 
     `records` hold the tasks of every revision; `plan` only those of the current one.
-    `replan_reason` set means: order nothing more, and plan again. If it is also `mend_reason`,
-    another allocation of what is left may do. `dropping` are tasks that are under way and no longer
-    wanted; their orders are cancelled. `team` are the robots that were there when the plan was
-    made. `late` are tasks that took far longer than predicted, and were reacted to.
+    `replan_reason` set means: order nothing more, and plan again. What is left is mended, if that
+    can be, unless it is also `anew_reason`. If it is also `outside_reason`, it says nothing against
+    the plan: robots came, went or are late, a goal was deleted. `dropping` are tasks that are under
+    way and no longer wanted; their orders are cancelled. `team` are the robots that were there when
+    the plan was made. `late` are tasks that took far longer than predicted, and were reacted to.
+    `failures` counts the tasks of each goal that failed for good.
     """
 
     plan: Plan
@@ -87,8 +93,10 @@ class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
     sequence: dict[str, tuple[str, ...]] = {}
     job: Job | None = None
     replan_reason: str | None = None
-    mend_reason: str | None = None
+    anew_reason: str | None = None
+    outside_reason: str | None = None
     late: tuple[str, ...] = ()
+    failures: dict[str, int] = {}
     amendment: Task | None = None
     """A task that someone wants added, and the request for it."""
     amendment_request: str | None = None
@@ -165,7 +173,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
                 continue
             if isinstance(fact.value, str) and rooms.get(fact.value, where) == where:
                 rests[fact.subject] = fact.value
-        return Vocabulary(self.places, self.objects, self.robots, whereabouts, rests)
+        deeds = self.policy.deeds
+        return Vocabulary(self.places, self.objects, self.robots, whereabouts, rests, deeds)
 
     def world(self, skills: Mapping[str, SkillModel]) -> WorldModel:
         """The world as believed now."""

@@ -80,9 +80,6 @@ def why_replan(state: State, book: PlanBook, skills: Skills) -> str | None:
         if where is not None:
             return f"{thing} was found: it is at {where}"
     current = list(book.current())
-    new = sorted(set(world.team) - set(book.team))
-    if book.team and new and any(record.state is TaskState.WAITING for record in current):
-        return f"{' and '.join(new)} can help now"
     if all(record.state is TaskState.SUCCEEDED for record in current):
         for goal in book.plan.goals:
             status = state.goal_states.get(goal)
@@ -92,3 +89,20 @@ def why_replan(state: State, book: PlanBook, skills: Skills) -> str | None:
             if unmet:
                 return f"every task is done, and {unmet[0]} does not hold"
     return None
+
+
+def new_robots(state: State, book: PlanBook, skills: Skills) -> PlanBook | None:
+    """The book with the wish that robots take part that came since the plan was made.
+
+    More of a kind that is there already can share what is left. A new kind may help in ways that
+    the plan knows nothing of, so that everything is planned again.
+    """
+    world = state.world(skills)
+    new = sorted(set(world.team) - set(book.team))
+    if not book.team or not new or all(r.state is not TaskState.WAITING for r in book.current()):
+        return None
+    reason = f"{' and '.join(new)} can help now"
+    kinds = {state.robots[robot].model for robot in book.team if robot in state.robots}
+    if all(state.robots[robot].model in kinds for robot in new):
+        return replace(book, replan_reason=reason, outside_reason=reason)
+    return replace(book, replan_reason=reason, anew_reason=reason)

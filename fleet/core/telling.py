@@ -10,7 +10,7 @@ from fleet.core.language import Reading, read_goal, statement_facts
 from fleet.core.state import State, put, without
 from fleet.errors import NotUnderstood
 from keyexpr_schema.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
-from keyexpr_schema.plans import PlanState
+from keyexpr_schema.plans import Plan, PlanState
 from keyexpr_schema.world import NOTHING, Fact, StatementStatus, Value
 
 SEARCHED = "searched"
@@ -104,21 +104,28 @@ def goal_forgotten(state: State, event: events.GoalForgotten) -> State:
     )
     for plan, book in state.plans.items():
         if event.goal in book.plan.goals and not book.ended:
-            rest = tuple(goal for goal in book.plan.goals if goal != event.goal)
-            conditions = tuple(
-                c
-                for goal in rest
-                if goal in state.goal_states
-                for c in state.goal_states[goal].conditions
-            )
+            rest = without_goal(state, book.plan, event.goal)
             book = replace(
                 book,
-                plan=replace(book.plan, goals=rest, conditions=conditions),
+                plan=rest,
                 replan_reason=f"goal {event.goal} was deleted",
-                cancelling=book.cancelling or not rest,
+                outside_reason=f"goal {event.goal} was deleted",
+                cancelling=book.cancelling or not rest.goals,
             )
             state = replace(state, plans=put(state.plans, plan, book))
     return state
+
+
+def without_goal(state: State, plan: Plan, goal: str) -> Plan:
+    """The plan, answering for its other goals only; its tasks stay."""
+    rest = tuple(other for other in plan.goals if other != goal)
+    conditions = tuple(
+        condition
+        for other in rest
+        if other in state.goal_states
+        for condition in state.goal_states[other].conditions
+    )
+    return replace(plan, goals=rest, conditions=conditions)
 
 
 def _understand(state: State, goal: Goal) -> GoalStatus:

@@ -11,7 +11,7 @@ from fleet.core.planning import plan_again
 from fleet.core.requests import take_waiting_goals
 from fleet.core.skills import Action
 from fleet.core.state import OUTSTANDING, PlanBook, State
-from fleet.core.surprises import why_replan
+from fleet.core.surprises import new_robots, why_replan
 from fleet.core.telling import mark_goals, next_stage
 from keyexpr_schema.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.plans import PlanState
@@ -31,6 +31,24 @@ def advance(state: State, skills: Skills) -> State:
             state = plan_again(state, book)
         elif book.state is PlanState.RUNNING and book.job is None:
             state = _run(state, book, skills)
+    return _loosened(state, skills)
+
+
+def _loosened(state: State, skills: Skills) -> State:
+    """Where nobody moves, since plans keep robots from each other in a circle, one task gets its
+    robots all the same; what that upsets is planned again."""
+    alive = [book for book in state.plans.values() if not book.ended]
+    if any(book.job is not None or book.outstanding() for book in alive):
+        return state
+    for book in sorted(alive, key=lambda each: _priority(state, each.plan.plan)):
+        if book.state is not PlanState.RUNNING or book.replan_reason is not None:
+            continue
+        for record in book.current():
+            if record.state is not TaskState.WAITING:
+                continue
+            after = _dispatch(state, book.plan.plan, record, skills, kept=False)
+            if after is not state:
+                return advance(after, skills)
     return state
 
 
@@ -60,12 +78,14 @@ def _cancel(state: State, book: PlanBook) -> State:
 def _run(state: State, book: PlanBook, skills: Skills) -> State:
     state = _mark_reached(state, book, skills)
     book = state.plans[book.plan.plan]
-    reason = why_replan(state, book, skills)
-    if reason is not None:
+    if (reason := why_replan(state, book, skills)) is not None:
         return advance(set_book(state, replace(book, replan_reason=reason)), skills)
+    if (helpers := new_robots(state, book, skills)) is not None:
+        return advance(set_book(state, helpers), skills)
     if (late := late_task(state, book)) is not None:
         reason = f"{late.robot} is late with {late.task} ({late.skill})"
-        book = replace(book, replan_reason=reason, mend_reason=reason, late=(*book.late, late.task))
+        handled = (*book.late, late.task)
+        book = replace(book, replan_reason=reason, outside_reason=reason, late=handled)
         return advance(set_book(state, book), skills)
     if all(record.state is TaskState.SUCCEEDED for record in book.current()):
         return set_book(state, replace(book, state=PlanState.SUCCEEDED))
@@ -105,8 +125,13 @@ def _mark_reached(state: State, book: PlanBook, skills: Skills) -> State:
     return state
 
 
-def _dispatch(state: State, plan: str, record: TaskRecord, skills: Skills) -> State:
-    """Order a waiting task if nothing holds it back; replan if the world is not as it must be."""
+def _dispatch(
+    state: State, plan: str, record: TaskRecord, skills: Skills, kept: bool = True
+) -> State:
+    """Order a waiting task if nothing holds it back; replan if the world is not as it must be.
+
+    See `_free` for `kept`.
+    """
     book = state.plans[plan]
     befores = (*record.after, *record.behind)
     if any(
@@ -119,7 +144,7 @@ def _dispatch(state: State, plan: str, record: TaskRecord, skills: Skills) -> St
     if action is None:
         reason = f"{record.task} cannot start: there is no skill {record.skill} any more"
         return give_up(state, book, reason)
-    if not all(_free(state, robot, plan) for robot in action.participants):
+    if not all(_free(state, robot, plan, kept) for robot in action.participants):
         return state
     if _touches_what_is_dropped(book, action, skills):
         return state
@@ -158,12 +183,12 @@ def _touches_what_is_dropped(book: PlanBook, action: Action, skills: Skills) -> 
     return False
 
 
-def _free(state: State, robot: str, plan: str) -> bool:
+def _free(state: State, robot: str, plan: str, kept: bool) -> bool:
     """Whether a robot is connected and neither works now nor is in the middle of other work.
 
     A robot that carries what a plan wants brought somewhere is that plan's until it is delivered:
     between a pick and its place no other plan may have the hand. Without a load, a robot that has
-    begun an actor's work keeps to that plan until it has nothing left to do there.
+    begun an actor's work is `kept` by that plan until it has nothing left to do there.
     """
     if not state.alive.get(robot):
         return False
@@ -182,7 +207,7 @@ def _free(state: State, robot: str, plan: str) -> bool:
                 unfinished.add(record.actor)
         if book.plan.plan == plan or book.ended or carries:
             continue
-        if begun & unfinished or _carries_for(state, robot, book):
+        if (kept and begun & unfinished) or _carries_for(state, robot, book):
             return False
     return True
 
@@ -215,7 +240,7 @@ def _fail_tasks_of_lost_robots(state: State) -> State:
                 for name, record in book.records.items()
             }
             if records != book.records or book.replan_reason is None:
-                lost = replace(book, records=records, replan_reason=reason, mend_reason=reason)
+                lost = replace(book, records=records, replan_reason=reason, outside_reason=reason)
                 state = set_book(state, lost)
     return state
 

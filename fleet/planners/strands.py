@@ -100,7 +100,7 @@ def options_for(
     strands: dict[object, Strand] = {}
     for result, condition in found:
         # What rides in a basket already rides with a certain robot.
-        rides_with = facts.get(Variable("at", condition.subject))
+        rides_with = world.value("at", condition.subject)
         spoken_of = (condition.subject, condition.value, rides_with)
         named = frozenset(robot for robot in world.robots if robot in spoken_of)
         content = tuple(_signature(action) for action in result.actions)

@@ -1,8 +1,9 @@
-"""A running plan goes on with what is left of it, where only robots have changed.
+"""A running plan goes on with what is left of it, as far as that still works.
 
 Planning a thousand tasks again takes long, and would turn over what is well under way. So what is
-left is checked as it stands; goals for which it no longer works (a lost robot had a cup in its
-hand) are planned anew, alone, and put beside the rest. The checker decides whether that is a plan.
+left is checked as it stands; goals for which it no longer works (a cup is elsewhere, a lost robot
+had it in its hand, the goal is new) are planned anew, alone, and put beside the rest. The checker
+decides whether that is a plan.
 """
 
 from __future__ import annotations
@@ -38,14 +39,15 @@ def mended_plan(
     whole = _for_goals(remaining, problem.goals)
     checked = check_plan(whole, problem.world)
     if checked.valid:
-        return PartialPlan(whole)
+        return PartialPlan(whole, changed=False)
     broken = _broken_goals(whole, checked, problem.world, problem.goals)
     rest = tuple(goal for goal in problem.goals if goal.goal not in broken)
     if not broken or all(goal.goal in reached for goal in rest):
         return None
     tasks = tuple(task for task in remaining.tasks if task.goal not in broken)
     kept = {task.task for task in tasks}
-    first = 1 + max((int(task.task.removeprefix("t")) for task in remaining.tasks), default=0)
+    numbers = [int(task.task.removeprefix("t")) for task in remaining.tasks]
+    first = max([problem.first_task, *(number + 1 for number in numbers)])
     anew = tuple(goal for goal in problem.goals if goal.goal in broken)
     part = plan_what_can_be(planner, judge, changed(problem, goals=anew, first_task=first))
     mended = replace(

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager
 
 from fleet.core.effects import Publish, Retract
-from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.errors import SchemaError, UndecodablePayload
 from keyexpr_schema.session import Session
 
 CONFIRM_TIMEOUT_S = 10.0
@@ -63,6 +63,8 @@ class Outbox:
                         )
                     else:
                         await self._session.delete(effect.key, effect.address, CONFIRM_TIMEOUT_S)
+                except UndecodablePayload as error:
+                    log.error("not published, since no reader could read it: %s", error)
                 except SchemaError as error:
                     log.warning("%s", error)
                     self._wanted.setdefault(keyexpr, effect)

@@ -11,10 +11,14 @@ from keyexpr_schema.plans import Plan
 
 @dataclass(frozen=True)
 class PartialPlan:
-    """A plan, and the goals that it leaves out, each with the reason."""
+    """A plan, and the goals that it leaves out, each with the reason.
+
+    `changed` is false for what is left of a plan and stays as it was.
+    """
 
     plan: Plan
     left_out: Mapping[str, str] = field(default_factory=dict)
+    changed: bool = True
 
 
 def plan_what_can_be(

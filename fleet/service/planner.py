@@ -13,6 +13,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.deeds import deeds_of
 from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event
 from fleet.core.lateness import SAME_CLOCK_S
@@ -58,7 +59,11 @@ class PlannerService:
         self._journal = journal
         self._parts = parts
         self._interpreter = parts.llm.interpreter(parts.skills)
-        self._policy = replace(policy or Policy(), interpreter=self._interpreter.configured)
+        self._policy = replace(
+            policy or Policy(),
+            interpreter=self._interpreter.configured,
+            deeds=deeds_of(parts.skills),
+        )
         self._incarnation = uuid.uuid4().hex[:12]
         self._state = State()
         self._time_s = 0.0
@@ -135,7 +140,8 @@ class PlannerService:
         )
 
     async def _take_charge(self) -> None:
-        status = await self._session.get(PLANNER_STATUS, PlannerAddress())
+        # Listed, not got: a value there that is none must not keep the planner from starting.
+        status = (await self._session.list(PLANNER_STATUS)).get(PlannerAddress())
         epoch = 1 + max(self._state.epoch, status.epoch if status else 0)
         self._apply(
             events.PlannerStarted(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, field
 from dataclasses import replace as changed
 
@@ -98,8 +98,13 @@ class _Desk:
         )
         if made is None:
             return None
-        found = self._allocate(made.plan, {})
-        return None if isinstance(found, NotAllocated) else self._made(made, found, mended=True)
+        begun = {task.actor for task in made.plan.tasks} & set(self.job.begun)
+        found = self._allocate(made.plan, _busy_robots(self.job, made.plan, self.state, begun))
+        if isinstance(found, NotAllocated):
+            return None
+        if not self.job.outside and not made.left_out and not made.changed:
+            return None  # it is as it was, and there is a reason why that will not do
+        return self._made(made, found, mended=True)
 
     def planned(self) -> _Made | NoPlan:
         """A new plan; of goals that can be reached, where the job allows that."""
@@ -173,16 +178,24 @@ def _wanted(status: GoalStatus, world: WorldModel) -> tuple[Condition, ...]:
     return status.conditions
 
 
-def _busy_robots(job: Job, plan: Plan, state: State) -> dict[str, str]:
-    """Actors of the new plan whose work a robot has begun already, so that it goes on with it."""
+def _busy_robots(
+    job: Job, plan: Plan, state: State, begun_actors: Set[str] = frozenset()
+) -> dict[str, str]:
+    """Actors of the new plan whose work a robot has begun already, so that it goes on with it.
+
+    Of `begun_actors` that is known; they and what their robots do are left out.
+    """
     book = state.plans.get(job.plan)
     begun: dict[tuple[object, ...], list[str]] = {}
     for name in job.running:
-        if book is not None and (record := book.records.get(name)) is not None and record.robot:
+        record = book.records.get(name) if book is not None else None
+        if record is not None and record.robot and record.actor not in begun_actors:
             work = _work(record.skill, record.args, (record.robot, *state.robots))
             begun.setdefault(work, []).append(record.robot)
     pins: dict[str, str] = {}
     for task in plan.tasks:
+        if task.actor in begun_actors:
+            continue
         robots = begun.get(_work(task.skill, task.args, ()))
         if robots and task.actor not in pins and robots[0] not in pins.values():
             pins[task.actor] = robots.pop(0)

@@ -18,8 +18,8 @@ DEFAULT_SPAN_S = (0.0, 60.0)
 LANE_SHARE = 0.018
 """A third of a lane of the Gantt chart, as a part of the height of a 900 pixel window."""
 
-ELEVATION_DEG = 60.0
-AWAY = 1.08
+ELEVATION_DEG = 68.0
+AWAY = 0.97
 """Distance of the eye from the middle of the floor, in diagonals of the floor and for a view as
 high as the window; a lower view shows as much of the width from nearer by."""
 
@@ -78,7 +78,7 @@ def blueprint(
                 ),
                 row_shares=[0.5, 0.19, 0.31],
             ),
-            column_shares=[0.58, 0.42],
+            column_shares=[0.62, 0.38],
         ),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),

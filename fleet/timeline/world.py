@@ -23,6 +23,9 @@ FRAME_STEP_S = 0.05
 ROWS = 400
 """Rows of one body that are sent at once, at the latest."""
 
+LABEL_M = 0.6
+"""How far over a robot its label hangs: seen from above, a lower one hides its arm."""
+
 ROBOT_TRAIL_M = 0.025
 OBJECT_TRAIL_M = 0.015
 
@@ -216,7 +219,7 @@ class World:
         self._sink.log(
             f"{path}/label",
             rr.Points3D(
-                [(0, 0, height + 0.25)],
+                [(0, 0, height + LABEL_M)],
                 radii=[0.001],
                 colors=[self._palette.robot(robot)],
                 labels=[text],

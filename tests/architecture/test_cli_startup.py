@@ -100,3 +100,30 @@ def test_the_shell_completes(words: str, expected: set[str]) -> None:
         },
     )
     assert set(done.stdout.split()) == expected
+
+
+@pytest.mark.parametrize(
+    ("command", "arguments", "loaded"),
+    [
+        ("goals", ["list", "--router", "tcp/127.0.0.1:1"], False),
+        ("goals", ["add", "Bring the first cup.", "--id", "g"], False),
+        ("plans", ["create", "big-dag", "milp", "g1", "g2"], False),
+        ("goals", ["add", "Bring the first cup.", "--priority", "2"], True),
+    ],
+)
+def test_words_are_taken_as_they_are_without_pydantic(
+    command: str, arguments: list[str], loaded: bool
+) -> None:
+    """It takes as long to load as the rest of a command; typer uses it for every value."""
+    code = (
+        f"import sys, typer.main, cli.commands.{command} as module\n"
+        f"leaf = typer.main.get_command(module.app).commands[{arguments[0]!r}]\n"
+        f"taken = leaf.make_context('robotctl', {arguments[1:]!r}).params\n"
+        "print('pydantic' in sys.modules, list(taken['router']), taken.get('priority'))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=30
+    )
+    router = ["tcp/127.0.0.1:1"] if "--router" in arguments else []
+    priority = {"add": 2 if loaded else 0}.get(arguments[0])
+    assert done.stdout.strip() == f"{loaded} {router} {priority}"

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from cli.commands.processes import data_folder
 from cli.errors import BadSettings
 from cli.settings import DEFAULT_REALM, DEFAULT_ROUTER, PlannerSettings, load_settings
 
@@ -105,3 +106,13 @@ def test_the_file_to_copy_is_right_with_every_comment_taken_away(tmp_path: Path)
     told = load_settings(None, None, False, {}, tmp_path).planner
     assert (told.approval, told.auto_plan, told.lost_after_s) == (True, True, 30.0)
     assert told.llm_config == tmp_path / "planner.yaml"
+
+
+def test_what_a_process_keeps_lies_in_a_folder_of_its_realm(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    north, south = (data_folder(None, "planner", realm) for realm in ("north", "south"))
+    assert north == tmp_path / "robotfleet" / "north" / "planner" != south
+    assert data_folder(None, "router") == tmp_path / "robotfleet" / "router"
+    assert data_folder(tmp_path / "here", "planner", "north") == tmp_path / "here"

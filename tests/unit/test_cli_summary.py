@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from io import StringIO
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rich.console import Console
 
-from cli.demo.summary import task_lines, times
+from cli.demo.summary import Summary, task_lines, times
+from cli.judge import Judgement, Verdict
+from cli.show.summary_page import summary_page
 from fleet.core.idle_time import union_s
+from keyexpr_schema.goals import GoalState
 from keyexpr_schema.tasks import TaskRecord, TaskState, Try
 
 
@@ -73,3 +79,43 @@ def test_the_union_of_intervals_counts_every_unit_once(pairs: list[tuple[int, in
     spans = [(float(min(pair)), float(max(pair))) for pair in pairs]
     units = {unit for start, end in spans for unit in range(int(start), int(end))}
     assert union_s(spans) == len(units)
+
+
+def verdict(goal: str, physics: Judgement, planner: GoalState) -> Verdict:
+    agreed = physics is Judgement.HOLDS and planner is GoalState.REACHED
+    return Verdict(
+        goal=goal, physics=physics, planner=planner, agreed=agreed, sentence="so", conditions=()
+    )
+
+
+def page_of(*verdicts: Verdict) -> str:
+    summary = Summary(
+        mission="m",
+        backend="mujoco",
+        ok=all(each.agreed for each in verdicts),
+        goals=verdicts,
+        tasks=(),
+        revisions={},
+        makespan_s=0.0,
+        busy_s={},
+        idle_s={},
+        contacts=None,
+        wall_s=1.0,
+        real_time_factor=None,
+        out="runs/m",
+        recording=None,
+    )
+    console = Console(width=160, file=StringIO())
+    console.print(summary_page(summary))
+    return console.file.getvalue()  # type: ignore[attr-defined,no-any-return]
+
+
+def test_the_title_tells_a_failure_from_what_physics_cannot_see() -> None:
+    holds = verdict("bring", Judgement.HOLDS, GoalState.REACHED)
+    unseen = verdict("search-all", Judgement.NOT_JUDGED, GoalState.REACHED)
+    failed = verdict("fetch", Judgement.FAILS, GoalState.REACHED)
+    assert "Every goal is reached: the physics and the planner agree." in page_of(holds)
+    assert "the physics cannot see all of it" in page_of(holds, unseen)
+    assert "Not every goal is reached" in page_of(holds, unseen, failed)
+    lines = [line for line in page_of(holds, unseen).splitlines() if "planner:" in line]
+    assert lines[0].index("physics:") == lines[1].index("physics:")

@@ -6,14 +6,14 @@ import pytest
 
 from fleet.core import events
 from fleet.core.lateness import FACTOR, MARGIN_S, next_lateness
-from fleet.core.state import PlanBook
+from fleet.core.state import PlanBook, Policy
 from fleet.core.working import next_timer
 from keyexpr_schema.goals import GoalState
-from keyexpr_schema.plans import PlanState
+from keyexpr_schema.plans import Plan, PlanState, Task
 from keyexpr_schema.requests import Control, ControlRequest, ReplanRequest
 from keyexpr_schema.tasks import Order, ReportState, TaskState
 from tests.fleet_model import FleetModel
-from tests.household import bring, manipulator
+from tests.household import bring, carrier, cup, manipulator
 
 ROOMS = ("hallway", "living_room")
 
@@ -210,3 +210,105 @@ def test_a_lost_robot_that_had_nothing_else_to_do_takes_its_goal_with_it() -> No
     model.finish()
     assert book(model).state is PlanState.SUCCEEDED
     assert all(record.robot == other for record in book(model).current())
+
+
+def orders_but(model: FleetModel, goal: str) -> list[Order]:
+    records = book(model).records
+    return [order for order in model.orders() if records[order.task].goal != goal]
+
+
+def test_a_task_that_fails_changes_nothing_about_other_goals() -> None:
+    model = running(robots=3, cups=6)
+    (order, *_) = model.orders()
+    goal = book(model).records[order.task].goal
+    assert goal is not None
+    others = {r.task for r in book(model).current() if r.goal != goal}
+    undisturbed = orders_but(model, goal)
+    model.fail(order)
+    assert book(model).plan.revision == 2
+    assert all(order in model.orders() for order in undisturbed)
+    kept = others & {task.task for task in book(model).plan.tasks}
+    assert len(kept) >= len(others) - 4, "more than one other actor changed hands"
+    model.finish()
+    assert all(status.state is GoalState.REACHED for status in model.state.goal_states.values())
+
+
+def test_a_new_goal_is_planned_alone_and_put_beside_the_rest() -> None:
+    model = running(robots=2, cups=4)
+    model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(auto_plan=True))
+    before = {task.task for task in book(model).plan.tasks}
+    undisturbed = [(o.robot, o.task) for o in model.orders()]
+    model.tell(events.ObjectTold, object=cup(5))
+    model.learn("cup_5", "at", "living_room")
+    model.tell(events.GoalTold, goal=bring(5, "hallway"))
+    assert [(o.robot, o.task) for o in model.orders()] == undisturbed
+    change = book(model).change
+    assert change is not None
+    assert change.dropped <= 4
+    assert len(before & {task.task for task in book(model).plan.tasks}) >= len(before) - 4
+    model.finish()
+    assert model.state.goal_states["g5"].state is GoalState.REACHED
+
+
+def test_a_deleted_goal_takes_only_its_own_tasks_with_it() -> None:
+    model = running(robots=2, cups=4)
+    gone = {r.task for r in book(model).current() if r.goal == "g4"}
+    rest = {r.task for r in book(model).current()} - gone
+    begun = [order.task for order in orders_but(model, "g4")]
+    model.tell(events.GoalForgotten, goal="g4")
+    for order in [o for o in model.orders() if o.cancelled]:
+        assert order.task in gone
+        model.report(order, ReportState.CANCELLED)
+    now = book(model).plan.tasks
+    assert {*begun} <= rest & {task.task for task in now}
+    assert "cup_4" not in {task.args.get("object") for task in now}
+    model.finish()
+    assert book(model).state is PlanState.SUCCEEDED
+    assert book(model).plan.goals == ("g1", "g2", "g3")
+
+
+def test_one_goal_that_never_works_does_not_use_up_the_patience_for_all() -> None:
+    model = running(robots=2, cups=3)
+    for _ in range(400):
+        if not model.orders():
+            break
+        order = model.orders()[0]
+        if order.skill == "pick" and order.args["object"] == "cup_2":
+            model.fail(order)
+        else:
+            model.succeed(order)
+    states = {goal: status.state for goal, status in model.state.goal_states.items()}
+    assert states == {
+        "g1": GoalState.REACHED, "g2": GoalState.FAILED, "g3": GoalState.REACHED,
+    }  # fmt: skip
+    assert "it slipped" in (model.state.goal_states["g2"].reason or "")
+
+
+def test_plans_that_keep_robots_from_each_other_do_not_wait_for_ever() -> None:
+    model = FleetModel((manipulator("r1"), carrier("c1")), cups=2)
+
+    def hand_over(plan: str, thing: str, first: str, second: str) -> Plan:
+        """The first of pickup and carrier to drive is followed by the other."""
+
+        def drive(task: str, actor: str, to: str, *after: str) -> Task:
+            args = {"robot": f"?{actor}", "to": to}
+            return Task(task=task, skill="navigate", args=args, actor=actor, after=after)
+
+        cup = {"robot": "?pickup", "object": thing, "place": "kitchen"}
+        tasks = (
+            drive("t1", first, "kitchen"),
+            drive("t2", second, "kitchen", "t1"),
+            Task(task="t3", skill="pick", args=cup, actor="pickup", after=("t2",)),
+            Task(
+                task="t4", skill="place_on_robot", args={**cup, "carrier": "?carrier"},
+                actor="pickup", after=("t3",),
+            ),
+            drive("t5", "carrier", "hallway", "t4"),
+        )  # fmt: skip
+        return Plan(plan=plan, goals=(), conditions=(), tasks=tasks)
+
+    model.tell(events.PlanProposed, plan=hand_over("one", "cup_1", "pickup", "carrier"))
+    model.tell(events.PlanProposed, plan=hand_over("two", "cup_2", "carrier", "pickup"))
+    assert [(o.plan, o.robot) for o in model.orders()] == [("two", "c1"), ("one", "r1")]
+    model.finish()
+    assert {each.state for each in model.state.plans.values()} == {PlanState.SUCCEEDED}

@@ -60,7 +60,7 @@ async def test_a_death_that_nobody_asked_for_ends_the_work(tmp_path: Path) -> No
         os.kill(pid, signal.SIGKILL)
         with pytest.raises(ProcessDied) as error:
             await fleet.guard(asyncio.Event().wait())
-    assert "router ended unexpectedly by SIGKILL" in str(error.value)
+    assert "router ended unexpectedly by SIGKILL; its log is" in str(error.value)
     assert str(fleet.log("router")) in str(error.value)
 
 

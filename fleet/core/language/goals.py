@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fleet.core.language.locations import PLACES
+from fleet.core.language.mentions import Mention
 from fleet.core.language.sentences import Sentences
 from fleet.core.language.subjects import THINGS, Fact, Subject
-from fleet.core.language.tokens import SENTENCE_ENDS
-from fleet.core.language.verbs import EXAMPLE, verb_next
-from fleet.core.language.vocabulary import Vocabulary
+from fleet.core.language.tokens import SENTENCE_ENDS, words_of
+from fleet.core.language.verbs import EXAMPLE, IMPERATIVES, longest, verb_next
+from fleet.core.language.vocabulary import Deed, Vocabulary
 from fleet.core.language.wordlists import (
     ASKING_WHERE,
     CLOSERS,
@@ -179,6 +180,8 @@ class _Goals(Sentences):
             self.declarative(told=True)
         elif cursor.word() in ("clear", "empty") and self._table_next():
             self.clear()
+        elif (deed := self._deed()) is not None:
+            self._done_to(deed)
         elif verb_next(cursor):
             self.imperative()
         elif cursor.word() in ("can", "could", "would", "will", "should", "may"):
@@ -190,6 +193,28 @@ class _Goals(Sentences):
             self.declarative()
         else:
             raise self.no_clause()
+
+    def _deed(self) -> Deed | None:
+        """The skill whose name comes next, unless a verb of ours is as long; past it."""
+        names = {words_of(deed.verb): deed for deed in self.words.deeds}
+        verb = longest(self.cursor, names)
+        if verb is None or len(longest(self.cursor, IMPERATIVES) or ()) >= len(verb):
+            return None
+        self.cursor.at += len(verb)
+        return names[verb]
+
+    def _done_to(self, deed: Deed) -> None:
+        """`vacuum the hallway and the kitchen`, after the verb."""
+        if deed.sort == "place":
+            names = self.places()
+            mentions = [Mention((name,), "place", self.cursor.at) for name in names]
+        else:
+            found = self.subjects.read("an object", ("object",))
+            mentions = [self.subjects.settle(subject) for subject in found]
+            self.subjects.remember(mentions)
+        for mention in mentions:
+            for relation, value in deed.wants:
+                self.draft.add(relation, mention, value)
 
     def _table_next(self) -> bool:
         """Whether the next word is a verb, and a place or surface is what it is about; past it."""

@@ -1,0 +1,68 @@
+"""The symbolic planner from any start: hands may be full, goals may come on top of others."""
+
+from __future__ import annotations
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fleet.allocators.base import Allocated
+from fleet.core.checker import check_plan
+from fleet.core.skills import Variable
+from fleet.core.world_model import WorldModel
+from fleet.planners.base import PlanningProblem
+from fleet.service.composition import compose
+from keyexpr_schema.goals import Goal
+from keyexpr_schema.plans import Plan
+from keyexpr_schema.world import Value
+from tests.household import bring, carrier, home, manipulator
+
+PARTS = compose()
+PLACES = ("kitchen", "hallway", "living_room")
+STRATEGIES = ("big-dag", "per-goal", "monolithic")
+
+
+@st.composite
+def missions(draw: st.DrawFn) -> tuple[WorldModel, tuple[Goal, ...]]:
+    """One or two hands and a basket; cups in rooms, in hands and in the basket; all of them are
+    wanted somewhere, or all but one. In the basket there is one at most: it can be in one place.
+    """
+    arms = ["hsr", "r2"][: draw(st.integers(1, 2))]
+    robots = (*(manipulator(name) for name in arms), carrier("locobot"))
+    cups = draw(st.integers(1, 4))
+    facts: dict[Variable, Value] = {}
+    for spec in robots:
+        facts[Variable("at", spec.robot)] = draw(st.sampled_from((*PLACES, None)))
+    free_hands = list(arms)
+    riding = ""
+    goals: list[Goal] = []
+    for number in range(1, cups + 1):
+        name = f"cup_{number}"
+        where = draw(st.sampled_from(("room", "hand", "basket")))
+        to = draw(st.sampled_from(PLACES))
+        facts[Variable("at", name)] = draw(st.sampled_from(PLACES))
+        if where == "hand" and free_hands:
+            hand = free_hands.pop()
+            facts[Variable("holding", hand)] = name
+            facts[Variable("at", name)] = hand
+        elif where == "basket" and not riding:
+            riding = to
+            facts[Variable("at", name)] = "locobot"
+        goals.append(bring(number, to))
+    if len(goals) > 1 and draw(st.booleans()):
+        goals.pop(draw(st.integers(0, len(goals) - 1)))
+    return home(robots, cups).with_facts(facts), tuple(goals)
+
+
+@settings(max_examples=60, deadline=None)
+@given(missions(), st.sampled_from(STRATEGIES))
+def test_what_can_be_done_is_planned_and_allocated(
+    mission: tuple[WorldModel, tuple[Goal, ...]], strategy: str
+) -> None:
+    world, goals = mission
+    problem = PlanningProblem("p", goals, world, strategy=strategy)
+    plan = PARTS.planners["symbolic"].plan(problem)
+    assert isinstance(plan, Plan), plan.reason
+    assert check_plan(plan, world).valid
+    found = PARTS.allocators["milp"].allocate(plan, world)
+    assert isinstance(found, Allocated), found.violations
+    assert check_plan(plan, world, found.allocation, found.schedule.extra_after).valid

@@ -119,8 +119,8 @@ class _Mending:
     ) -> None:
         self.shop, self.home, self.knots, self.frozen = shop, home, knots, frozen
         self.found, self.seed = found, seed
-        self.kept_s = inf
-        """The shortest makespan of those that keep to a target."""
+        self.kept: list[Answer] = []
+        """Of those found, the ones that keep to a target."""
         self.targeted_s = 0.0
         """The limit that targets were last taken from."""
 
@@ -151,12 +151,13 @@ class _Mending:
             made = keep(self.shop, self.knots, self.home, target_s)
             if made is not None:
                 self.found.append(made)
-                self.kept_s = min(self.kept_s, made.rated.makespan_s)
+                self.kept.append(made)
 
     @property
     def met(self) -> bool:
         """Whether keeping to a target has led to a schedule that is short enough."""
-        return self.kept_s <= self.limit_s
+        limit_s = self.limit_s
+        return any(answer.rated.makespan_s <= limit_s for answer in self.kept)
 
     def repair(self, until_s: float) -> None:
         """Only orphans move."""
@@ -165,8 +166,10 @@ class _Mending:
             self.found.append(made)
 
     def shorten(self, until_s: float) -> None:
-        """Search for a shorter schedule, at any number of moves."""
-        shortest = min(self.found, key=lambda answer: answer.rated.makespan_s)
+        """Search for a shorter schedule at any number of moves, from one that has few: what comes
+        out of a new one would set a limit that only new ones meet."""
+        begin = self.kept if self.met else self.found
+        shortest = min(begin, key=lambda answer: answer.rated.makespan_s)
         self.found.append(anneal(self.shop, shortest, until_s, 0.0, self.seed, frozen=self.frozen))
 
     def move_less(self, take_back_until_s: float, until_s: float) -> Answer:

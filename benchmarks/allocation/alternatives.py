@@ -82,13 +82,15 @@ def big_m(ready: Compiled) -> float | None:
     import pulp
 
     blocks = ready.shop.blocks
+    if ready.travels or len(blocks) > MOST_PAIRS:
+        return None
     pairs = [
         (a, b)
         for b in range(len(blocks))
         for a in range(b)
         if not set(blocks[a].machines).isdisjoint(blocks[b].machines)
     ]
-    if ready.travels or len(pairs) > MOST_PAIRS:
+    if len(pairs) > MOST_PAIRS:
         return None
     big = sum(max(duration) for duration in ready.durations)
     model = pulp.LpProblem("big_m", pulp.LpMinimize)

@@ -136,7 +136,7 @@ def _mended(results: list[dict[str, Any]], path: Path) -> None:
     axis.set_xticks(range(len(labels)), labels)
     axis.set_ylabel("blocks that changed hands, of 1,000 tasks")
     axis.set_title("one of 50 robots; above the bars the makespan", fontsize=10)
-    axis.legend(frameon=False)
+    figure.legend(loc="outside lower center", ncols=2, frameon=False)
     axis.spines[["top", "right"]].set_visible(False)
     figure.savefig(path, dpi=130)
     plt.close(figure)

@@ -89,7 +89,7 @@ def _runs(given: argparse.Namespace, console: Console) -> dict[str, Callable[[],
         "sizes": lambda: [
             asdict(o) for o in bench_makespan.sizes(largest, limits_s, console.print)
         ],
-        "coalitions": lambda: bench_makespan.coalitions(seeds=seeds),
+        "coalitions": lambda: bench_makespan.coalitions(),
         "public": lambda: [
             asdict(one) for one in bench_makespan.public(bench_makespan.PUBLIC_S, console.print)
         ],

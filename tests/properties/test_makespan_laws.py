@@ -213,7 +213,10 @@ def test_the_model_of_cp_sat_has_the_optimum_of_brute_force(shop: Shop) -> None:
     solver.parameters.num_workers = 1
     assert solver.solve(Model(cp_model, data).model) == cp_model.OPTIMAL
     least_s = min(one.makespan_s for one in every_schedule(shop))
-    assert solver.objective_value == pytest.approx(least_s)
+    assert solver.objective_value <= least_s + NEAR
+    if all(o.target is None or o.arrives is not None for o in shop.operations):
+        # Who drives somewhere and is not there afterwards has only his first way in the model.
+        assert solver.objective_value == pytest.approx(least_s)
 
 
 @settings(max_examples=150, deadline=None)

@@ -126,6 +126,10 @@ class Model:
         for number, block in enumerate(self.data["blocks"]):
             begin, end = self._span(number)
             single = len(block["steps"]) == 1 and block["place"] == 1
+            # A block that must be first has the machine from the start, one that must be last keeps
+            # it to the end.
+            opens = begin if block["place"] else 0
+            closes = end if block["place"] < 2 else self.horizon
             for group, lit in self.lits[number].items():
                 if groups[group]["ready"]:
                     model.add(begin >= groups[group]["ready"]).only_enforce_if(lit)
@@ -133,12 +137,8 @@ class Model:
                     row = self.data["steps"][block["steps"][0]]
                     size = row["durations"][groups[group]["kind"]]
                 else:
-                    # A block that must be first has the machine from the start, one that must be
-                    # last keeps it to the end.
-                    begin = begin if block["place"] else 0
-                    end = end if block["place"] < 2 else self.horizon
                     size = model.new_int_var(0, self.horizon, "")
-                interval = model.new_optional_interval_var(begin, size, end, lit, "")
+                interval = model.new_optional_interval_var(opens, size, closes, lit, "")
                 intervals[group].append(interval)
         for group, rows in zip(groups, intervals, strict=True):
             if group["size"] == 1:

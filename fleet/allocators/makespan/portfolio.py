@@ -144,7 +144,7 @@ def _search(
                 exactly = timed(shop, proof.order, proof.machine_of)
                 if exactly is not None and exactly.makespan_s < answer.makespan_s - 1e-9:
                     answer, how = exactly, "CP-SAT"
-            if proof.status == "OPTIMAL":
+            if proof.status == "OPTIMAL" and answer.makespan_s <= bound_s * (1 + NEAR):
                 how += ", proven by CP-SAT"
     finally:
         if run is not None:

@@ -26,10 +26,8 @@ WITHIN = 0.02
 """Share of the best makespan that fewer moves may cost."""
 PRICE = 0.002
 """Share of the makespan that one move costs while annealing: ten moves for `WITHIN`."""
-TARGETS = (1.0, 0.99, 0.98, 0.97, 0.95)
+TARGETS = (1.0, 0.99, 0.98, 0.97, 0.995, 0.985, 0.975, 0.96, 0.95, 0.94)
 """Of the longest makespan that is allowed; tried one after the other."""
-ALWAYS = 4
-"""So many of them whatever the time."""
 TARGETS_SHARE, REPAIR_SHARE, SHORTEN_SHARE = 0.4, 0.5, 0.6
 MORE_TARGETS_SHARE, TAKE_BACK_SHARE = 0.75, 0.85
 """When each step is over, as a share of the time."""
@@ -121,6 +119,8 @@ class _Mending:
     ) -> None:
         self.shop, self.home, self.knots, self.frozen = shop, home, knots, frozen
         self.found, self.seed = found, seed
+        self.kept: list[Answer] = []
+        """Of those found, the ones that keep to a target."""
         self.targeted_s = 0.0
         """The limit that targets were last taken from."""
 
@@ -139,7 +139,7 @@ class _Mending:
         are ways or partners, so that shorter ones are tried, too."""
         tried = 0
         while tried < len(TARGETS):
-            if tried >= ALWAYS and time.perf_counter() > until_s:
+            if self.met and time.perf_counter() > until_s:
                 break
             if self.limit_s != self.targeted_s:
                 # The first time, or one of those before has come out shorter than all others.
@@ -151,6 +151,13 @@ class _Mending:
             made = keep(self.shop, self.knots, self.home, target_s)
             if made is not None:
                 self.found.append(made)
+                self.kept.append(made)
+
+    @property
+    def met(self) -> bool:
+        """Whether keeping to a target has led to a schedule that is short enough."""
+        limit_s = self.limit_s
+        return any(answer.rated.makespan_s <= limit_s for answer in self.kept)
 
     def repair(self, until_s: float) -> None:
         """Only orphans move."""
@@ -159,8 +166,10 @@ class _Mending:
             self.found.append(made)
 
     def shorten(self, until_s: float) -> None:
-        """Search for a shorter schedule, at any number of moves."""
-        shortest = min(self.found, key=lambda answer: answer.rated.makespan_s)
+        """Search for a shorter schedule at any number of moves, from one that has few: what comes
+        out of a new one would set a limit that only new ones meet."""
+        begin = self.kept if self.met else self.found
+        shortest = min(begin, key=lambda answer: answer.rated.makespan_s)
         self.found.append(anneal(self.shop, shortest, until_s, 0.0, self.seed, frozen=self.frozen))
 
     def move_less(self, take_back_until_s: float, until_s: float) -> Answer:

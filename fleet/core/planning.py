@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sized
+
 from msgspec.structs import replace
 
 from fleet.core import events
@@ -146,11 +148,16 @@ def _with_outcome(book: PlanBook, event: events.PlanMade) -> PlanBook:
 
 def _made_sentence(event: events.PlanMade) -> str:
     plan = event.plan
-    told = [f"plan {plan.plan} has {len(plan.tasks)} tasks for {len(plan.goals)} goals"]
+    tasks, goals = _counted(plan.tasks, "task"), _counted(plan.goals, "goal")
+    told = [f"plan {plan.plan} has {tasks} for {goals}"]
     if plan.making.fallback:
         told.append(plan.making.fallback)
     told += [f"goal {goal} is left out: {reason}" for goal, reason in event.left_out.items()]
     return "; ".join(told)
+
+
+def _counted(things: Sized, what: str) -> str:
+    return f"{len(things)} {what}{'' if len(things) == 1 else 's'}"
 
 
 def _preview_of(state: State, job: int) -> Job | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.books import open_goals, set_record
+from fleet.core.books import give_up, open_goals, set_record
 from fleet.core.calls import Skills, action_of, unmet_before
 from fleet.core.durations import learn
 from fleet.core.effects import PLANNER_SOURCE
@@ -122,8 +122,11 @@ def _failed(state: State, book: PlanBook, record: TaskRecord, report: Report) ->
     if record.goal is not None and record.goal in book.plan.goals:
         count = book.failures.get(record.goal, 0) + 1
         book = replace(book, failures=put(book.failures, record.goal, count))
-        if count >= MAX_FAILURES and len(open_goals(state, book)) > 1:
+        if count >= MAX_FAILURES:
             told = f"given up after {count} failed tasks; the last: {reason}"
+            if open_goals(state, book) == [record.goal]:
+                book = replace(book, records=put(book.records, record.task, record))
+                return give_up(state, book, told)
             state = mark_goals(state, (record.goal,), GoalState.FAILED, book.plan.plan, told)
             book = replace(book, plan=without_goal(state, book.plan, record.goal))
     return set_record(state, book, record)

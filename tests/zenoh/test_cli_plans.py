@@ -244,7 +244,7 @@ async def test_a_goal_is_planned_and_waited_for_in_one_command(
     assert said.code == 0, said.err
     first, second, last = said.out.strip().splitlines()
     assert first == "goal g is waiting, understood as at(cup_1) = hallway"
-    assert second == "plan plan-1 has 4 tasks for 1 goals"
+    assert second == "plan plan-1 has 4 tasks for 1 goal"
     assert last == "goal g is reached, understood as at(cup_1) = hallway"
     assert "understood  at(cup_1) = hallway" in page
     assert "Idle time" in idle and "hsr" in idle.partition("Idle time")[2]

@@ -122,12 +122,16 @@ class _Desk:
         return _Made(made.plan, found, mended, made.left_out)
 
     def _allocate(self, plan: Plan, busy: Mapping[str, str]) -> Allocated | NotAllocated:
-        """With actors that robots are `busy` with left where they are, if that can be."""
+        """With actors that robots are `busy` with left where they are and begun with, if that can
+        be; else only left where they are; else as if nothing were under way."""
         told = circumstances_of(self.job, self.state, frozenset(busy))
+        calm = changed(told, under_way=frozenset())
         kept = replace(plan, pins={**busy, **plan.pins})
         made = self.allocator.allocate(kept, self.world, told)
+        if isinstance(made, NotAllocated) and told.under_way:
+            made = self.allocator.allocate(kept, self.world, calm)
         if isinstance(made, NotAllocated) and kept.pins != plan.pins:
-            made = self.allocator.allocate(plan, self.world, told)
+            made = self.allocator.allocate(plan, self.world, calm)
         return made
 
     def _plan(self) -> PartialPlan | NoPlan:

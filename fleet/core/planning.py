@@ -44,7 +44,8 @@ def plan_again(state: State, book: PlanBook) -> State:
         allocator=book.plan.allocator,
         first_task=next_task(book) + (book.amendment is not None),
         partial=True,
-        running=tuple(record.task for record in book.outstanding()),
+        # What is being cancelled is not what a new plan could go on with, though it wants the same.
+        running=tuple(r.task for r in book.outstanding() if r.task not in book.dropping),
         reason=book.replan_reason,
         request=book.amendment_request,
     )

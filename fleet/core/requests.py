@@ -127,6 +127,8 @@ def replan_asked(state: State, event: events.ReplanAsked) -> State:
     if book.state is not PlanState.RUNNING:
         sentence = f"plan {ask.plan} is {book.state.value}, not running"
         return answer(state, ask.request, False, sentence)
+    if book.cancelling:
+        return answer(state, ask.request, False, f"plan {ask.plan} is being cancelled")
     if ask.goals and (reason := _why_not_plan(state, None, ask.goals)):
         return answer(state, ask.request, False, reason)
     goals = tuple(dict.fromkeys([*book.plan.goals, *ask.goals]))
@@ -156,7 +158,7 @@ def take_waiting_goals(state: State) -> State:
     if any(book.state is PlanState.PLANNING for book in state.plans.values()):
         return state  # what comes meanwhile goes into the plan that is being made
     for book in state.plans.values():
-        if book.state is PlanState.RUNNING:
+        if book.state is PlanState.RUNNING and not book.cancelling:
             goals = (*book.plan.goals, *waiting)
             reason = f"{', '.join(waiting)} came up"
             book = replace(book, plan=replace(book.plan, goals=goals), replan_reason=reason)

@@ -312,3 +312,27 @@ def test_plans_that_keep_robots_from_each_other_do_not_wait_for_ever() -> None:
     assert [(o.plan, o.robot) for o in model.orders()] == [("two", "c1"), ("one", "r1")]
     model.finish()
     assert {each.state for each in model.state.plans.values()} == {PlanState.SUCCEEDED}
+
+
+def test_work_that_is_being_cancelled_is_not_gone_on_with() -> None:
+    model = running(robots=1, cups=2)
+    (order,) = model.orders()
+    goal = book(model).records[order.task].goal
+    assert goal is not None
+    model.start(order)
+    other = {"g1": "g2", "g2": "g1"}[goal]
+    model.succeed(order)
+    (pick,) = model.orders()
+    model.start(pick)
+    model.tell(events.GoalForgotten, goal=goal)
+    assert [o.task for o in model.orders() if o.cancelled] == [pick.task]
+    again = bring(int(goal.removeprefix("g")), "hallway")
+    model.tell(events.GoalTold, goal=again)
+    model.tell(
+        events.ReplanAsked,
+        request=ReplanRequest(request="x", plan="plan-1", reason="after all", goals=(goal,)),
+    )
+    model.report(pick, ReportState.CANCELLED)
+    model.finish()
+    states = {name: status.state for name, status in model.state.goal_states.items()}
+    assert states == {goal: GoalState.REACHED, other: GoalState.REACHED}

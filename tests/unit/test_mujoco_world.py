@@ -99,7 +99,7 @@ def test_tables_are_a_top_on_four_legs_and_doors_are_open(resting: MujocoBackend
             Motion(kind=MotionKind.RELEASE_IN_BASKET, robot="locobot"),
             "the hand is empty",
         ),
-        ("hsr", Motion(kind=MotionKind.APPROACH, point_m=(0.4, 0.5, 0.9)), "cannot stand"),
+        ("hsr", Motion(kind=MotionKind.APPROACH, point_m=(0.4, 0.5, 0.9)), "there is room only"),
     ],
 )
 def test_what_a_robot_cannot_do_fails_with_a_sentence(

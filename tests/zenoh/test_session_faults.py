@@ -372,6 +372,17 @@ async def test_questions_are_served_several_at_a_time(session_config):
         assert sorted(answer.reason for answer in answers) == [f"r1 c{n}" for n in range(5)]
 
 
+async def _ask_whoever_comes(client, address):
+    """Ask until the other session's declaration has come through the router."""
+    async with asyncio.timeout(10):
+        while True:
+            try:
+                return await client.ask(SIM_MOTION, address, _call("c1"))
+            except NoAnswer as error:
+                if "nobody serves" not in str(error):
+                    raise
+
+
 async def test_a_failing_slow_or_absent_server_is_no_answer_with_a_sentence(session_config):
     async def handler(address: SimRobotAddress, call: MotionCall) -> MotionOutcome:
         if call.call == "slow":
@@ -387,7 +398,7 @@ async def test_a_failing_slow_or_absent_server_is_no_answer_with_a_sentence(sess
             await client.ask(SIM_MOTION, r1, _call("c1"))
         async with server.serve(SIM_MOTION, handler, robot="r1"):
             with pytest.raises(NoAnswer, match="sim failed: the arm is stuck"):
-                await client.ask(SIM_MOTION, r1, _call("c1"))
+                await _ask_whoever_comes(client, r1)
             with pytest.raises(NoAnswer, match="nobody serves sim/robots/r2/motion"):
                 await client.ask(SIM_MOTION, SimRobotAddress("r2"), _call("c1"))
             with pytest.raises(NoAnswer, match=r"did not answer within 0\.3 s"):

@@ -187,7 +187,7 @@ async def test_plans_and_their_revisions_are_compared(
     ) == ("kitchen", "living_room")
     assert f"{plan}@1 → {plan}: " in text.out
     assert "1 finished meanwhile" in text.out
-    assert "4 kept, 0 changed, 0 dropped, 0 added" in files.out
+    assert "4 kept, 0 changed, 0 dropped, 0 added" in " ".join(files.out.split())
     assert f"plan {plan} has no revision 7; known are: 1, 2" in missing.err
     assert "there is no plan 'nothing'" in unknown.err
     assert "change      revision 2 kept " in page

@@ -352,6 +352,17 @@ def _senses(time_s: float) -> Senses:
     return Senses(robot="r1", time_s=time_s, pose_m_rad=(0.0, 0.0, 0.0), place=None)
 
 
+async def _ask_whoever_comes(client, address, call="c1"):
+    """Ask until the other session's declaration has come through the router."""
+    async with asyncio.timeout(10):
+        while True:
+            try:
+                return await client.ask(SIM_MOTION, address, _call(call))
+            except NoAnswer as error:
+                if "nobody serves" not in str(error):
+                    raise
+
+
 async def test_questions_are_served_several_at_a_time(session_config):
     all_in = asyncio.Barrier(5)
 
@@ -367,20 +378,9 @@ async def test_questions_are_served_several_at_a_time(session_config):
         server.serve(SIM_MOTION, handler),
     ):
         answers = await asyncio.gather(
-            *(client.ask(SIM_MOTION, SimRobotAddress("r1"), _call(f"c{n}")) for n in range(5))
+            *(_ask_whoever_comes(client, SimRobotAddress("r1"), f"c{n}") for n in range(5))
         )
         assert sorted(answer.reason for answer in answers) == [f"r1 c{n}" for n in range(5)]
-
-
-async def _ask_whoever_comes(client, address):
-    """Ask until the other session's declaration has come through the router."""
-    async with asyncio.timeout(10):
-        while True:
-            try:
-                return await client.ask(SIM_MOTION, address, _call("c1"))
-            except NoAnswer as error:
-                if "nobody serves" not in str(error):
-                    raise
 
 
 async def test_a_failing_slow_or_absent_server_is_no_answer_with_a_sentence(session_config):

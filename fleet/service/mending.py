@@ -16,7 +16,6 @@ from msgspec.structs import replace
 from fleet.core.binding import able_robots
 from fleet.core.checker import CheckedPlan, check_plan
 from fleet.core.telling import SEARCHED
-from fleet.core.world_model import WorldModel
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.service.partial import PartialPlan, plan_what_can_be
 from keyexpr_schema.goals import Condition, Goal
@@ -40,7 +39,7 @@ def mended_plan(
     checked = check_plan(whole, problem.world)
     if checked.valid:
         return PartialPlan(whole, changed=False)
-    broken = _broken_goals(whole, checked, problem.world, problem.goals)
+    broken = _broken_goals(whole, checked, problem.goals)
     rest = tuple(goal for goal in problem.goals if goal.goal not in broken)
     if not broken or all(goal.goal in reached for goal in rest):
         return None
@@ -94,9 +93,7 @@ def _for_goals(plan: Plan, goals: Iterable[Goal]) -> Plan:
     )
 
 
-def _broken_goals(
-    plan: Plan, checked: CheckedPlan, world: WorldModel, goals: Iterable[Goal]
-) -> frozenset[str]:
+def _broken_goals(plan: Plan, checked: CheckedPlan, goals: Iterable[Goal]) -> frozenset[str]:
     """The goals that the checker's violations are about; none if one is about no goal."""
     goal_of = {task.task: task.goal for task in plan.tasks}
     wants: dict[Condition, list[str]] = {}

@@ -99,7 +99,20 @@ class CpSat:
             return Exact(None, None, bound, status)
         starts, ends = solution["starts"], solution["ends"]
         order = sorted(range(len(starts)), key=lambda b: (starts[b], ends[b]))
-        return Exact(order, self._machines(solution, order), bound, status)
+        machine_of = self._machines(solution, order)
+        if not self._in_place(order, machine_of):
+            return Exact(None, None, bound, status)
+        return Exact(order, machine_of, bound, status)
+
+    def _in_place(self, order: Sequence[int], machine_of: Sequence[int]) -> bool:
+        """Whether on every machine those that must be first, or last, are."""
+        latest: dict[int, int] = {}
+        for block in order:
+            place, before = self._shop.places[block], latest.get(machine_of[block])
+            if before is not None and (before == Place.LAST or before > place):
+                return False
+            latest[machine_of[block]] = place
+        return True
 
     def _machines(self, solution: dict[str, Any], order: Sequence[int]) -> list[int]:
         """Blocks of a pool to its machines: each to one that is free, as intervals are coloured."""

@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+from collections import Counter
 from types import ModuleType
 from typing import Any
 
@@ -123,14 +124,21 @@ class Model:
     def _cumulatives(self) -> None:
         model, groups = self.model, self.data["groups"]
         intervals: list[list[Any]] = [[] for _ in groups]
+        firsts = Counter(
+            group
+            for block, lits in zip(self.data["blocks"], self.lits, strict=True)
+            for group in lits
+            if block["place"] == 0
+        )
         for number, block in enumerate(self.data["blocks"]):
             begin, end = self._span(number)
             single = len(block["steps"]) == 1 and block["place"] == 1
             # A block that must be first has the machine from the start, one that must be last keeps
-            # it to the end.
-            opens = begin if block["place"] else 0
+            # it to the end. Where several must be first, they come before the others one by one
+            # (`_ahead`); in a pool of machines that is left open, and looked at in the answer.
             closes = end if block["place"] < 2 else self.horizon
             for group, lit in self.lits[number].items():
+                opens = 0 if block["place"] == 0 and firsts[group] == 1 else begin
                 if groups[group]["ready"]:
                     model.add(begin >= groups[group]["ready"]).only_enforce_if(lit)
                 if single:
@@ -140,11 +148,23 @@ class Model:
                     size = model.new_int_var(0, self.horizon, "")
                 interval = model.new_optional_interval_var(opens, size, closes, lit, "")
                 intervals[group].append(interval)
-        for group, rows in zip(groups, intervals, strict=True):
+        for number, (group, rows) in enumerate(zip(groups, intervals, strict=True)):
             if group["size"] == 1:
                 model.add_no_overlap(rows)
+                if firsts[number] > 1:
+                    self._ahead(number)
             elif len(rows) > group["size"]:
                 model.add_cumulative(rows, [1] * len(rows), group["size"])
+
+    def _ahead(self, group: int) -> None:
+        """On this one machine, blocks that must be first end before others begin."""
+        mine = [(b, lits[group]) for b, lits in enumerate(self.lits) if group in lits]
+        place = [block["place"] for block in self.data["blocks"]]
+        for first, first_lit in mine:
+            for other, other_lit in mine:
+                if place[first] == 0 and place[other] != 0:
+                    begins, ends = self._span(other)[0], self._span(first)[1]
+                    self.model.add(begins >= ends).only_enforce_if([first_lit, other_lit])
 
     def _circuits(self) -> None:
         model, data = self.model, self.data

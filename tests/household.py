@@ -14,6 +14,18 @@ from keyexpr_schema.world import Fact, Object, Place
 SKILLS: dict[str, SkillModel] = load_skills(
     Path(__file__).parents[1] / "configs" / "skills" / "household.yaml"
 )
+UNLOAD = {
+    "parameters": {"robot": "robot", "object": "object", "carrier": "robot", "place": "place"},
+    "needs": {"robot": ["grip >= mass(object)"], "carrier": ["basket"]},
+    "before": [
+        "at(robot) = place",
+        "at(carrier) = place",
+        "at(object) = carrier",
+        "holding(robot) = nothing",
+    ],
+    "after": ["holding(robot) = object", "at(object) = robot"],
+}
+"""Model of a skill that the household has not: taking something out of a basket."""
 _TRAVEL_M = {
     "kitchen": {"hallway": 4.0, "living_room": 7.0},
     "hallway": {"kitchen": 4.0, "living_room": 4.0},

@@ -18,21 +18,11 @@ from fleet.core.world_model import WorldModel, condition_holds, first_unmet, roo
 from keyexpr_schema.goals import Condition
 from keyexpr_schema.plans import Plan, Task
 from keyexpr_schema.world import Value
-from tests.household import PLACES, SKILLS, at, carrier, cup, fact, manipulator
+from tests.household import PLACES, SKILLS, UNLOAD, at, carrier, cup, fact, manipulator
 
 MOST_TASKS = 6
 _MORE = {
-    "unload": {
-        "parameters": {"robot": "robot", "object": "object", "carrier": "robot", "place": "place"},
-        "needs": {"robot": ["grip >= mass(object)"], "carrier": ["basket"]},
-        "before": [
-            "at(robot) = place",
-            "at(carrier) = place",
-            "at(object) = carrier",
-            "holding(robot) = nothing",
-        ],
-        "after": ["holding(robot) = object", "at(object) = robot"],
-    },
+    "unload": UNLOAD,
     "fill": {
         "parameters": {"robot": "robot", "object": "object", "place": "place"},
         "before": ["at(robot) = place", "at(object) = place", "full(object) = false"],

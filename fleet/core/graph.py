@@ -60,6 +60,14 @@ class TaskGraph:
             raise Cycle([task for task in names if task not in done])
         return tuple(order)
 
+    def earliest(self, duration_s: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+        """When each task starts and ends, s, if each starts as soon as it may."""
+        spans: dict[str, tuple[float, float]] = {}
+        for task in self.order:
+            start_s = max((spans[before][1] for before in self.predecessors[task]), default=0.0)
+            spans[task] = start_s, start_s + duration_s[task]
+        return spans
+
     def precedes(self, first: str, second: str) -> bool:
         """Whether `first` ends before `second` starts in every order the graph allows."""
         return bool(self._ancestors[self._index[second]] >> self._index[first] & 1)

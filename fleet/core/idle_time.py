@@ -106,11 +106,7 @@ def predicted_spans(
         there = [actor for actor in actors if actor in first]
         for one, other in pairwise(there):
             after[first[other]].add(last[one])
-    spans: dict[str, Span] = {}
-    for name in TaskGraph(after).order:
-        start_s = max((spans[before][1] for before in after[name]), default=0.0)
-        spans[name] = start_s, start_s + tasks[name].duration_s
-    return spans
+    return TaskGraph(after).earliest({name: task.duration_s for name, task in tasks.items()})
 
 
 def predicted_idle(

@@ -80,7 +80,7 @@ def plan_made(state: State, event: events.PlanMade, skills: Skills) -> State:
         return state
     job = book.job
     first = event.plan.revision == 1
-    team = tuple(sorted(robot for robot in state.alive if state.ready(robot)))
+    team = state.team()
     if _as_it_was(book, job, event):
         book = replace(book, job=None, replan_reason=_new_reason(book, job), team=team)
         return set_book(state, book)

@@ -70,10 +70,8 @@ def actors_in_order(book: PlanBook) -> tuple[str, ...]:
     current = {record.task: record for record in book.current()}
     graph = TaskGraph({task: {*r.after, *r.behind} & current.keys() for task, r in current.items()})
     start_s: dict[str, float] = {}
-    end_s: dict[str, float] = {}
-    for task in graph.order:
-        record = current[task]
-        begin_s = max((end_s[before] for before in graph.predecessors[task]), default=0.0)
-        end_s[task] = begin_s + record.duration_s
-        start_s[record.actor] = min(begin_s, start_s.get(record.actor, begin_s))
+    spans = graph.earliest({task: record.duration_s for task, record in current.items()})
+    for task, (begin_s, _) in spans.items():
+        actor = current[task].actor
+        start_s[actor] = min(begin_s, start_s.get(actor, begin_s))
     return tuple(sorted(start_s, key=start_s.__getitem__))

@@ -184,9 +184,13 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
             self.objects.values(),
             self.robots.values(),
             self.facts.values(),
-            available=[robot for robot in self.alive if self.ready(robot)],
+            available=self.team(),
             durations=self.durations,
         )
+
+    def team(self) -> tuple[str, ...]:
+        """The robots that can be planned with, in a fixed order."""
+        return tuple(sorted(robot for robot in self.alive if self.ready(robot)))
 
     def ready(self, robot: str) -> bool:
         """Whether a robot can be planned with: connected, and what its hand holds is known."""

@@ -91,14 +91,13 @@ def why_replan(state: State, book: PlanBook, skills: Skills) -> str | None:
     return None
 
 
-def new_robots(state: State, book: PlanBook, skills: Skills) -> PlanBook | None:
+def new_robots(state: State, book: PlanBook) -> PlanBook | None:
     """The book with the wish that robots take part that came since the plan was made.
 
     More of a kind that is there already can share what is left. A new kind may help in ways that
     the plan knows nothing of, so that everything is planned again.
     """
-    world = state.world(skills)
-    new = sorted(set(world.team) - set(book.team))
+    new = sorted(set(state.team()) - set(book.team))
     if not book.team or not new or all(r.state is not TaskState.WAITING for r in book.current()):
         return None
     reason = f"{' and '.join(new)} can help now"

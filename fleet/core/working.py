@@ -80,7 +80,7 @@ def _run(state: State, book: PlanBook, skills: Skills) -> State:
     book = state.plans[book.plan.plan]
     if (reason := why_replan(state, book, skills)) is not None:
         return advance(set_book(state, replace(book, replan_reason=reason)), skills)
-    if (helpers := new_robots(state, book, skills)) is not None:
+    if (helpers := new_robots(state, book)) is not None:
         return advance(set_book(state, helpers), skills)
     if (late := late_task(state, book)) is not None:
         reason = f"{late.robot} is late with {late.task} ({late.skill})"

@@ -16,7 +16,7 @@ from fleet.planners.symbolic import SymbolicPlanner
 from keyexpr_schema.goals import Goal
 from keyexpr_schema.plans import Plan
 from keyexpr_schema.world import Fact
-from tests.household import PLACES, SKILLS, at, bring, carrier, cup, fact, manipulator
+from tests.household import PLACES, SKILLS, UNLOAD, at, bring, carrier, cup, fact, manipulator
 from tests.language_house import WORDS, shown
 
 OWN = {
@@ -36,17 +36,7 @@ OWN = {
         "before": ["at(robot) = place", "at(object) = place"],
         "after": ["watered(object) = true"],
     },
-    "unload": {
-        "parameters": {"robot": "robot", "object": "object", "carrier": "robot", "place": "place"},
-        "needs": {"robot": ["grip >= mass(object)"], "carrier": ["basket"]},
-        "before": [
-            "at(robot) = place",
-            "at(carrier) = place",
-            "at(object) = carrier",
-            "holding(robot) = nothing",
-        ],
-        "after": ["holding(robot) = object", "at(object) = robot"],
-    },
+    "unload": UNLOAD,
 }
 ALL = {**SKILLS, **skills_from_data({"skills": OWN}, "mine.yaml")}
 DEEDS = deeds_of(ALL)

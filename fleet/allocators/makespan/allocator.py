@@ -15,6 +15,7 @@ from fleet.allocators.makespan.bounds import lower_bound
 from fleet.allocators.makespan.compiled import Compiled
 from fleet.allocators.makespan.plan_shop import PlanShop, plan_shop
 from fleet.allocators.makespan.portfolio import solve
+from fleet.allocators.makespan.problem import Timed
 from fleet.allocators.makespan.reschedule import reschedule
 from fleet.allocators.milp import MilpAllocator
 
@@ -54,15 +55,21 @@ class MakespanAllocator(Allocator):
             # Robots are so few that rules run into a dead end: what is left is a matching problem.
             chosen = MilpAllocator()._assign(problem)
             return chosen if isinstance(chosen, NotAllocated) else _by_load(chosen)
-        machine_of = dict(enumerate(found.machine_of))
-        return Assignment(
-            allocation={
-                actor: made.robots[machine_of[block]] for block, actor in enumerate(made.actors)
-            },
-            sequence=tuple(made.actors[b] for b in found.order if b < len(made.actors)),
-            lower_bound_s=found.lower_bound_s,
-            notes=found.notes,
-        )
+        return _assignment(made, found, found.lower_bound_s, found.notes)
+
+
+def _assignment(
+    made: PlanShop, found: Timed, lower_bound_s: float, notes: tuple[str, ...]
+) -> Assignment:
+    """A schedule of the shop in terms of actors and robots."""
+    return Assignment(
+        allocation={
+            actor: made.robots[found.machine_of[block]] for block, actor in enumerate(made.actors)
+        },
+        sequence=tuple(made.actors[b] for b in found.order if b < len(made.actors)),
+        lower_bound_s=lower_bound_s,
+        notes=notes,
+    )
 
 
 def _mended(made: PlanShop, told: Circumstances, deadline_s: float, seed: int) -> Assignment | None:
@@ -77,18 +84,11 @@ def _mended(made: PlanShop, told: Circumstances, deadline_s: float, seed: int) -
     if found is None:
         return None
     moved = sum(block < len(made.actors) for block in found.moved)
-    return Assignment(
-        allocation={
-            actor: made.robots[found.timed.machine_of[block]]
-            for block, actor in enumerate(made.actors)
-        },
-        sequence=tuple(made.actors[b] for b in found.timed.order if b < len(made.actors)),
-        lower_bound_s=lower_bound(Compiled(made.shop)),
-        notes=(
-            f"rescheduled: {moved} of {len(made.actors)} actors changed hands; "
-            f"with any number of changes the least found is {found.best_makespan_s:.1f} s",
-        ),
+    note = (
+        f"rescheduled: {moved} of {len(made.actors)} actors changed hands; "
+        f"with any number of changes the least found is {found.best_makespan_s:.1f} s"
     )
+    return _assignment(made, found.timed, lower_bound(Compiled(made.shop)), (note,))
 
 
 def _by_load(chosen: Mapping[str, str] | Assignment) -> Assignment:

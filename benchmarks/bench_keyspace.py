@@ -21,10 +21,10 @@ from rich.table import Table
 from fleet.service.router_process import with_port
 from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.keyspace import FACT, STORE_JOURNAL
-from keyexpr_schema.service import StoreAddress, StoreQuery
-from keyexpr_schema.session import Session, SessionConfig, open_session
-from keyexpr_schema.storage import Write
-from keyexpr_schema.world import Fact, FactAddress
+from keyexpr_schema.payloads.service import StoreAddress, StoreQuery
+from keyexpr_schema.payloads.world import Fact, FactAddress
+from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from keyexpr_schema.transport.storage import Write
 
 CALLS = 1500
 WATCHED = 500

@@ -17,14 +17,14 @@ from rich.console import Console
 from rich.table import Table
 
 from fleet.allocators.base import Allocated
-from fleet.core.checker import check_plan
-from fleet.core.world_model import WorldModel
+from fleet.core.checker.plan_checker import check_plan
+from fleet.core.model.world import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.service.composition import Composition, compose
-from keyexpr_schema.goals import Condition, Goal
-from keyexpr_schema.plans import Plan, Task
-from keyexpr_schema.robots import RobotSpec
-from keyexpr_schema.world import Fact, Object, Place
+from keyexpr_schema.payloads.goals import Condition, Goal
+from keyexpr_schema.payloads.plans import Plan, Task
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.world import Fact, Object, Place
 
 T = TypeVar("T")
 SIZES = ((2, 2), (10, 5), (50, 20))

@@ -18,19 +18,19 @@ from rich.console import Console
 from rich.table import Table
 
 from fleet.core import events
+from fleet.core.dispatch.delays import FACTOR, MARGIN_S
 from fleet.core.effects import MakePlan
 from fleet.core.events import PlanMade
-from fleet.core.lateness import FACTOR, MARGIN_S
 from fleet.core.state import OUTSTANDING, PlanBook, Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
-from fleet.service.planning_desk import carry_out
-from keyexpr_schema.goals import Condition, Goal
-from keyexpr_schema.plans import PlanChange
-from keyexpr_schema.requests import PlanRequest, ReplanRequest
-from keyexpr_schema.robots import RobotSpec
-from keyexpr_schema.tasks import Report, ReportState, TaskRecord
-from keyexpr_schema.world import Fact, Object, Place
+from fleet.service.planning_job import carry_out
+from keyexpr_schema.payloads.goals import Condition, Goal
+from keyexpr_schema.payloads.plans import PlanChange
+from keyexpr_schema.payloads.requests import PlanRequest, ReplanRequest
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.tasks import Report, ReportState, TaskRecord
+from keyexpr_schema.payloads.world import Fact, Object, Place
 
 PLACES = 6
 STEP_M = 4.0

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from cli.errors import NotRunning, Refused, TooLate
 from cli.presence import planner_alive
 from keyexpr_schema.keyspace import ANSWER, CONTROL_REQUEST, PLAN_REQUEST, REPLAN_REQUEST
-from keyexpr_schema.requests import (
+from keyexpr_schema.payloads.requests import (
     Answer,
     ControlRequest,
     PlanRequest,
@@ -17,7 +17,7 @@ from keyexpr_schema.requests import (
 )
 
 if TYPE_CHECKING:
-    from keyexpr_schema.session import Session
+    from keyexpr_schema.transport.session import Session
 
 ANSWER_S = 120.0
 """Longest time to wait for an answer: planning with a language model takes its time."""

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from cli.errors import TooLate
 from keyexpr_schema.errors import Unreachable
-from keyexpr_schema.goals import ENDED_GOALS, Goal, GoalStatus
 from keyexpr_schema.key import Payload
 from keyexpr_schema.keyspace import (
     FACT,
@@ -28,16 +27,17 @@ from keyexpr_schema.keyspace import (
     SIM_TRUTH,
     TASK_RECORD,
 )
-from keyexpr_schema.motions import Senses
-from keyexpr_schema.plans import Plan, PlanStatus
-from keyexpr_schema.robots import RobotSpec, RobotState
-from keyexpr_schema.service import Reject
-from keyexpr_schema.simulation import ContactCount, Scene, SimClock, Truth
-from keyexpr_schema.tasks import TaskRecord
-from keyexpr_schema.world import Fact
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalStatus
+from keyexpr_schema.payloads.motions import Senses
+from keyexpr_schema.payloads.plans import Plan, PlanStatus
+from keyexpr_schema.payloads.robots import RobotSpec, RobotState
+from keyexpr_schema.payloads.service import Reject
+from keyexpr_schema.payloads.simulation import ContactCount, Scene, SimClock, Truth
+from keyexpr_schema.payloads.tasks import TaskRecord
+from keyexpr_schema.payloads.world import Fact
 
 if TYPE_CHECKING:
-    from keyexpr_schema.session import Change, Session, Watch
+    from keyexpr_schema.transport.session import Change, Session, Watch
 
 FLEET = (
     GOAL_SPEC,

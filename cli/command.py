@@ -23,7 +23,7 @@ from cli.settings import Settings, load_settings, one_line
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from keyexpr_schema.session import Session
+    from keyexpr_schema.transport.session import Session
 
 CONNECT_TIMEOUT_S = 1.5
 """With the time that Python takes to start, less than the 3 s within which robotctl must say that
@@ -65,7 +65,7 @@ class Call:
         self, connect_timeout_s: float = CONNECT_TIMEOUT_S
     ) -> AbstractAsyncContextManager[Session]:
         """A session on the configured router; entering raises `Unreachable` if there is none."""
-        from keyexpr_schema.session import SessionConfig, open_session
+        from keyexpr_schema.transport.session import SessionConfig, open_session
 
         return open_session(
             SessionConfig(

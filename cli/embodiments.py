@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, cast
 from cli.errors import check_known
 
 if TYPE_CHECKING:
-    from keyexpr_schema.robots import RobotSpec
-    from keyexpr_schema.session import Session
+    from keyexpr_schema.payloads.robots import RobotSpec
+    from keyexpr_schema.transport.session import Session
     from workers.embodiment import Embodiment, EmbodimentFactory
 
 GROUP = "robotfleet.embodiments"

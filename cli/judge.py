@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import msgspec
 
-from keyexpr_schema.goals import Condition, GoalState, GoalStatus
-from keyexpr_schema.simulation import Truth
-from keyexpr_schema.world import Value
+from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
+from keyexpr_schema.payloads.simulation import Truth
+from keyexpr_schema.payloads.world import Value
 
 
 class Judgement(str, Enum):

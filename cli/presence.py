@@ -10,7 +10,7 @@ from keyexpr_schema.key import A, Key
 from keyexpr_schema.keyspace import PLANNER_ALIVE, ROBOT_ALIVE
 
 if TYPE_CHECKING:
-    from keyexpr_schema.session import Session
+    from keyexpr_schema.transport.session import Session
 
 SYNC_S = 3.0
 """Longest time for the router to list the tokens it knows."""

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from cli.errors import BadArgument, Unknown, check_known
 from cli.naming import free_name
 from cli.presence import planner_alive
-from keyexpr_schema.goals import Goal, GoalAddress
 from keyexpr_schema.keyspace import (
     FACT,
     GOAL_SPEC,
@@ -28,8 +27,9 @@ from keyexpr_schema.keyspace import (
     STATEMENT,
     STATEMENT_STATUS,
 )
-from keyexpr_schema.service import PlannerAddress
-from keyexpr_schema.world import (
+from keyexpr_schema.payloads.goals import Goal, GoalAddress
+from keyexpr_schema.payloads.service import PlannerAddress
+from keyexpr_schema.payloads.world import (
     Fact,
     FactAddress,
     Object,
@@ -43,9 +43,9 @@ from keyexpr_schema.world import (
 )
 
 if TYPE_CHECKING:
-    from keyexpr_schema.robots import RobotSpec
-    from keyexpr_schema.service import PlannerStatus
-    from keyexpr_schema.session import Session
+    from keyexpr_schema.payloads.robots import RobotSpec
+    from keyexpr_schema.payloads.service import PlannerStatus
+    from keyexpr_schema.transport.session import Session
 
 
 CLOCK_S = 0.6

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload
 from keyexpr_schema.keyspace import key_of
-from keyexpr_schema.service import Reject
+from keyexpr_schema.payloads.service import Reject
 
 if TYPE_CHECKING:
-    from keyexpr_schema.session import Session
+    from keyexpr_schema.transport.session import Session
 
 ASK_S = 3.0
 

@@ -11,10 +11,10 @@ from msgspec.structs import replace
 from cli.errors import BadArgument, check_known
 from keyexpr_schema.ids import check_id
 from keyexpr_schema.keyspace import OBJECT, PLACE, ROBOT_SPEC
-from keyexpr_schema.world import Object, ObjectAddress, Place, PlaceAddress
+from keyexpr_schema.payloads.world import Object, ObjectAddress, Place, PlaceAddress
 
 if TYPE_CHECKING:
-    from keyexpr_schema.session import Session
+    from keyexpr_schema.transport.session import Session
 
 HOW_TO_PLACE = "tell one with `robotctl world add --place`"
 _GOES_WITH = {

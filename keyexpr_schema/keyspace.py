@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from keyexpr_schema import (
+from keyexpr_schema.errors import ForeignKey
+from keyexpr_schema.key import Kept, Key
+from keyexpr_schema.payloads import (
     durations,
     goals,
     motions,
@@ -20,8 +22,6 @@ from keyexpr_schema import (
     tasks,
     world,
 )
-from keyexpr_schema.errors import ForeignKey
-from keyexpr_schema.key import Kept, Key
 
 # fmt: off
 # --- goals ---------------------------------------------------------------------------------------

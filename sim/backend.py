@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from keyexpr_schema.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
-from keyexpr_schema.simulation import ContactCount, Frame, Scene, Truth
-from sim.world_model import WorldFile
+from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
+from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
+from sim.world_schema import WorldFile
 
 NEEDS: dict[MotionKind, tuple[str, ...]] = {
     MotionKind.GO_TO: ("place",),

@@ -7,8 +7,8 @@ from collections import OrderedDict
 
 import msgspec
 
-from keyexpr_schema.motions import MotionOutcome, MotionState
-from keyexpr_schema.simulation import MotionCall
+from keyexpr_schema.payloads.motions import MotionOutcome, MotionState
+from keyexpr_schema.payloads.simulation import MotionCall
 from sim.backend import Backend
 
 REMEMBERED = 256

@@ -9,10 +9,10 @@ from types import TracebackType
 
 from keyexpr_schema.errors import NoAnswer
 from keyexpr_schema.keyspace import SIM_CLOCK, SIM_MOTION
-from keyexpr_schema.motions import Motion, MotionOutcome, MotionState, Senses
-from keyexpr_schema.robots import RobotSpec
-from keyexpr_schema.session import Session
-from keyexpr_schema.simulation import MotionCall, SimRobotAddress
+from keyexpr_schema.payloads.motions import Motion, MotionOutcome, MotionState, Senses
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.simulation import MotionCall, SimRobotAddress
+from keyexpr_schema.transport.session import Session
 from workers.errors import BodyUnreachable
 
 POLL_S = 1.0

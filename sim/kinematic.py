@@ -12,7 +12,7 @@ import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from keyexpr_schema.motions import (
+from keyexpr_schema.payloads.motions import (
     Detection,
     Motion,
     MotionKind,
@@ -21,12 +21,12 @@ from keyexpr_schema.motions import (
     PointM,
     Senses,
 )
-from keyexpr_schema.robots import PoseMRad, RobotSpec
-from keyexpr_schema.simulation import ContactCount, Frame, Scene, Truth
+from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
+from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from sim.backend import Backend
 from sim.kinematic_scene import draw_frame, draw_scene
 from sim.navigation.routes import Route, Routes
-from sim.world_model import FLOOR, WorldFile
+from sim.world_schema import FLOOR, WorldFile
 
 REACH_M = 1.2
 """How far from a robot's centre its hand gets, sideways; generous, as stances here are coarse."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from keyexpr_schema.motions import PointM
-from keyexpr_schema.robots import PoseMRad
-from keyexpr_schema.simulation import Body, Frame, QuaternionWxyz, Scene, Shape, ShapeKind
-from sim.world_model import WorldFile
+from keyexpr_schema.payloads.motions import PointM
+from keyexpr_schema.payloads.robots import PoseMRad
+from keyexpr_schema.payloads.simulation import Body, Frame, QuaternionWxyz, Scene, Shape, ShapeKind
+from sim.world_schema import WorldFile
 
 _UPRIGHT: QuaternionWxyz = (1.0, 0.0, 0.0, 0.0)
 _COLOURS = {

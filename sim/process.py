@@ -7,13 +7,13 @@ import signal
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from keyexpr_schema.session import SessionConfig, open_session
+from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.backend import Backend
 from sim.errors import SimError
-from sim.rivals import no_other_world
 from sim.server import GRACE_S, WATCHDOG_S, SimServer
+from sim.single_instance import no_other_world
 from sim.world_file import load_mission
-from sim.world_model import Mission
+from sim.world_schema import Mission
 
 if TYPE_CHECKING:
     from sim.kinematic import Durations

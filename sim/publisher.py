@@ -14,8 +14,7 @@ from keyexpr_schema.keyspace import (
     SIM_SENSES,
     SIM_TRUTH,
 )
-from keyexpr_schema.session import Session
-from keyexpr_schema.simulation import (
+from keyexpr_schema.payloads.simulation import (
     Frame,
     Frames,
     SimAddress,
@@ -23,6 +22,7 @@ from keyexpr_schema.simulation import (
     SimRobotAddress,
     TruthAddress,
 )
+from keyexpr_schema.transport.session import Session
 from sim.backend import Backend
 
 CLOCK_WALL_S = 0.05

@@ -7,7 +7,7 @@ from sim.mujoco_world.driving import REACH_MARGIN_M
 from sim.navigation.clearance import Clearance
 from sim.navigation.lattice import Lattice
 from sim.navigation.spots import Spots
-from sim.world_model import Mission
+from sim.world_schema import Mission
 
 
 def out_of_reach(mission: Mission) -> tuple[str, ...]:

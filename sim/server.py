@@ -11,9 +11,9 @@ import asyncio
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.keyspace import SIM_MOTION
-from keyexpr_schema.motions import MotionOutcome
-from keyexpr_schema.session import Session
-from keyexpr_schema.simulation import MotionCall, SimRobotAddress
+from keyexpr_schema.payloads.motions import MotionOutcome
+from keyexpr_schema.payloads.simulation import MotionCall, SimRobotAddress
+from keyexpr_schema.transport.session import Session
 from sim.backend import Backend
 from sim.driver import Driver
 from sim.publisher import Publisher

@@ -14,9 +14,9 @@ import msgspec
 
 from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.ids import Id, check_id
-from keyexpr_schema.robots import PoseMRad, RobotSpec
+from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from sim.errors import BadFile
-from sim.world_model import (
+from sim.world_schema import (
     FLOOR,
     LARGEST_RADIUS_M,
     Mission,

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import settings
 
 from fleet.service.router_process import with_port
-from keyexpr_schema.session import SessionConfig
+from keyexpr_schema.transport.session import SessionConfig
 
 # No timing decides a test. A merge is judged by the same examples each time; people draw new ones,
 # and what those find becomes a test of its own.

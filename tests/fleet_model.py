@@ -14,13 +14,13 @@ from fleet.core.events import Event, decode_event, encode_event
 from fleet.core.state import OUTSTANDING, PlanBook, Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
-from fleet.service.planning_desk import carry_out
-from keyexpr_schema.goals import Goal
+from fleet.service.planning_job import carry_out
 from keyexpr_schema.keyspace import ORDER
-from keyexpr_schema.requests import PlanRequest
-from keyexpr_schema.robots import RobotSpec
-from keyexpr_schema.tasks import Order, Report, ReportState, TaskState
-from keyexpr_schema.world import Fact, Value
+from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.requests import PlanRequest
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskState
+from keyexpr_schema.payloads.world import Fact, Value
 from tests.household import PLACES, SKILLS, cup
 
 _ALL = compose()

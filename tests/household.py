@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fleet.core.skills import SkillModel
-from fleet.core.world_model import WorldModel
+from fleet.core.model.skills import SkillModel
+from fleet.core.model.world import WorldModel
 from fleet.service.composition import load_skills
-from keyexpr_schema.goals import Condition, Goal
-from keyexpr_schema.robots import RobotSpec
-from keyexpr_schema.world import Fact, Object, Place
+from keyexpr_schema.payloads.goals import Condition, Goal
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.world import Fact, Object, Place
 
 SKILLS: dict[str, SkillModel] = load_skills(
     Path(__file__).parents[1] / "configs" / "skills" / "household.yaml"

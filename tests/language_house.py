@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fleet.core.language import Reading, Vocabulary
-from keyexpr_schema.world import Object, Place, Surface
+from fleet.language import Reading, Vocabulary
+from keyexpr_schema.payloads.world import Object, Place, Surface
 from tests.household import carrier, manipulator
 
 

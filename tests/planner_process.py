@@ -12,7 +12,6 @@ from typing import Any
 
 import pytest
 
-from keyexpr_schema.goals import Goal, GoalAddress, GoalState
 from keyexpr_schema.key import Address, Key
 from keyexpr_schema.keyspace import (
     ANSWER,
@@ -28,12 +27,13 @@ from keyexpr_schema.keyspace import (
     ROBOT_ALIVE,
     ROBOT_SPEC,
 )
-from keyexpr_schema.plans import PlanAddress, PlanState
-from keyexpr_schema.requests import PlanRequest, RequestAddress
-from keyexpr_schema.robots import AliveAddress, RobotAddress
-from keyexpr_schema.session import Session, SessionConfig, open_session
-from keyexpr_schema.tasks import Order, Report, ReportAddress, ReportState
-from keyexpr_schema.world import FactAddress, ObjectAddress, PlaceAddress
+from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState
+from keyexpr_schema.payloads.plans import PlanAddress, PlanState
+from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
+from keyexpr_schema.payloads.robots import AliveAddress, RobotAddress
+from keyexpr_schema.payloads.tasks import Order, Report, ReportAddress, ReportState
+from keyexpr_schema.payloads.world import FactAddress, ObjectAddress, PlaceAddress
+from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from tests.household import PLACES, SKILLS, cup, fact, manipulator
 
 DEADLINE_S = 30.0

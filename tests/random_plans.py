@@ -12,12 +12,12 @@ from itertools import product
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from fleet.core.lifting import Strand, tasks_from
-from fleet.core.skills import Action, Variable, skills_from_data
-from fleet.core.world_model import WorldModel, condition_holds, first_unmet, room_left
-from keyexpr_schema.goals import Condition
-from keyexpr_schema.plans import Plan, Task
-from keyexpr_schema.world import Value
+from fleet.core.model.skills import Action, Variable, skills_from_data
+from fleet.core.model.world import WorldModel, condition_holds, first_unmet, room_left
+from fleet.planners.deordering import Strand, tasks_from
+from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.plans import Plan, Task
+from keyexpr_schema.payloads.world import Value
 from tests.household import PLACES, SKILLS, UNLOAD, at, carrier, cup, fact, manipulator
 
 MOST_TASKS = 6

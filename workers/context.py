@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from keyexpr_schema.motions import (
+from keyexpr_schema.payloads.motions import (
     Detection,
     Motion,
     MotionKind,
@@ -13,11 +13,11 @@ from keyexpr_schema.motions import (
     PointM,
     Senses,
 )
-from keyexpr_schema.robots import PoseMRad, RobotSpec, RobotState
-from keyexpr_schema.world import NOTHING, Fact, FactAddress, Value
+from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec, RobotState
+from keyexpr_schema.payloads.world import NOTHING, Fact, FactAddress, Value
 from workers.embodiment import Embodiment
 from workers.errors import SkillFailed
-from workers.worldview import WorldView
+from workers.world_cache import WorldView
 
 
 class SkillContext:

@@ -16,9 +16,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
-from keyexpr_schema.motions import Motion, MotionOutcome, Senses
-from keyexpr_schema.robots import RobotSpec
-from keyexpr_schema.session import Session
+from keyexpr_schema.payloads.motions import Motion, MotionOutcome, Senses
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.transport.session import Session
 
 
 @runtime_checkable

@@ -18,10 +18,10 @@ from typing import Self
 import msgspec
 
 from keyexpr_schema.key import Payload
-from keyexpr_schema.tasks import Order, Report
-from keyexpr_schema.world import Fact
+from keyexpr_schema.payloads.tasks import Order, Report
+from keyexpr_schema.payloads.world import Fact
 from workers.errors import JournalBusy, JournalUnreadable
-from workers.intake import AttemptName, Entry, Ledger, Phase, attempt_name
+from workers.fencing import AttemptName, Entry, Ledger, Phase, attempt_name
 
 VERSION = 1
 _TABLES = """

@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 from keyexpr_schema.errors import SchemaError, UndecodablePayload
 from keyexpr_schema.keyspace import FACT, REPORT
-from keyexpr_schema.session import Session
-from keyexpr_schema.world import Fact, FactAddress
+from keyexpr_schema.payloads.world import Fact, FactAddress
+from keyexpr_schema.transport.session import Session
 from workers.journal import Journal, Unsent
 from workers.reports import report_address
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from keyexpr_schema.ids import check_id
 from keyexpr_schema.keyspace import ROBOT_SPEC
-from keyexpr_schema.robots import RobotSpec
-from keyexpr_schema.session import Session, SessionConfig, open_session
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from workers.embodiment import Embodiment, EmbodimentFactory
 from workers.journal import Journal
 from workers.runtime import Worker

@@ -6,13 +6,13 @@ import asyncio
 import logging
 
 from keyexpr_schema.errors import SchemaError
-from keyexpr_schema.motions import Motion, MotionKind, Senses
-from keyexpr_schema.tasks import Order, ReportState
-from keyexpr_schema.world import Fact
+from keyexpr_schema.payloads.motions import Motion, MotionKind, Senses
+from keyexpr_schema.payloads.tasks import Order, ReportState
+from keyexpr_schema.payloads.world import Fact
 from workers.context import SkillContext
 from workers.embodiment import Embodiment
 from workers.errors import BodyUnreachable, SkillFailed
-from workers.intake import Ledger, Phase
+from workers.fencing import Ledger, Phase
 
 SAFE_S = 60.0
 """Wall seconds that bringing the body to rest may take before the worker goes on without."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from keyexpr_schema.tasks import Order, Report, ReportAddress, ReportState, Try
-from keyexpr_schema.world import Fact
+from keyexpr_schema.payloads.tasks import Order, Report, ReportAddress, ReportState, Try
+from keyexpr_schema.payloads.world import Fact
 
 
 def report_on(

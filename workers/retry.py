@@ -12,7 +12,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 from keyexpr_schema.errors import SchemaError
-from keyexpr_schema.tasks import ReportState, Try
+from keyexpr_schema.payloads.tasks import ReportState, Try
 from workers.errors import BodyUnreachable, SkillFailed
 
 MOST_TRIES = 3

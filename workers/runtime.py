@@ -7,18 +7,17 @@ import logging
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.keyspace import ORDER, ROBOT_ALIVE
-from keyexpr_schema.robots import AliveAddress, RobotActivity, RobotSpec
-from keyexpr_schema.session import Session, Watch
-from keyexpr_schema.tasks import Order, OrderAddress, Report, ReportState
-from keyexpr_schema.world import Fact
+from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotSpec
+from keyexpr_schema.payloads.tasks import Order, OrderAddress, Report, ReportState
+from keyexpr_schema.payloads.world import Fact
+from keyexpr_schema.transport.session import Session, Watch
 from workers.context import SkillContext
 from workers.embodiment import Embodiment
 from workers.errors import BadArguments, UnknownSkill
-from workers.in_tray import InTray
-from workers.intake import Phase
+from workers.fencing import Phase
 from workers.journal import Journal
+from workers.order_queue import InTray
 from workers.outbox import Outbox
-from workers.presence import Presence
 from workers.recovery import (
     first_senses,
     look_about,
@@ -28,9 +27,10 @@ from workers.recovery import (
 )
 from workers.reports import report_on
 from workers.retry import run_attempt
-from workers.rivals import no_rivals
+from workers.single_instance import no_rivals
 from workers.skill import SkillRegistry
-from workers.worldview import WORLD_KEYS, WorldView
+from workers.state_publisher import Presence
+from workers.world_cache import WORLD_KEYS, WorldView
 
 LAST_WORD_S = 3.0
 """Wall seconds that a worker which is told to end spends on getting its last report out."""

@@ -14,7 +14,7 @@ from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.ids import check_id
 from workers.context import SkillContext
 from workers.errors import BadArguments, BadSkill, UnknownSkill
-from workers.worldview import WorldView
+from workers.world_cache import WorldView
 
 ENTRY_POINTS = "robotfleet.skills"
 """Entry-point group: each entry is a `Skill`, or a tuple or list of them."""

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fleet.allocators.makespan.compiled import Compiled
-from fleet.allocators.makespan.lists import construct
-from fleet.allocators.makespan.problem import Shop
 from fleet.allocators.min_max_load import Bound, min_max_load
 from fleet.allocators.solver_run import solve
+from fleet.jobshop.compiled import Compiled
+from fleet.jobshop.list_scheduling import construct
+from fleet.jobshop.problem import Shop
 
 MILP_S = 10.0
 """Wall time of a solver, s."""

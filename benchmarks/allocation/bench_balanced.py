@@ -23,7 +23,7 @@ import time
 from rich.console import Console
 from rich.table import Table
 
-from fleet.allocators.balancing import (
+from fleet.allocators.load_balancing import (
     Balance,
     LoadProblem,
     balance,
@@ -31,8 +31,8 @@ from fleet.allocators.balancing import (
     loads_of,
     semi_matching,
 )
-from fleet.allocators.balancing.balance import spread
-from fleet.allocators.balancing.bits import bits, mask_of
+from fleet.allocators.load_balancing.balance import spread
+from fleet.allocators.load_balancing.bits import bits, mask_of
 from fleet.allocators.min_max_load import Bound, min_max_load
 
 SIZES = ((100, 20), (1_000, 100), (10_000, 1_000))

@@ -31,11 +31,10 @@ from fleet.allocators.balanced import BalancedAllocator
 from fleet.allocators.base import Allocated, Allocator
 from fleet.allocators.cost_based import CostBasedAllocator
 from fleet.allocators.llm import LlmAllocator
-from fleet.allocators.makespan import MakespanAllocator
-from fleet.allocators.makespan.allocator import DEADLINE_S
+from fleet.allocators.makespan import DEADLINE_S, MakespanAllocator
 from fleet.allocators.milp import MilpAllocator
 from fleet.allocators.round_robin import RoundRobinAllocator
-from fleet.core.idle_time import predicted_unit, union_s
+from fleet.core.schedule.idle_time import predicted_unit, union_s
 from fleet.planners.llm import ModelCaller, load_llm_config
 from fleet.service.allocation_asker import AllocationAsker
 

@@ -21,11 +21,11 @@ from rich.table import Table
 from benchmarks.allocation.alternatives import big_m, in_turn, makespan_s, nearest, papers_milp
 from benchmarks.allocation.shop_files import NAMES, load
 from benchmarks.allocation.shops import random_shop
-from fleet.allocators.makespan.compiled import Compiled
-from fleet.allocators.makespan.lists import construct
-from fleet.allocators.makespan.portfolio import solve
-from fleet.allocators.makespan.problem import Machine, Shop
-from fleet.allocators.makespan.reschedule import reschedule, without_machines
+from fleet.jobshop.compiled import Compiled
+from fleet.jobshop.list_scheduling import construct
+from fleet.jobshop.portfolio import solve
+from fleet.jobshop.problem import Machine, Shop
+from fleet.jobshop.rescheduling import reschedule, without_machines
 
 SIZES = ((8, 3), (10, 3), (20, 4), (50, 5), (100, 10), (1000, 50), (10_000, 1000))
 LIMITS_S = (1.0, 10.0)

@@ -18,13 +18,13 @@ from typing import Any
 
 import yaml
 
-from fleet.core.skills import skills_from_data
-from fleet.core.world_model import WorldModel
+from fleet.core.model.skills import skills_from_data
+from fleet.core.model.world import WorldModel
 from keyexpr_schema.ids import ACTOR_PREFIX
-from keyexpr_schema.plans import Plan
-from keyexpr_schema.plans import Task as PlanTask
-from keyexpr_schema.robots import RobotSpec
-from keyexpr_schema.world import Fact, Place
+from keyexpr_schema.payloads.plans import Plan
+from keyexpr_schema.payloads.plans import Task as PlanTask
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.world import Fact, Place
 
 STRATEGIES = ("big-dag", "per-goal", "monolithic")
 CHANCE = 0.5

@@ -22,7 +22,7 @@ from rich.console import Console
 
 from benchmarks.allocation import bench_household, bench_makespan, report
 from benchmarks.planning.report import machine
-from fleet.allocators.makespan.allocator import DEADLINE_S
+from fleet.allocators.makespan import DEADLINE_S
 
 QUICK_SEEDS = 3
 

@@ -13,7 +13,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from fleet.allocators.makespan.problem import Block, Machine, Operation, Shop
+from fleet.jobshop.problem import Block, Machine, Operation, Shop
 
 INSTANCES = Path(__file__).with_name("instances")
 NAMES = ("ft06", "la01", "la02", "la03", "la04", "la05", "mk01", "mk02", "mk03")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from random import Random
 
-from fleet.allocators.makespan.problem import Block, Machine, Operation, Shop
+from fleet.jobshop.problem import Block, Machine, Operation, Shop
 
 ROOMS = 12
 ROOM_M = 4.0

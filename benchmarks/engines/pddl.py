@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from fleet.core.skills import Action, Need, SkillModel
-from fleet.core.world_model import WorldModel
-from keyexpr_schema.goals import Condition
-from keyexpr_schema.world import NOTHING, Value
+from fleet.core.model.skills import Action, Need, SkillModel
+from fleet.core.model.world import WorldModel
+from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.world import NOTHING, Value
 
 Step = tuple[str, tuple[str, ...]]
 """A step of a plan: the action's name and its arguments, as PDDL has them."""

@@ -26,15 +26,15 @@ from rich.table import Table
 from benchmarks.bench_planner import goals_of, household
 from benchmarks.engines import pddl
 from fleet.allocators.base import Allocated, Allocator
-from fleet.core.checker import check_plan
-from fleet.core.lifting import Strand, tasks_from
-from fleet.core.skills import Action
-from fleet.core.world_model import WorldModel
+from fleet.core.checker.plan_checker import check_plan
+from fleet.core.model.skills import Action
+from fleet.core.model.world import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
+from fleet.planners.deordering import Strand, tasks_from
 from fleet.service.composition import Composition, compose
-from keyexpr_schema.goals import Goal
-from keyexpr_schema.plans import Plan
-from keyexpr_schema.world import NOTHING
+from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.plans import Plan
+from keyexpr_schema.payloads.world import NOTHING
 
 SIZES = ((2, 2), (5, 3), (10, 5), (20, 10), (50, 20))
 ENGINES = ("fast-downward", "pyperplan", "aries")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
-from keyexpr_schema.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
+from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
 from sim.kinematic import KinematicBackend
 
 

@@ -21,19 +21,19 @@ from fleet.core.state import Policy, State
 from fleet.core.step import step
 from fleet.planners.llm import LlmInterpreter
 from fleet.service.composition import Composition
-from fleet.service.planning_desk import carry_out
-from keyexpr_schema.goals import ENDED_GOALS, Goal
+from fleet.service.planning_job import carry_out
 from keyexpr_schema.keyspace import FACT, OBJECT, ORDER, PLACE, ROBOT_SPEC, ROBOT_STATE
-from keyexpr_schema.plans import ENDED_PLANS
-from keyexpr_schema.requests import PlanRequest
-from keyexpr_schema.robots import RobotActivity, RobotAddress, RobotState
-from keyexpr_schema.tasks import FINAL_REPORTS, Report, ReportState
-from keyexpr_schema.watch import Change
-from keyexpr_schema.world import Fact, FactAddress, ObjectAddress, PlaceAddress, Statement
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal
+from keyexpr_schema.payloads.plans import ENDED_PLANS
+from keyexpr_schema.payloads.requests import PlanRequest
+from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
+from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Report, ReportState
+from keyexpr_schema.payloads.world import Fact, FactAddress, ObjectAddress, PlaceAddress, Statement
+from keyexpr_schema.transport.watch import Change
 from sim.kinematic import KinematicBackend
 from workers.skill import SkillRegistry
 from workers.skills.household import HOUSEHOLD
-from workers.worldview import WorldView
+from workers.world_cache import WorldView
 
 SEED = 7
 MOST_SIMULATED_S = 7200.0

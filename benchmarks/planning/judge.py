@@ -11,7 +11,7 @@ from benchmarks.planning.missions import Mission
 from benchmarks.planning.simulated_time import SimulatedLoop, run
 from fleet.planners.llm import LlmInterpreter
 from fleet.service.composition import Composition
-from keyexpr_schema.goals import GoalState
+from keyexpr_schema.payloads.goals import GoalState
 
 
 class Result(msgspec.Struct, frozen=True, kw_only=True):

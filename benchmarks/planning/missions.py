@@ -11,11 +11,11 @@ import msgspec
 from msgspec.structs import replace
 
 from benchmarks.planning.truth import Truth, parse_truth
-from keyexpr_schema.robots import PoseMRad, RobotSpec
-from keyexpr_schema.world import Place
+from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
+from keyexpr_schema.payloads.world import Place
 from sim.errors import BadFile
 from sim.world_file import load_robot, load_world
-from sim.world_model import WorldFile
+from sim.world_schema import WorldFile
 from sim.yaml_file import Entry, read_yaml
 
 HERE = Path(__file__).parent

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 from msgspec.structs import replace
 
-from keyexpr_schema.robots import RobotSpec
-from keyexpr_schema.tasks import Order, Report, ReportState
-from keyexpr_schema.world import Fact
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.tasks import Order, Report, ReportState
+from keyexpr_schema.payloads.world import Fact
 from workers.context import SkillContext
 from workers.embodiment import Embodiment
 from workers.errors import BadArguments, UnknownSkill
@@ -17,7 +17,7 @@ from workers.recovery import make_safe, self_knowledge
 from workers.reports import report_on
 from workers.retry import run_attempt
 from workers.skill import SkillRegistry
-from workers.worldview import WorldView
+from workers.world_cache import WorldView
 
 INCARNATION = "benchmark"
 Say = Callable[[tuple[Fact, ...], Report | None], None]

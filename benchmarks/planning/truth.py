@@ -10,9 +10,9 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from math import dist
 
-from keyexpr_schema.motions import Senses
-from keyexpr_schema.simulation import Truth as ObjectTruth
-from keyexpr_schema.world import Place
+from keyexpr_schema.payloads.motions import Senses
+from keyexpr_schema.payloads.simulation import Truth as ObjectTruth
+from keyexpr_schema.payloads.world import Place
 from sim.errors import BadFile
 
 GRID_M = 0.5

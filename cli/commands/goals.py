@@ -10,8 +10,8 @@ from cli.command import Call, command
 from cli.parsing import Group
 
 if TYPE_CHECKING:
-    from keyexpr_schema.goals import Goal, GoalStatus
-    from keyexpr_schema.session import Session
+    from keyexpr_schema.payloads.goals import Goal, GoalStatus
+    from keyexpr_schema.transport.session import Session
 
 UNDERSTANDING_S = 10.0
 """How long the planner may take to say something of a goal."""
@@ -60,9 +60,9 @@ async def add(
     from cli.presence import planner_alive
     from cli.show.fleet_tables import GoalRow
     from cli.telling import put_goal
-    from keyexpr_schema.goals import ENDED_GOALS, GoalState
     from keyexpr_schema.keyspace import GOAL_STATUS
-    from keyexpr_schema.requests import PlanRequest
+    from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
+    from keyexpr_schema.payloads.requests import PlanRequest
 
     async with call.session() as session:
         if plan and not await planner_alive(session):
@@ -121,7 +121,7 @@ async def add(
 def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
     """How a goal stands and what it was understood as; how to have it planned, if it is not."""
     from cli.show.words import meaning as meaning_of
-    from keyexpr_schema.goals import GoalState
+    from keyexpr_schema.payloads.goals import GoalState
 
     means = meaning_of(status)
     meaning = f", understood as {means}" if means else ""
@@ -160,8 +160,8 @@ async def show(call: Call, goal: GoalArgument) -> None:
 async def delete(call: Call, goal: GoalArgument) -> None:
     """Take a goal back; its plan goes on without it, and ends if it had no other goal."""
     from cli.errors import check_known
-    from keyexpr_schema.goals import GoalAddress
     from keyexpr_schema.keyspace import GOAL_SPEC
+    from keyexpr_schema.payloads.goals import GoalAddress
 
     async with call.session() as session:
         goals, _ = await _all(session)

@@ -11,7 +11,7 @@ from cli.command import Call, command
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from keyexpr_schema.session import Change
+    from keyexpr_schema.transport.session import Change
 
 status_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 watch_app = typer.Typer(rich_markup_mode=None, add_completion=False)
@@ -102,7 +102,7 @@ async def journal(
 ) -> None:
     """What changed in the key-space, in the order in which the store applied it."""
     from keyexpr_schema.keyspace import STORE_JOURNAL
-    from keyexpr_schema.service import StoreAddress, StoreJournal, StoreQuery
+    from keyexpr_schema.payloads.service import StoreAddress, StoreJournal, StoreQuery
 
     async with call.session() as session:
         # What a query key replies is not in its type; the key table says it is a StoreJournal.

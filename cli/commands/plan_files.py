@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from cli.plans.comparison import PlanSide
-    from fleet.core.world_model import WorldModel
-    from keyexpr_schema.plans import Plan
-    from keyexpr_schema.session import Session
+    from fleet.core.model.world import WorldModel
+    from keyexpr_schema.payloads.plans import Plan
+    from keyexpr_schema.transport.session import Session
 
 PROPOSAL_S = 120.0
 """How long the planner may take to check and allocate a proposed plan."""
@@ -60,7 +60,7 @@ async def check(
     """
     from cli.plans.files import read_plan
     from cli.plans.worlds import told_world, world_of_files
-    from fleet.core.checker import check_plan
+    from fleet.core.checker.plan_checker import check_plan
     from fleet.service.composition import load_all_skills
 
     _only_with_world(world, connected, robots, facts)
@@ -148,7 +148,7 @@ async def propose(
     from cli.show.words import outcome
     from keyexpr_schema.ids import check_id
     from keyexpr_schema.keyspace import PLAN_SPEC, PLAN_STATUS
-    from keyexpr_schema.plans import PlanAddress, PlanState
+    from keyexpr_schema.payloads.plans import PlanAddress, PlanState
 
     plan = read_plan(file)
     plan = replace(

@@ -14,10 +14,10 @@ from cli.parsing import FactWords, Group
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from keyexpr_schema.goals import Goal, GoalStatus
-    from keyexpr_schema.plans import PlanStatus
-    from keyexpr_schema.requests import Control
-    from keyexpr_schema.session import Session
+    from keyexpr_schema.payloads.goals import Goal, GoalStatus
+    from keyexpr_schema.payloads.plans import PlanStatus
+    from keyexpr_schema.payloads.requests import Control
+    from keyexpr_schema.transport.session import Session
 
 app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, add_completion=False)
 replan_app = typer.Typer(rich_markup_mode=None, add_completion=False)
@@ -74,7 +74,7 @@ async def create(
     from cli.telling import planner_status
     from keyexpr_schema.ids import check_id
     from keyexpr_schema.keyspace import GOAL_SPEC
-    from keyexpr_schema.requests import PlanRequest
+    from keyexpr_schema.payloads.requests import PlanRequest
 
     if fallback and allocator != "milp":
         raise BadArgument("--fallback-round-robin goes with the allocator milp")
@@ -216,7 +216,7 @@ command(app, "diff")(diff)
 @command(app, "start")
 async def start(call: Call, plan: PlanArgument) -> None:
     """Carry out a plan that was made with --no-start."""
-    from keyexpr_schema.requests import Control
+    from keyexpr_schema.payloads.requests import Control
 
     await _control(call, Control.START, plan)
 
@@ -224,7 +224,7 @@ async def start(call: Call, plan: PlanArgument) -> None:
 @command(app, "approve")
 async def approve(call: Call, plan: PlanArgument) -> None:
     """Let a plan be carried out that waits for a person (`robotctl planner --approval`)."""
-    from keyexpr_schema.requests import Control
+    from keyexpr_schema.payloads.requests import Control
 
     await _control(call, Control.APPROVE, plan)
 
@@ -232,7 +232,7 @@ async def approve(call: Call, plan: PlanArgument) -> None:
 @command(app, "cancel")
 async def cancel(call: Call, plan: PlanArgument) -> None:
     """Stop a plan: running tasks are told to stop, no further one begins."""
-    from keyexpr_schema.requests import Control
+    from keyexpr_schema.payloads.requests import Control
 
     await _control(call, Control.CANCEL, plan)
 
@@ -240,7 +240,7 @@ async def cancel(call: Call, plan: PlanArgument) -> None:
 @command(app, "delete")
 async def delete(call: Call, plan: PlanArgument) -> None:
     """Forget a plan and its tasks."""
-    from keyexpr_schema.requests import Control
+    from keyexpr_schema.payloads.requests import Control
 
     await _control(call, Control.DELETE, plan)
 
@@ -262,7 +262,7 @@ async def replan(
     from cli.errors import check_known
     from cli.naming import request_name
     from keyexpr_schema.keyspace import GOAL_SPEC
-    from keyexpr_schema.requests import ReplanRequest
+    from keyexpr_schema.payloads.requests import ReplanRequest
 
     async with call.session() as session:
         await check_plan(session, plan)
@@ -302,7 +302,7 @@ async def check_plan(session: Session, plan: str) -> None:
 async def _control(call: Call, control: Control, plan: str) -> None:
     from cli.asking import ask_planner
     from cli.naming import request_name
-    from keyexpr_schema.requests import ControlRequest
+    from keyexpr_schema.payloads.requests import ControlRequest
 
     async with call.session() as session:
         await check_plan(session, plan)

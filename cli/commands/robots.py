@@ -24,7 +24,7 @@ async def register(
     """Declare robots from YAML files; declaring one again replaces what was said of it."""
     from cli.telling import check_skills
     from keyexpr_schema.keyspace import ROBOT_SPEC
-    from keyexpr_schema.robots import RobotAddress
+    from keyexpr_schema.payloads.robots import RobotAddress
     from sim.world_file import load_robot
 
     specs = [load_robot(file) for file in files]
@@ -47,7 +47,7 @@ async def unregister(
     """Forget a robot: it gets no further tasks."""
     from cli.errors import check_known
     from keyexpr_schema.keyspace import ROBOT_SPEC
-    from keyexpr_schema.robots import RobotAddress
+    from keyexpr_schema.payloads.robots import RobotAddress
 
     async with call.session() as session:
         specs = await session.list(ROBOT_SPEC)

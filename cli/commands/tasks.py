@@ -107,8 +107,8 @@ async def add(
     from cli.naming import request_name
     from cli.telling import planner_status
     from keyexpr_schema.keyspace import PLAN_SPEC, ROBOT_SPEC
-    from keyexpr_schema.plans import PlanAddress
-    from keyexpr_schema.requests import Control, ControlRequest
+    from keyexpr_schema.payloads.plans import PlanAddress
+    from keyexpr_schema.payloads.requests import Control, ControlRequest
 
     given = parse_args(args or [])
     async with call.session() as session:

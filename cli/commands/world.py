@@ -12,8 +12,8 @@ from cli.parsing import Group
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from keyexpr_schema.session import Session
-    from keyexpr_schema.world import Value
+    from keyexpr_schema.payloads.world import Value
+    from keyexpr_schema.transport.session import Session
 
 app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, add_completion=False)
 
@@ -222,7 +222,7 @@ async def delete(
 async def _delete_fact(session: Session, relation: str, subject: str) -> str:
     from cli.errors import check_known
     from keyexpr_schema.keyspace import FACT
-    from keyexpr_schema.world import FactAddress
+    from keyexpr_schema.payloads.world import FactAddress
 
     facts = [f"{a.relation} {a.subject}" for a in await session.list(FACT)]
     check_known("fact", f"{relation} {subject}", facts, "see `robotctl world add --fact`")
@@ -233,7 +233,7 @@ async def _delete_fact(session: Session, relation: str, subject: str) -> str:
 async def _delete_named(session: Session, name: str) -> str:
     from cli.errors import check_known
     from keyexpr_schema.keyspace import OBJECT, PLACE, STATEMENT
-    from keyexpr_schema.world import ObjectAddress, PlaceAddress, StatementAddress
+    from keyexpr_schema.payloads.world import ObjectAddress, PlaceAddress, StatementAddress
 
     statements = [a.statement for a in await session.list(STATEMENT)]
     objects = [a.object for a in await session.list(OBJECT)]

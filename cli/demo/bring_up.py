@@ -14,9 +14,9 @@ from cli.telling import check_skills, put_world
 from keyexpr_schema.errors import NoAnswer, Unreachable
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import PLANNER_ALIVE, ROBOT_ALIVE, ROBOT_SPEC, STORE_JOURNAL
-from keyexpr_schema.robots import RobotAddress
-from keyexpr_schema.service import StoreAddress, StoreQuery
-from keyexpr_schema.session import Session, SessionConfig, open_session
+from keyexpr_schema.payloads.robots import RobotAddress
+from keyexpr_schema.payloads.service import StoreAddress, StoreQuery
+from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 
 if TYPE_CHECKING:
     from cli.demo.mission_run import DemoOptions

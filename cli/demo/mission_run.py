@@ -18,13 +18,13 @@ from cli.errors import Refused, TooLate
 from cli.judge import all_agreed, judge
 from cli.naming import request_name
 from cli.telling import add_statement, put_goal
-from keyexpr_schema.goals import GoalState, GoalStatus
-from keyexpr_schema.requests import PlanRequest
-from keyexpr_schema.session import Session, SessionConfig, open_session
+from keyexpr_schema.payloads.goals import GoalState, GoalStatus
+from keyexpr_schema.payloads.requests import PlanRequest
+from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.world_file import Mission, load_mission
 
 if TYPE_CHECKING:
-    from keyexpr_schema.session import Change
+    from keyexpr_schema.transport.session import Change
 
 SETTLE_S = 20.0
 """How long objects may take to come to rest after the last goal has ended [s, wall]."""

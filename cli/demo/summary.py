@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 import msgspec
 
 from cli.judge import Verdict
-from fleet.core.idle_time import measured_idle
-from keyexpr_schema.simulation import ContactCount
-from keyexpr_schema.tasks import TaskRecord, TaskState
+from fleet.core.schedule.idle_time import measured_idle
+from keyexpr_schema.payloads.simulation import ContactCount
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 
 class TaskLine(msgspec.Struct, frozen=True, kw_only=True):

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 import msgspec
 
 from keyexpr_schema.ids import ACTOR_PREFIX
-from keyexpr_schema.plans import Plan, Task
+from keyexpr_schema.payloads.plans import Plan, Task
 
 
 class PlanSide(msgspec.Struct, frozen=True, kw_only=True):

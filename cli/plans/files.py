@@ -9,7 +9,7 @@ import yaml
 
 from cli.errors import BadFile
 from cli.settings import one_line
-from keyexpr_schema.plans import Plan
+from keyexpr_schema.payloads.plans import Plan
 
 SUFFIXES = (".yaml", ".yml", ".json")
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from fleet.core.idle_time import (
+from fleet.core.schedule.idle_time import (
     IdleTime,
     capable,
     measured_idle,
@@ -17,9 +17,9 @@ from fleet.core.idle_time import (
 )
 
 if TYPE_CHECKING:
-    from keyexpr_schema.plans import Plan, PlanStatus
-    from keyexpr_schema.robots import RobotSpec
-    from keyexpr_schema.tasks import TaskRecord
+    from keyexpr_schema.payloads.plans import Plan, PlanStatus
+    from keyexpr_schema.payloads.robots import RobotSpec
+    from keyexpr_schema.payloads.tasks import TaskRecord
 
 
 class Idle(msgspec.Struct, frozen=True, kw_only=True):
@@ -57,8 +57,8 @@ def idle_report(
     robots: Iterable[RobotSpec],
 ) -> IdleReport:
     """The report, from what stands on the keys."""
-    from fleet.core.graph import Cycle
-    from keyexpr_schema.plans import ENDED_PLANS
+    from fleet.core.model.task_graph import Cycle
+    from keyexpr_schema.payloads.plans import ENDED_PLANS
 
     fleet = capable(plan, robots)
     told = list(records)

@@ -13,12 +13,12 @@ from cli.plans.comparison import PlanSide
 from cli.plans.files import is_plan_file, read_plan
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.keyspace import PLAN_SPEC, PLAN_STATUS, STORE_JOURNAL, TASK_RECORD
-from keyexpr_schema.plans import Plan, PlanAddress, PlanStatus
-from keyexpr_schema.service import JournalEntry, StoreAddress, StoreJournal, StoreQuery
-from keyexpr_schema.tasks import TaskState
+from keyexpr_schema.payloads.plans import Plan, PlanAddress, PlanStatus
+from keyexpr_schema.payloads.service import JournalEntry, StoreAddress, StoreJournal, StoreQuery
+from keyexpr_schema.payloads.tasks import TaskState
 
 if TYPE_CHECKING:
-    from keyexpr_schema.session import Session
+    from keyexpr_schema.transport.session import Session
 
 PAGE = 1000
 """Entries of the journal asked for at once."""

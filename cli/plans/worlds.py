@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 from cli.errors import BadArgument, check_known
 from cli.presence import robots_alive
 from cli.telling import parse_value
-from fleet.core.skills import SkillModel
-from fleet.core.world_model import WorldModel
+from fleet.core.model.skills import SkillModel
+from fleet.core.model.world import WorldModel
 from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, ROBOT_SPEC
-from keyexpr_schema.robots import RobotSpec
-from keyexpr_schema.world import NOTHING, Fact
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.world import NOTHING, Fact
 
 if TYPE_CHECKING:
-    from keyexpr_schema.session import Session
+    from keyexpr_schema.transport.session import Session
 
 _CALL = re.compile(r"^\s*([\w.-]+)\s*\(\s*([\w.-]+)\s*\)\s*=\s*(\S+)\s*$")
 

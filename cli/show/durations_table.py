@@ -8,7 +8,7 @@ from rich.table import Table
 
 from cli.show.page import table
 from cli.show.words import seconds
-from keyexpr_schema.durations import Durations
+from keyexpr_schema.payloads.durations import Durations
 
 
 def durations_table(rows: Iterable[Durations]) -> Table:

@@ -21,12 +21,12 @@ from cli.show.words import (
     statement_means,
     value,
 )
-from keyexpr_schema.goals import Goal, GoalState, GoalStatus
-from keyexpr_schema.plans import Plan, PlanStatus
-from keyexpr_schema.robots import RobotSpec, RobotState
-from keyexpr_schema.service import Reject
-from keyexpr_schema.tasks import Report, TaskRecord
-from keyexpr_schema.world import Fact, Object, Place, Statement, StatementStatus
+from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.plans import Plan, PlanStatus
+from keyexpr_schema.payloads.robots import RobotSpec, RobotState
+from keyexpr_schema.payloads.service import Reject
+from keyexpr_schema.payloads.tasks import Report, TaskRecord
+from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
 
 class RobotRow(msgspec.Struct, frozen=True, kw_only=True):

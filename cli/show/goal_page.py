@@ -7,7 +7,7 @@ from rich.text import Text
 
 from cli.show.fleet_tables import GoalRow
 from cli.show.words import STATE_STYLE, seconds
-from keyexpr_schema.goals import GoalState
+from keyexpr_schema.payloads.goals import GoalState
 
 
 def goal_page(row: GoalRow) -> Group:

@@ -16,13 +16,13 @@ from rich.text import Text
 from cli.show.page import page, table
 from cli.show.plan_tree import plan_tree
 from cli.show.words import call, carried, doing, seconds
-from keyexpr_schema.goals import GoalStatus
-from keyexpr_schema.plans import PlanStatus
-from keyexpr_schema.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.goals import GoalStatus
+from keyexpr_schema.payloads.plans import PlanStatus
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 if TYPE_CHECKING:
     from cli.board import Board
-    from keyexpr_schema.session import Change
+    from keyexpr_schema.transport.session import Change
 
 REDRAW_S = 0.2
 """How often the picture is redrawn, so that running tasks count up."""

@@ -9,8 +9,8 @@ from rich.text import Text
 
 from cli.show.plan_tree import MARKS, in_order
 from cli.show.words import STATE_STYLE, call, seconds
-from keyexpr_schema.plans import Plan, PlanStatus, Task
-from keyexpr_schema.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.plans import Plan, PlanStatus, Task
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 FILL = {
     TaskState.WAITING: "white",

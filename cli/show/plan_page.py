@@ -12,9 +12,9 @@ from cli.show.page import table
 from cli.show.plan_graph import plan_graph
 from cli.show.plan_tree import plan_tree
 from cli.show.words import call, seconds
-from keyexpr_schema.goals import Goal, GoalStatus
-from keyexpr_schema.plans import Making, Plan, PlanStatus, Task, Violation
-from keyexpr_schema.tasks import TaskRecord
+from keyexpr_schema.payloads.goals import Goal, GoalStatus
+from keyexpr_schema.payloads.plans import Making, Plan, PlanStatus, Task, Violation
+from keyexpr_schema.payloads.tasks import TaskRecord
 
 
 def plan_page(

@@ -8,9 +8,9 @@ from rich.text import Text
 from rich.tree import Tree
 
 from cli.show.words import STATE_STYLE, call, natural, outcome, seconds, spent_s
-from keyexpr_schema.goals import Goal, GoalStatus
-from keyexpr_schema.plans import Plan, PlanStatus, Task
-from keyexpr_schema.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.goals import Goal, GoalStatus
+from keyexpr_schema.payloads.plans import Plan, PlanStatus, Task
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 MARKS = {
     TaskState.WAITING: "·",

@@ -18,7 +18,7 @@ from cli.show.fleet_tables import (
     robots_table,
 )
 from cli.show.page import table
-from keyexpr_schema.service import PlannerStatus, Reject, StoreJournal
+from keyexpr_schema.payloads.service import PlannerStatus, Reject, StoreJournal
 
 if TYPE_CHECKING:
     from cli.board import Board

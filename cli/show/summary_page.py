@@ -9,7 +9,7 @@ from cli.demo.summary import Summary
 from cli.judge import Judgement
 from cli.show.page import table
 from cli.show.words import call, seconds
-from keyexpr_schema.goals import GoalState
+from keyexpr_schema.payloads.goals import GoalState
 
 MARKS = {Judgement.HOLDS: "✓", Judgement.FAILS: "✗", Judgement.NOT_JUDGED: "?"}
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from keyexpr_schema.goals import GoalStatus
-from keyexpr_schema.plans import PlanStatus
-from keyexpr_schema.robots import RobotSpec, RobotState
-from keyexpr_schema.tasks import TaskRecord, TaskState
-from keyexpr_schema.world import StatementStatus, Value
+from keyexpr_schema.payloads.goals import GoalStatus
+from keyexpr_schema.payloads.plans import PlanStatus
+from keyexpr_schema.payloads.robots import RobotSpec, RobotState
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.world import StatementStatus, Value
 
 STATE_STYLE = {
     "waiting": "dim",

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from fleet.allocators.balancing import LoadProblem, Unbalanced, balance
-from fleet.allocators.balancing.bits import mask_of
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
+from fleet.allocators.load_balancing import LoadProblem, Unbalanced, balance
+from fleet.allocators.load_balancing.bits import mask_of
 from fleet.allocators.reasons import not_apart
 
 

@@ -8,11 +8,16 @@ from dataclasses import dataclass, field, replace
 
 import msgspec
 
-from fleet.core.binding import able_robots, actors_apart, task_counts, tasks_nobody_can_do
-from fleet.core.checker import CheckedPlan, check_plan
-from fleet.core.schedule import Schedule, schedule, valid_schedule
-from fleet.core.world_model import WorldModel
-from keyexpr_schema.plans import Plan, Violation
+from fleet.core.checker.plan_checker import CheckedPlan, check_plan
+from fleet.core.model.world import WorldModel
+from fleet.core.schedule.actor_constraints import (
+    able_robots,
+    actors_apart,
+    task_counts,
+    tasks_nobody_can_do,
+)
+from fleet.core.schedule.plan_schedule import Schedule, schedule, valid_schedule
+from keyexpr_schema.payloads.plans import Plan, Violation
 
 
 @dataclass(frozen=True)

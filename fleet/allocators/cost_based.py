@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from fleet.allocators.balanced import load_problem
-from fleet.allocators.balancing import Unbalanced, balance
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
+from fleet.allocators.load_balancing import Unbalanced, balance
 from fleet.allocators.reasons import not_apart
 from keyexpr_schema.ids import ACTOR_PREFIX
-from keyexpr_schema.world import Value
+from keyexpr_schema.payloads.world import Value
 
 NEVER_S = 1e9
 """Cost of a robot that cannot be the actor, s: more than any travel, and safe to add up."""

@@ -14,9 +14,9 @@ from typing import Any, Protocol
 import msgspec
 
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
-from fleet.core.checker import check_plan
-from fleet.core.schedule import best_schedule
-from keyexpr_schema.plans import Violation
+from fleet.core.checker.plan_checker import check_plan
+from fleet.core.schedule.plan_schedule import best_schedule
+from keyexpr_schema.payloads.plans import Violation
 
 log = logging.getLogger(__name__)
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import logging
 
 from fleet.allocators.balanced import load_problem
-from fleet.allocators.balancing import Unbalanced, balance
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
+from fleet.allocators.load_balancing import Unbalanced, balance
 from fleet.allocators.min_max_load import Bound, min_max_load
 from fleet.allocators.reasons import not_apart
 from fleet.allocators.round_robin import in_turn
-from keyexpr_schema.plans import Violation
+from keyexpr_schema.payloads.plans import Violation
 
 log = logging.getLogger(__name__)
 

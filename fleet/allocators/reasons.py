@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 
 from fleet.allocators.base import AllocationProblem, NotAllocated
 from keyexpr_schema.ids import ACTOR_PREFIX
-from keyexpr_schema.plans import Violation
+from keyexpr_schema.payloads.plans import Violation
 
 NAMED = 6
 """So many names are listed; the rest are counted."""

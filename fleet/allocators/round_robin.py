@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from fleet.allocators.balanced import load_problem
-from fleet.allocators.balancing.apart import why_not_apart
 from fleet.allocators.base import AllocationProblem, Allocator, NotAllocated
+from fleet.allocators.load_balancing.apart import why_not_apart
 from fleet.allocators.reasons import not_apart
 
 MAX_STEPS = 100_000

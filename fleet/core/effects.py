@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from fleet.core.state import OUTSTANDING, Job, PlanBook, State
-from keyexpr_schema.durations import DurationsAddress
-from keyexpr_schema.goals import GoalAddress
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
     ANSWER,
@@ -26,10 +24,12 @@ from keyexpr_schema.keyspace import (
     STATEMENT_STATUS,
     TASK_RECORD,
 )
-from keyexpr_schema.plans import PlanAddress, PlanStatus
-from keyexpr_schema.requests import RequestAddress
-from keyexpr_schema.tasks import Order, OrderAddress, TaskAddress, TaskRecord
-from keyexpr_schema.world import FactAddress, StatementAddress
+from keyexpr_schema.payloads.durations import DurationsAddress
+from keyexpr_schema.payloads.goals import GoalAddress
+from keyexpr_schema.payloads.plans import PlanAddress, PlanStatus
+from keyexpr_schema.payloads.requests import RequestAddress
+from keyexpr_schema.payloads.tasks import Order, OrderAddress, TaskAddress, TaskRecord
+from keyexpr_schema.payloads.world import FactAddress, StatementAddress
 
 PLANNER_SOURCE = "planner"
 """`source` of facts that the planner concludes itself; statements add a colon and their id."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import msgspec
 
 from fleet.core.state import Policy
-from keyexpr_schema.durations import Durations
-from keyexpr_schema.goals import Condition, Goal, GoalStatus
-from keyexpr_schema.plans import Plan, Violation
-from keyexpr_schema.requests import Answer, ControlRequest, PlanRequest, ReplanRequest
-from keyexpr_schema.robots import RobotSpec
-from keyexpr_schema.tasks import Report
-from keyexpr_schema.world import Fact, Object, Place, Statement
+from keyexpr_schema.payloads.durations import Durations
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalStatus
+from keyexpr_schema.payloads.plans import Plan, Violation
+from keyexpr_schema.payloads.requests import Answer, ControlRequest, PlanRequest, ReplanRequest
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.tasks import Report
+from keyexpr_schema.payloads.world import Fact, Object, Place, Statement
 
 
 class Event(msgspec.Struct, frozen=True, kw_only=True, tag_field="event", tag=True):

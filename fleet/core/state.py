@@ -7,17 +7,17 @@ from typing import TypeVar
 
 import msgspec
 
-from fleet.core.language import Vocabulary
-from fleet.core.language.vocabulary import Deed
-from fleet.core.skills import SkillModel
-from fleet.core.world_model import WorldModel
-from keyexpr_schema.durations import Durations
-from keyexpr_schema.goals import Goal, GoalStatus
-from keyexpr_schema.plans import ENDED_PLANS, Plan, PlanChange, PlanState, Task, Violation
-from keyexpr_schema.requests import Answer
-from keyexpr_schema.robots import RobotSpec
-from keyexpr_schema.tasks import TaskRecord, TaskState
-from keyexpr_schema.world import Fact, Object, Place, Statement, StatementStatus
+from fleet.core.model.skills import SkillModel
+from fleet.core.model.world import WorldModel
+from fleet.language import Vocabulary
+from fleet.language.vocabulary import Deed
+from keyexpr_schema.payloads.durations import Durations
+from keyexpr_schema.payloads.goals import Goal, GoalStatus
+from keyexpr_schema.payloads.plans import ENDED_PLANS, Plan, PlanChange, PlanState, Task, Violation
+from keyexpr_schema.payloads.requests import Answer
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
 T = TypeVar("T")
 

@@ -11,33 +11,35 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from fleet.core import events, planning, reporting, requests, surprises, telling, working
-from fleet.core.calls import Skills
+from fleet.core import events
+from fleet.core.dispatch import dispatcher, replan_triggers
 from fleet.core.effects import Effect, effects_between
 from fleet.core.events import Event
+from fleet.core.handlers import goals, plan_results, reports, requests
+from fleet.core.model.preconditions import Skills
 from fleet.core.state import State
 
 _NEWS: dict[type[Event], Callable[[State, Any], State]] = {
-    events.GoalTold: telling.goal_told,
-    events.GoalForgotten: telling.goal_forgotten,
-    events.FactForgotten: telling.fact_forgotten,
-    events.StatementTold: telling.statement_told,
-    events.StatementForgotten: telling.statement_forgotten,
-    events.PlaceTold: telling.place_told,
-    events.PlaceForgotten: telling.place_forgotten,
-    events.ObjectTold: telling.object_told,
-    events.ObjectForgotten: telling.object_forgotten,
-    events.RobotTold: telling.robot_told,
-    events.RobotForgotten: telling.robot_forgotten,
-    events.RobotSeen: telling.robot_seen,
-    events.RobotGone: telling.robot_gone,
-    events.Remembered: telling.remembered,
-    events.GoalInterpreted: telling.goal_interpreted,
+    events.GoalTold: goals.goal_told,
+    events.GoalForgotten: goals.goal_forgotten,
+    events.FactForgotten: goals.fact_forgotten,
+    events.StatementTold: goals.statement_told,
+    events.StatementForgotten: goals.statement_forgotten,
+    events.PlaceTold: goals.place_told,
+    events.PlaceForgotten: goals.place_forgotten,
+    events.ObjectTold: goals.object_told,
+    events.ObjectForgotten: goals.object_forgotten,
+    events.RobotTold: goals.robot_told,
+    events.RobotForgotten: goals.robot_forgotten,
+    events.RobotSeen: goals.robot_seen,
+    events.RobotGone: goals.robot_gone,
+    events.Remembered: goals.remembered,
+    events.GoalInterpreted: goals.goal_interpreted,
     events.PlanAsked: requests.plan_asked,
     events.ReplanAsked: requests.replan_asked,
     events.ControlAsked: requests.control_asked,
     events.PlanProposed: requests.plan_proposed,
-    events.PlanNotMade: planning.plan_not_made,
+    events.PlanNotMade: plan_results.plan_not_made,
 }
 
 
@@ -52,7 +54,7 @@ def step(state: State, event: Event, skills: Skills) -> tuple[State, tuple[Effec
         wall_time_s=max(state.wall_time_s, event.wall_time_s),
     )
     told = _take_in(now, event, skills)
-    settled = working.advance(told, skills)
+    settled = dispatcher.advance(told, skills)
     if settled is now:
         return state, ()
     return settled, effects_between(state, settled)
@@ -65,11 +67,11 @@ def _take_in(state: State, event: Event, skills: Skills) -> State:
                 state, epoch=event.epoch, incarnation=event.incarnation, policy=event.policy
             )
         case events.PlanMade():
-            return planning.plan_made(state, event, skills)
+            return plan_results.plan_made(state, event, skills)
         case events.FactTold():
-            return surprises.fact_told(state, event, skills)
+            return replan_triggers.fact_told(state, event, skills)
         case events.ReportTold():
-            return reporting.report_told(state, event, skills)
+            return reports.report_told(state, event, skills)
         case events.TimePassed():
             return state
     return _NEWS[type(event)](state, event)

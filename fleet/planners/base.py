@@ -5,10 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
-from fleet.core.checker import check_plan
-from fleet.core.world_model import WorldModel
-from keyexpr_schema.goals import Goal
-from keyexpr_schema.plans import Plan, Violation
+from fleet.core.checker.plan_checker import check_plan
+from fleet.core.model.world import WorldModel
+from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.plans import Plan, Violation
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 from fleet.allocators.llm import Choice
+from fleet.llm.conversation import Conversation, GivenUp, Ledger, Rejected
+from fleet.llm.prompts import Prompts
 from fleet.planners.llm import LlmConfig, ModelCaller
-from fleet.planners.llm.conversation import Conversation, GivenUp, Ledger, Rejected
-from fleet.planners.llm.prompts import Prompts
-from keyexpr_schema.plans import Violation
+from keyexpr_schema.payloads.plans import Violation
 
 
 class AllocationAsker:

@@ -21,11 +21,11 @@ from fleet.allocators.llm import LlmAllocator
 from fleet.allocators.makespan import MakespanAllocator
 from fleet.allocators.milp import MilpAllocator
 from fleet.allocators.round_robin import RoundRobinAllocator
-from fleet.core.skills import SkillModel, skills_from_data
+from fleet.core.model.skills import SkillModel, skills_from_data
 from fleet.errors import BadSkillFile, FleetError
 from fleet.planners.base import Planner
 from fleet.planners.llm import LlmPlanner, ModelCaller, load_llm_config
-from fleet.planners.symbolic import SymbolicPlanner
+from fleet.planners.symbolic.planner import SymbolicPlanner
 from fleet.service.allocation_asker import AllocationAsker
 
 SKILL_MODELS = "robotfleet.skill_models"

@@ -9,7 +9,7 @@ from contextlib import asynccontextmanager
 
 from fleet.core.effects import Publish, Retract
 from keyexpr_schema.errors import SchemaError, UndecodablePayload
-from keyexpr_schema.session import Session
+from keyexpr_schema.transport.session import Session
 
 CONFIRM_TIMEOUT_S = 10.0
 IN_FLIGHT = 32

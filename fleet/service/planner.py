@@ -13,19 +13,19 @@ from typing import Any
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.deeds import deeds_of
+from fleet.core.dispatch.delays import SAME_CLOCK_S
+from fleet.core.dispatch.dispatcher import next_timer
 from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event
-from fleet.core.lateness import SAME_CLOCK_S
+from fleet.core.model.spoken_skills import deeds_of
 from fleet.core.state import Job, Policy, State
 from fleet.core.step import replay, step
-from fleet.core.working import next_timer
 from fleet.errors import Superseded
 from fleet.service.composition import Composition
 from fleet.service.event_journal import EventJournal
-from fleet.service.inbox import WATCHED, At, event_of, missed_deletions
+from fleet.service.event_translation import WATCHED, At, event_of, missed_deletions
 from fleet.service.outbox import Outbox
-from fleet.service.planning_desk import carry_out
+from fleet.service.planning_job import carry_out
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import (
     ANSWER,
@@ -39,8 +39,8 @@ from keyexpr_schema.keyspace import (
     SIM_CLOCK,
     TASK_RECORD,
 )
-from keyexpr_schema.service import PlannerAddress, PlannerAliveAddress, PlannerStatus
-from keyexpr_schema.session import Session, TokenWatch, Watch
+from keyexpr_schema.payloads.service import PlannerAddress, PlannerAliveAddress, PlannerStatus
+from keyexpr_schema.transport.session import Session, TokenWatch, Watch
 
 log = logging.getLogger(__name__)
 

@@ -14,7 +14,7 @@ from fleet.service.composition import Composition, compose
 from fleet.service.event_journal import EventJournal
 from fleet.service.planner import PlannerService
 from keyexpr_schema.errors import SchemaError
-from keyexpr_schema.session import SessionConfig, open_session
+from keyexpr_schema.transport.session import SessionConfig, open_session
 
 
 def run(

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from fleet.stores.errors import StoreError
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.router import CannotListen, run_router
+from keyexpr_schema.transport.router import CannotListen, run_router
 
 FREE_PORT = ":0"
 

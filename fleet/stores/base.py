@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Self
 
 from fleet.stores.errors import StoreError
-from keyexpr_schema.storage import Journaled, Write
+from keyexpr_schema.transport.storage import Journaled, Write
 
 
 class StateStore(ABC):

@@ -6,7 +6,7 @@ import re
 from bisect import bisect_left, insort
 from functools import lru_cache
 
-from keyexpr_schema.storage import Write
+from keyexpr_schema.transport.storage import Write
 
 
 @lru_cache(maxsize=1024)

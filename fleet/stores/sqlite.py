@@ -14,7 +14,7 @@ from typing import Literal
 from fleet.stores.base import StateStore
 from fleet.stores.errors import StoreError, StoreInUse
 from fleet.stores.index import Index
-from keyexpr_schema.storage import Journaled, Write
+from keyexpr_schema.transport.storage import Journaled, Write
 
 FORMAT = 1
 _STAMP_BYTES = 24

@@ -12,8 +12,8 @@ from fleet.timeline.lanes import call_text
 from fleet.timeline.palette import TASK_STATES
 from fleet.timeline.sink import Sink, entity
 from fleet.timeline.text import drawable
-from keyexpr_schema.plans import Plan, PlanStatus
-from keyexpr_schema.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.plans import Plan, PlanStatus
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 ROW_PX = 58.0
 GLYPH_PX = 7.0

@@ -9,7 +9,7 @@ import rerun as rr
 from fleet.timeline.palette import CANCELLED, FAILED, Palette, Rgba
 from fleet.timeline.sink import Sink, entity
 from fleet.timeline.text import drawable
-from keyexpr_schema.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 IDLE = ""
 """The state of a robot without a task: the viewer draws a gap."""

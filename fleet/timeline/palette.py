@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from keyexpr_schema.tasks import TaskState
+from keyexpr_schema.payloads.tasks import TaskState
 
 Rgba = tuple[int, int, int, int]
 

@@ -14,7 +14,7 @@ from fleet.timeline import viewer
 from fleet.timeline.errors import NoPicture
 from fleet.timeline.recorder import RECORDED, Recorder
 from fleet.timeline.sink import free_port, open_stream
-from keyexpr_schema.session import Change, SessionConfig, Watch, open_session
+from keyexpr_schema.transport.session import Change, SessionConfig, Watch, open_session
 
 FLUSH_S = 1.0
 """How much wall time of events a SIGKILL may cost."""

@@ -41,7 +41,7 @@ from keyexpr_schema.keyspace import (
     SIM_TRUTH,
     TASK_RECORD,
 )
-from keyexpr_schema.tasks import OrderAddress, Report, TaskRecord, TaskState
+from keyexpr_schema.payloads.tasks import OrderAddress, Report, TaskRecord, TaskState
 
 RECORDED: tuple[Key[Any, Any], ...] = (
     SIM_SCENE,

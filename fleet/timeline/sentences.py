@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fleet.timeline.lanes import call_text
-from keyexpr_schema.goals import Goal, GoalState, GoalStatus
-from keyexpr_schema.plans import Plan, PlanState, PlanStatus
-from keyexpr_schema.robots import RobotActivity, RobotSpec, RobotState
-from keyexpr_schema.service import Reject
-from keyexpr_schema.simulation import Truth
-from keyexpr_schema.tasks import Order, Report, ReportState, TaskRecord, TaskState, Try
-from keyexpr_schema.world import Fact, Value
+from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus
+from keyexpr_schema.payloads.robots import RobotActivity, RobotSpec, RobotState
+from keyexpr_schema.payloads.service import Reject
+from keyexpr_schema.payloads.simulation import Truth
+from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskRecord, TaskState, Try
+from keyexpr_schema.payloads.world import Fact, Value
 
 INFO, WARN, ERROR = "INFO", "WARN", "ERROR"
 

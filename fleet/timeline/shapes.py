@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import rerun as rr
 
 from fleet.timeline.sink import Sink
-from keyexpr_schema.motions import PointM
-from keyexpr_schema.simulation import Shape, ShapeKind
+from keyexpr_schema.payloads.motions import PointM
+from keyexpr_schema.payloads.simulation import Shape, ShapeKind
 
 
 class Bounds:

@@ -8,7 +8,7 @@ import rerun as rr
 
 from fleet.timeline.palette import Rgba
 from fleet.timeline.sink import Sink
-from keyexpr_schema.motions import PointM
+from keyexpr_schema.payloads.motions import PointM
 
 STEP_M = 0.15
 """A trail grows in steps of this length."""

@@ -12,10 +12,10 @@ from fleet.timeline.shapes import Bounds, log_shapes
 from fleet.timeline.sink import Sink, entity
 from fleet.timeline.text import drawable
 from fleet.timeline.trails import Trail
-from keyexpr_schema.motions import PointM
-from keyexpr_schema.robots import RobotSpec, RobotState
-from keyexpr_schema.simulation import Body, Frame, QuaternionWxyz, Scene, ShapeKind
-from keyexpr_schema.world import Place
+from keyexpr_schema.payloads.motions import PointM
+from keyexpr_schema.payloads.robots import RobotSpec, RobotState
+from keyexpr_schema.payloads.simulation import Body, Frame, QuaternionWxyz, Scene, ShapeKind
+from keyexpr_schema.payloads.world import Place
 
 FRAME_STEP_S = 0.05
 """Frames closer together than this [s, fleet time] are thinned out: 20 a second look smooth."""

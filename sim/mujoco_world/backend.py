@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from keyexpr_schema.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
-from keyexpr_schema.robots import PoseMRad, RobotSpec
-from keyexpr_schema.simulation import ContactCount, Frame, Scene, Truth
+from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
+from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
+from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from sim.backend import Backend
 from sim.mujoco_world.assemble import STEP_S, compile_world
 from sim.mujoco_world.collisions import Collisions
@@ -22,7 +22,7 @@ from sim.mujoco_world.observer import Observer
 from sim.mujoco_world.robot_body import RobotBody
 from sim.mujoco_world.stage import Act, CannotDo, Ending, Stage, Steps
 from sim.navigation import Navigator
-from sim.world_model import WorldFile
+from sim.world_schema import WorldFile
 
 STEPS = round(PERIOD_S / STEP_S)
 WATCH_EVERY = 2

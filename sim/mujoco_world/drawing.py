@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from keyexpr_schema.motions import PointM
-from keyexpr_schema.simulation import Body, Frame, QuaternionWxyz, Scene, Shape, ShapeKind
+from keyexpr_schema.payloads.motions import PointM
+from keyexpr_schema.payloads.simulation import Body, Frame, QuaternionWxyz, Scene, Shape, ShapeKind
 
 FLOOR_HALF_THICKNESS_M = 0.01
 HIDDEN_GROUP = 3

@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from typing import Any
 
-from keyexpr_schema.robots import PoseMRad
+from keyexpr_schema.payloads.robots import PoseMRad
 from sim.mujoco_world.assemble import yaw_of, yaw_quaternion
 from sim.mujoco_world.description import Description, DifferentialDrive, PlanarDrive
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from keyexpr_schema.motions import Detection, Motion, PointM
+from keyexpr_schema.payloads.motions import Detection, Motion, PointM
 from sim.errors import NoPath, NoStance
 from sim.mujoco_world.drives import wrap
 from sim.mujoco_world.stage import Act, CannotDo, Ending, Stage, Step, Steps, stow

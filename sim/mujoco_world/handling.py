@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from keyexpr_schema.motions import Motion, PointM
+from keyexpr_schema.payloads.motions import Motion, PointM
 from sim.mujoco_world.arm import Arm, Gripper
 from sim.mujoco_world.drives import PERIOD_S
 from sim.mujoco_world.driving import distance_m

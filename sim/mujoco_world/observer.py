@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from keyexpr_schema.motions import Detection
-from keyexpr_schema.simulation import Truth
+from keyexpr_schema.payloads.motions import Detection
+from keyexpr_schema.payloads.simulation import Truth
 from sim.mujoco_world.robot_body import RobotBody
-from sim.world_model import FLOOR, WorldFile
+from sim.world_schema import FLOOR, WorldFile
 
 SETTLED_M_S = 0.02
 SETTLED_RAD_S = 0.3

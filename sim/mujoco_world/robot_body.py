@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from keyexpr_schema.robots import PoseMRad, RobotSpec
+from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from sim.errors import BadFile
 from sim.mujoco_world.arm import Arm, Gripper
 from sim.mujoco_world.description import RobotModel

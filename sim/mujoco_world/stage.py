@@ -10,12 +10,12 @@ import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 
-from keyexpr_schema.motions import Detection
+from keyexpr_schema.payloads.motions import Detection
 from sim.mujoco_world.drives import PERIOD_S, wrap
 from sim.mujoco_world.observer import Observer
 from sim.mujoco_world.robot_body import RobotBody
 from sim.navigation import Leg, Navigator
-from sim.world_model import WorldFile
+from sim.world_schema import WorldFile
 
 Steps = Generator[None, None, "Ending"]
 Step = Generator[None, None, None]

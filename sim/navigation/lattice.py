@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.navigation.clearance import Clearance, Floats
-from sim.world_model import LARGEST_RADIUS_M, WorldFile
+from sim.world_schema import LARGEST_RADIUS_M, WorldFile
 
 TRACKING_M = 0.05
 """How far a robot's controller may stray from its line. Twice that lies between two robots."""

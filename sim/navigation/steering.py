@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from keyexpr_schema.robots import PoseMRad
+from keyexpr_schema.payloads.robots import PoseMRad
 
 DECELERATION_M_S2 = 0.5
 CORNER_M_S = 0.3

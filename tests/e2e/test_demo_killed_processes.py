@@ -15,8 +15,14 @@ from cli.demo.mission_run import Demo, DemoOptions, running
 from cli.demo.summary import Summary
 from keyexpr_schema.errors import ForeignKey
 from keyexpr_schema.keyspace import REPORT, STORE_JOURNAL
-from keyexpr_schema.service import StoreAddress, StoreJournal, StoreQuery
-from keyexpr_schema.tasks import FINAL_REPORTS, Report, ReportAddress, ReportState, TaskState
+from keyexpr_schema.payloads.service import StoreAddress, StoreJournal, StoreQuery
+from keyexpr_schema.payloads.tasks import (
+    FINAL_REPORTS,
+    Report,
+    ReportAddress,
+    ReportState,
+    TaskState,
+)
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(240)]
 

@@ -14,11 +14,11 @@ from typing import Any
 
 import pytest
 
-from fleet.core.checker import check_plan
+from fleet.core.checker.plan_checker import check_plan
 from fleet.planners.base import PlanningProblem
 from fleet.planners.llm import LlmConfig, LlmPlanner
-from fleet.planners.symbolic import SymbolicPlanner
-from keyexpr_schema.plans import Plan
+from fleet.planners.symbolic.planner import SymbolicPlanner
+from keyexpr_schema.payloads.plans import Plan
 from tests.household import bring, home
 from tests.llm_server import LlmServer, Reply
 

@@ -8,8 +8,8 @@ import random
 import msgspec
 import pytest
 
-from keyexpr_schema.motions import Motion, MotionKind, MotionOutcome, MotionState, PointM
-from keyexpr_schema.simulation import Truth
+from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, PointM
+from keyexpr_schema.payloads.simulation import Truth
 from sim.mujoco_world import MujocoBackend
 from sim.world_file import load_mission
 

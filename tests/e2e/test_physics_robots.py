@@ -7,8 +7,8 @@ import math
 import msgspec
 import pytest
 
-from keyexpr_schema.motions import Motion, MotionKind, MotionOutcome, MotionState
-from keyexpr_schema.robots import PoseMRad
+from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState
+from keyexpr_schema.payloads.robots import PoseMRad
 from sim.mujoco_world import MujocoBackend
 from sim.world_file import load_mission
 

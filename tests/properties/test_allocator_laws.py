@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from fleet.allocators.base import AllocationProblem, NotAllocated
 from fleet.allocators.milp import MilpAllocator
-from fleet.core.checker import CheckedPlan
-from keyexpr_schema.plans import Plan
+from fleet.core.checker.plan_checker import CheckedPlan
+from keyexpr_schema.payloads.plans import Plan
 
 ROBOTS = ("r0", "r1", "r2")
 

@@ -7,7 +7,7 @@ from itertools import product
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fleet.allocators.balancing import (
+from fleet.allocators.load_balancing import (
     Balance,
     LoadProblem,
     Unbalanced,
@@ -17,7 +17,7 @@ from fleet.allocators.balancing import (
     loads_of,
     semi_matching,
 )
-from fleet.allocators.balancing.bits import bits, mask_of, selector
+from fleet.allocators.load_balancing.bits import bits, mask_of, selector
 from fleet.allocators.min_max_load import Bound, min_max_load
 
 

@@ -7,10 +7,10 @@ from itertools import combinations
 
 from hypothesis import given, settings
 
-from fleet.core.checker import check_plan
-from fleet.core.graph import TaskGraph
-from fleet.core.world_model import WorldModel, condition_holds, first_unmet, room_left
-from keyexpr_schema.plans import Plan
+from fleet.core.checker.plan_checker import check_plan
+from fleet.core.model.task_graph import TaskGraph
+from fleet.core.model.world import WorldModel, condition_holds, first_unmet, room_left
+from keyexpr_schema.payloads.plans import Plan
 from tests.random_plans import ALLOCATION, plans
 
 

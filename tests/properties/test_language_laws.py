@@ -5,10 +5,10 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fleet.core.language import Reading, Vocabulary, read_goal, statement_facts
-from fleet.core.language.tokens import words_in
 from fleet.errors import NotUnderstood
-from keyexpr_schema.world import Object, Place
+from fleet.language import Reading, Vocabulary, read_goal, statement_facts
+from fleet.language.tokens import words_in
+from keyexpr_schema.payloads.world import Object, Place
 from tests.household import carrier, manipulator
 from tests.language_house import WORDS as NAMES
 from tests.language_house import shown

@@ -9,19 +9,19 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
-from fleet.allocators.makespan.bounds import bound_with_ways, lower_bound
-from fleet.allocators.makespan.compiled import Compiled
-from fleet.allocators.makespan.cpsat import installed
-from fleet.allocators.makespan.cpsat_process import Model
-from fleet.allocators.makespan.cpsat_request import helps, request_of
-from fleet.allocators.makespan.exhaustive import exhaust
-from fleet.allocators.makespan.graphs import cheapest_assignment
-from fleet.allocators.makespan.keeping import keep
-from fleet.allocators.makespan.lists import construct
-from fleet.allocators.makespan.portfolio import blocks_in_order, solve
-from fleet.allocators.makespan.problem import BadShop, Block, Machine, Operation, Place, Shop, Timed
-from fleet.allocators.makespan.reschedule import WITHIN, reschedule, without_machines
-from fleet.allocators.makespan.timing import timed
+from fleet.jobshop.bounds import bound_with_ways, lower_bound
+from fleet.jobshop.branch_and_bound import exhaust
+from fleet.jobshop.compiled import Compiled
+from fleet.jobshop.cpsat import installed
+from fleet.jobshop.cpsat_process import Model
+from fleet.jobshop.cpsat_request import helps, request_of
+from fleet.jobshop.graphs import cheapest_assignment
+from fleet.jobshop.list_scheduling import construct
+from fleet.jobshop.portfolio import blocks_in_order, solve
+from fleet.jobshop.problem import BadShop, Block, Machine, Operation, Place, Shop, Timed
+from fleet.jobshop.rescheduling import WITHIN, reschedule, without_machines
+from fleet.jobshop.timing import timed
+from fleet.jobshop.warm_start import keep
 
 NEAR = 1e-6
 TWO_THAT_MUST_BE_FIRST = Shop(

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from fleet.core import events
-from keyexpr_schema.goals import ENDED_GOALS, Condition, Goal, GoalState
-from keyexpr_schema.plans import ENDED_PLANS, PlanState
-from keyexpr_schema.requests import ReplanRequest
-from keyexpr_schema.tasks import ReportState, TaskState
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState
+from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanState
+from keyexpr_schema.payloads.requests import ReplanRequest
+from keyexpr_schema.payloads.tasks import ReportState, TaskState
 from tests.fleet_model import FleetModel
 from tests.household import bring, carrier, manipulator
 

@@ -6,14 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fleet.allocators.base import Allocated
-from fleet.core.checker import check_plan
-from fleet.core.skills import Variable
-from fleet.core.world_model import WorldModel
+from fleet.core.checker.plan_checker import check_plan
+from fleet.core.model.skills import Variable
+from fleet.core.model.world import WorldModel
 from fleet.planners.base import PlanningProblem
 from fleet.service.composition import compose
-from keyexpr_schema.goals import Goal
-from keyexpr_schema.plans import Plan
-from keyexpr_schema.world import Value
+from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.plans import Plan
+from keyexpr_schema.payloads.world import Value
 from tests.household import bring, carrier, home, manipulator
 
 PARTS = compose()

@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from keyexpr_schema.tasks import Order, ReportState
-from workers.intake import (
+from keyexpr_schema.payloads.tasks import Order, ReportState
+from workers.fencing import (
     Accept,
     AttemptName,
     Cancel,

@@ -7,7 +7,7 @@ from math import cos, dist, pi, sin
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from keyexpr_schema.world import Place, Surface
+from keyexpr_schema.payloads.world import Place, Surface
 from workers.skills.spots import (
     APART_M,
     FURNITURE_M,

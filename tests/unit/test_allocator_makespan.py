@@ -9,17 +9,17 @@ import pytest
 from benchmarks.allocation.shops import random_shop
 from fleet.allocators.base import Allocated, Circumstances, NotAllocated
 from fleet.allocators.makespan import MakespanAllocator
-from fleet.allocators.makespan.compiled import Compiled
-from fleet.allocators.makespan.cpsat import CpSat, installed
-from fleet.allocators.makespan.lists import construct
-from fleet.allocators.makespan.portfolio import solve
-from fleet.allocators.makespan.problem import BadShop, Block, Machine, Operation, Shop
-from fleet.allocators.makespan.reschedule import reschedule, without_machines
 from fleet.allocators.milp import MilpAllocator
-from fleet.core.world_model import WorldModel
+from fleet.core.model.world import WorldModel
+from fleet.jobshop.compiled import Compiled
+from fleet.jobshop.cpsat import CpSat, installed
+from fleet.jobshop.list_scheduling import construct
+from fleet.jobshop.portfolio import solve
+from fleet.jobshop.problem import BadShop, Block, Machine, Operation, Shop
+from fleet.jobshop.rescheduling import reschedule, without_machines
 from fleet.planners.base import NoPlan, PlanningProblem
-from fleet.planners.symbolic import SymbolicPlanner
-from keyexpr_schema.plans import Plan
+from fleet.planners.symbolic.planner import SymbolicPlanner
+from keyexpr_schema.payloads.plans import Plan
 from tests.household import bring, carrier, home, manipulator
 
 QUICK = MakespanAllocator(deadline_s=0.2, exact=False)
@@ -65,7 +65,7 @@ def test_what_the_core_predicts_is_what_the_schedule_says() -> None:
 
     class Telling(MakespanAllocator):
         def _assign(self, problem):  # type: ignore[no-untyped-def]
-            from fleet.allocators.makespan.plan_shop import plan_shop
+            from fleet.allocators.plan_shop import plan_shop
 
             self.core_s = solve(plan_shop(problem).shop, 0.1, exact=False)
             return super()._assign(problem)
@@ -121,7 +121,7 @@ def test_eight_tasks_with_meetings_are_proven_optimal(seed: int) -> None:
 
 
 def test_without_or_tools_the_rest_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fleet.allocators.makespan.portfolio.installed", lambda: False)
+    monkeypatch.setattr("fleet.jobshop.portfolio.installed", lambda: False)
     found = solve(random_shop(30, 4), deadline_s=0.1)
     assert found is not None
     assert not any("CP-SAT" in note for note in found.notes)

@@ -10,22 +10,22 @@ from dataclasses import replace as changed
 import pytest
 
 from fleet.allocators.balanced import BalancedAllocator
-from fleet.allocators.balancing import Balance, LoadProblem, balance
 from fleet.allocators.base import Allocated, AllocationProblem, Allocator, Assignment, NotAllocated
 from fleet.allocators.cost_based import CostBasedAllocator
 from fleet.allocators.llm import Choice, LlmAllocator
+from fleet.allocators.load_balancing import Balance, LoadProblem, balance
 from fleet.allocators.milp import MilpAllocator
 from fleet.allocators.min_max_load import Bound, min_max_load
 from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.allocators.solver_run import Found, available_solver, solve
-from fleet.core.checker import check_plan
-from fleet.core.world_model import WorldModel
+from fleet.core.checker.plan_checker import check_plan
+from fleet.core.model.world import WorldModel
 from fleet.planners.base import PlanningProblem
 from fleet.planners.llm import LlmConfig, ModelCaller
-from fleet.planners.symbolic import SymbolicPlanner
+from fleet.planners.symbolic.planner import SymbolicPlanner
 from fleet.service.allocation_asker import AllocationAsker
 from fleet.service.composition import compose
-from keyexpr_schema.plans import Plan, Task, Violation
+from keyexpr_schema.payloads.plans import Plan, Task, Violation
 from tests.household import bring, carrier, fact, home, manipulator
 from tests.llm_server import LlmServer, Reply
 

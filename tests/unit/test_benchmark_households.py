@@ -19,10 +19,10 @@ from benchmarks.allocation.household import (
 from benchmarks.allocation.shops import random_shop
 from fleet.allocators.base import Allocated
 from fleet.allocators.makespan import MakespanAllocator
-from fleet.allocators.makespan.compiled import Compiled
-from fleet.allocators.makespan.portfolio import solve
 from fleet.allocators.round_robin import RoundRobinAllocator
-from fleet.core.checker import check_plan
+from fleet.core.checker.plan_checker import check_plan
+from fleet.jobshop.compiled import Compiled
+from fleet.jobshop.portfolio import solve
 
 
 @pytest.mark.parametrize("scenario", scenarios())

@@ -13,8 +13,8 @@ from benchmarks.planning.report import as_markdown, comparable_missions, failure
 from benchmarks.planning.simulated_time import SimulatedLoop, Stuck, run
 from benchmarks.planning.truth import Witness, parse_truth
 from fleet.service.composition import Composition, compose
-from keyexpr_schema.simulation import Truth
-from keyexpr_schema.world import Place
+from keyexpr_schema.payloads.simulation import Truth
+from keyexpr_schema.payloads.world import Place
 from sim.errors import BadFile
 
 PARTS: Composition = compose()

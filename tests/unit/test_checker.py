@@ -8,11 +8,11 @@ from dataclasses import replace as model_replace
 import pytest
 from msgspec.structs import replace
 
-from fleet.core.checker import check_plan
-from fleet.core.skills import skills_from_data
-from keyexpr_schema.goals import Condition
-from keyexpr_schema.plans import Plan, Task
-from keyexpr_schema.world import Surface
+from fleet.core.checker.plan_checker import check_plan
+from fleet.core.model.skills import skills_from_data
+from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.plans import Plan, Task
+from keyexpr_schema.payloads.world import Surface
 from tests.household import PLACES, SKILLS, at, carrier, cup, fact, home, manipulator
 
 A1, A2 = "?a1", "?a2"

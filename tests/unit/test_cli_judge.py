@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from cli.judge import Judgement, Verdict, all_agreed, judge
-from keyexpr_schema.goals import Condition, GoalState, GoalStatus
-from keyexpr_schema.simulation import Truth
+from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
+from keyexpr_schema.payloads.simulation import Truth
 
 
 def status(

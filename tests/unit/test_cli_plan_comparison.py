@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from cli.plans.comparison import PlanSide, compare
-from keyexpr_schema.plans import Plan, Task
+from keyexpr_schema.payloads.plans import Plan, Task
 
 
 def task(name: str, skill: str = "navigate", actor: str = "a1", *after: str, **args: str) -> Task:

@@ -13,8 +13,8 @@ from cli.plans.files import read_plan, write_plan
 from cli.show.page import page
 from cli.show.plan_graph import layers, plan_dot, plan_graph
 from cli.show.plan_page import making_lines
-from keyexpr_schema.goals import Condition
-from keyexpr_schema.plans import Making, Plan, PlanChange, PlanState, PlanStatus, Task
+from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.plans import Making, Plan, PlanChange, PlanState, PlanStatus, Task
 
 
 def task(name: str, *after: str) -> Task:

@@ -18,9 +18,9 @@ from cli.show.page import page, table
 from cli.show.plan_tree import in_order, plan_tree
 from cli.show.words import natural, outcome
 from cli.telling import parse_value
-from keyexpr_schema.goals import Condition, Goal, GoalState, GoalStatus
-from keyexpr_schema.plans import Plan, PlanState, PlanStatus, Task, Violation
-from keyexpr_schema.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus, Task, Violation
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 GOAL = "bring"
 TASKS = (

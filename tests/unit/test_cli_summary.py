@@ -12,9 +12,9 @@ from rich.console import Console
 from cli.demo.summary import Summary, task_lines, times
 from cli.judge import Judgement, Verdict
 from cli.show.summary_page import summary_page
-from fleet.core.idle_time import union_s
-from keyexpr_schema.goals import GoalState
-from keyexpr_schema.tasks import TaskRecord, TaskState, Try
+from fleet.core.schedule.idle_time import union_s
+from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState, Try
 
 
 def record(

@@ -9,13 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fleet.core import events
-from fleet.core.durations import FASTEST, FULL_ATTEMPTS, SLOWEST, learn, pace, work_s
-from fleet.core.schedule import predicted_duration_s
+from fleet.core.model.durations import FASTEST, FULL_ATTEMPTS, SLOWEST, learn, pace, work_s
+from fleet.core.schedule.plan_schedule import predicted_duration_s
 from fleet.core.state import State
 from fleet.core.step import step
-from keyexpr_schema.durations import Durations, Estimate
 from keyexpr_schema.keyspace import DURATIONS
-from keyexpr_schema.tasks import ReportState
+from keyexpr_schema.payloads.durations import Durations, Estimate
+from keyexpr_schema.payloads.tasks import ReportState
 from tests.fleet_model import FleetModel
 from tests.household import SKILLS, bring, manipulator
 

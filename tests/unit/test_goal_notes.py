@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from fleet.core import events
-from keyexpr_schema.goals import Goal, GoalState, GoalStatus
-from keyexpr_schema.world import Statement
+from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.world import Statement
 from tests.fleet_model import FleetModel
 from tests.household import manipulator
 

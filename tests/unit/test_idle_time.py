@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from cli.plans.idle import idle_report
 from cli.show.idle_page import idle_page
 from cli.show.page import page
-from fleet.core.graph import Cycle
-from fleet.core.idle_time import (
+from fleet.core.model.task_graph import Cycle
+from fleet.core.schedule.idle_time import (
     IdleTime,
     capable,
     measured_idle,
@@ -22,9 +22,9 @@ from fleet.core.idle_time import (
     predicted_unit,
     unit_idle,
 )
-from keyexpr_schema.plans import Plan, PlanState, PlanStatus, Task
-from keyexpr_schema.robots import RobotSpec
-from keyexpr_schema.tasks import TaskRecord, TaskState, Try
+from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus, Task
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState, Try
 
 
 def task(name: str, actor: str, duration_s: float, *after: str, with_: str = "") -> Task:

@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from keyexpr_schema.motions import Motion, MotionKind, MotionOutcome, MotionState
+from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState
 from sim.kinematic import Durations, KinematicBackend
 from sim.world_file import load_mission
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from fleet.core.language import statement_facts
 from fleet.errors import NotUnderstood
-from keyexpr_schema.world import Value
+from fleet.language import statement_facts
+from keyexpr_schema.payloads.world import Value
 from tests.language_house import WORDS
 
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 from msgspec import structs
 
-from fleet.core.language import Vocabulary, goal_conditions, read_goal
 from fleet.errors import NotUnderstood
-from keyexpr_schema.world import Object
+from fleet.language import Vocabulary, goal_conditions, read_goal
+from keyexpr_schema.payloads.world import Object
 from tests.language_house import OBJECTS, PLACES, ROBOTS, WORDS, shown
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from fleet.core.language import Vocabulary, read_goal
 from fleet.errors import NotUnderstood
+from fleet.language import Vocabulary, read_goal
 from tests.language_house import WORDS
 
 

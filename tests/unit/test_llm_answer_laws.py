@@ -9,13 +9,13 @@ import msgspec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fleet.core.checker import check_plan
+from fleet.core.checker.plan_checker import check_plan
+from fleet.llm.wording import fenced
 from fleet.planners.base import PlanningProblem
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema, read_answer
 from fleet.planners.llm.draft import Draft, draft_of, merged, plan_of
 from fleet.planners.llm.verify import why_not, without_useless
-from fleet.planners.llm.wording import fenced
-from keyexpr_schema.plans import Plan
+from keyexpr_schema.payloads.plans import Plan
 from tests.household import bring, home, manipulator
 
 WORLD = home((manipulator("r1"), manipulator("r2")))

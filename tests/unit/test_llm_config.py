@@ -16,10 +16,10 @@ from typing import Any
 import msgspec
 import pytest
 
+from fleet.llm.prompts import FOLDER, load_prompts
 from fleet.planners.llm import BadLlmConfig, LlmConfig, ModelCaller, load_llm_config
 from fleet.planners.llm.answers import StepAnswer, TaskAnswer
-from fleet.planners.llm.prompts import FOLDER, load_prompts
-from keyexpr_schema.plans import Task
+from keyexpr_schema.payloads.plans import Task
 from tests.llm_server import LlmServer, Reply
 
 ROOT = Path(__file__).parents[2]

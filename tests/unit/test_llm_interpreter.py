@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from fleet.core.language import Vocabulary
+from fleet.language import Vocabulary
 from fleet.planners.llm import LlmConfig, LlmInterpreter, LlmPlanner, ModelCaller
-from fleet.planners.symbolic import SymbolicPlanner
-from keyexpr_schema.goals import Condition
+from fleet.planners.symbolic.planner import SymbolicPlanner
+from keyexpr_schema.payloads.goals import Condition
 from tests.household import SKILLS, at, home
 from tests.llm_server import LlmServer, Reply
 

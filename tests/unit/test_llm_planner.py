@@ -12,16 +12,16 @@ import pytest
 
 from fleet.allocators.base import Allocated
 from fleet.allocators.milp import MilpAllocator
-from fleet.core.checker import check_plan
-from fleet.core.world_model import WorldModel
+from fleet.core.checker.plan_checker import check_plan
+from fleet.core.model.world import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.llm import LlmConfig, LlmPlanner, ModelCaller
 from fleet.planners.llm.answers import GraphAnswer
 from fleet.planners.llm.draft import draft_of, merged
-from fleet.planners.symbolic import SymbolicPlanner
-from keyexpr_schema.goals import Goal
-from keyexpr_schema.plans import Plan
-from keyexpr_schema.world import Object
+from fleet.planners.symbolic.planner import SymbolicPlanner
+from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.plans import Plan
+from keyexpr_schema.payloads.world import Object
 from tests.household import at, bring, carrier, fact, home
 from tests.llm_server import LlmServer, Reply
 

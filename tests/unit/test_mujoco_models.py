@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from keyexpr_schema.robots import RobotSpec
+from keyexpr_schema.payloads.robots import RobotSpec
 from sim.errors import BadFile
 from sim.mujoco_world import MODELS, MujocoBackend, load_description
 from sim.world_file import CONFIGS, load_robot, load_world

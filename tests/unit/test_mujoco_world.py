@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from keyexpr_schema.motions import Motion, MotionKind, MotionState
-from keyexpr_schema.simulation import ShapeKind
+from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionState
+from keyexpr_schema.payloads.simulation import ShapeKind
 from sim.mujoco_world import MujocoBackend
 from sim.world_file import load_mission
 

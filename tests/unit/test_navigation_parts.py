@@ -16,7 +16,7 @@ from sim.navigation.routes import Route, Routes
 from sim.navigation.spots import Spots
 from sim.navigation.steering import DECELERATION_M_S2, steer
 from sim.world_file import load_mission
-from sim.world_model import WorldFile
+from sim.world_schema import WorldFile
 
 WORLD = load_mission("two-cups").world
 CLEARANCE = Clearance(WORLD)

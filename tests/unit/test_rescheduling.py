@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 
 from fleet.core import events
-from fleet.core.lateness import FACTOR, MARGIN_S, next_lateness
+from fleet.core.dispatch.delays import FACTOR, MARGIN_S, next_lateness
+from fleet.core.dispatch.dispatcher import next_timer
 from fleet.core.state import PlanBook, Policy
-from fleet.core.working import next_timer
-from keyexpr_schema.goals import GoalState
-from keyexpr_schema.plans import Plan, PlanState, Task
-from keyexpr_schema.requests import Control, ControlRequest, ReplanRequest
-from keyexpr_schema.tasks import Order, ReportState, TaskState
+from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.plans import Plan, PlanState, Task
+from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
+from keyexpr_schema.payloads.tasks import Order, ReportState, TaskState
 from tests.fleet_model import FleetModel
 from tests.household import bring, carrier, cup, manipulator
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from benchmarks.allocation.shop_files import INSTANCES, BadInstance, load, read_instance
-from fleet.allocators.makespan.cpsat import installed
-from fleet.allocators.makespan.portfolio import solve
+from fleet.jobshop.cpsat import installed
+from fleet.jobshop.portfolio import solve
 
 KNOWN = {
     "ft06": 55, "la01": 666, "la02": 655, "la03": 597, "la04": 590, "la05": 593,

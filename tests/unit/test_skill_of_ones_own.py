@@ -5,17 +5,17 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from fleet.core.checker import check_plan
-from fleet.core.deeds import deeds_of
-from fleet.core.language import Vocabulary, read_goal
-from fleet.core.skills import skills_from_data
-from fleet.core.world_model import WorldModel
+from fleet.core.checker.plan_checker import check_plan
+from fleet.core.model.skills import skills_from_data
+from fleet.core.model.spoken_skills import deeds_of
+from fleet.core.model.world import WorldModel
 from fleet.errors import NotUnderstood
+from fleet.language import Vocabulary, read_goal
 from fleet.planners.base import PlanningProblem
-from fleet.planners.symbolic import SymbolicPlanner
-from keyexpr_schema.goals import Goal
-from keyexpr_schema.plans import Plan
-from keyexpr_schema.world import Fact
+from fleet.planners.symbolic.planner import SymbolicPlanner
+from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.plans import Plan
+from keyexpr_schema.payloads.world import Fact
 from tests.household import PLACES, SKILLS, UNLOAD, at, bring, carrier, cup, fact, manipulator
 from tests.language_house import WORDS, shown
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 
 from keyexpr_schema.keyspace import OBJECT, PLACE, ROBOT_SPEC
-from keyexpr_schema.robots import RobotAddress, RobotSpec
-from keyexpr_schema.session import Change
-from keyexpr_schema.world import Object, ObjectAddress, Place, PlaceAddress
+from keyexpr_schema.payloads.robots import RobotAddress, RobotSpec
+from keyexpr_schema.payloads.world import Object, ObjectAddress, Place, PlaceAddress
+from keyexpr_schema.transport.session import Change
 from workers.context import SkillContext
 from workers.errors import BadArguments, BadSkill, UnknownSkill
 from workers.skill import Kind, Skill, SkillRegistry, skill
 from workers.skills.household import HOUSEHOLD
-from workers.worldview import WorldView
+from workers.world_cache import WorldView
 
 
 @skill("pour", parameters={"object": Kind.OBJECT, "place": Kind.PLACE, "litres": Kind.NUMBER})

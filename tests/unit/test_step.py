@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from fleet.core import events
 from fleet.core.effects import Interpret, MakePlan, Publish
-from fleet.core.planning import MAX_REPLANS
+from fleet.core.handlers.plan_results import MAX_REPLANS
 from fleet.core.state import Policy, State
 from fleet.core.step import step
-from keyexpr_schema.goals import Goal, GoalState
 from keyexpr_schema.keyspace import PLACE, PLAN_STATUS
-from keyexpr_schema.plans import Plan, PlanChange, PlanState, Task
-from keyexpr_schema.requests import Control, ControlRequest, ReplanRequest
-from keyexpr_schema.tasks import ReportState, TaskState
+from keyexpr_schema.payloads.goals import Goal, GoalState
+from keyexpr_schema.payloads.plans import Plan, PlanChange, PlanState, Task
+from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
+from keyexpr_schema.payloads.tasks import ReportState, TaskState
 from tests.fleet_model import FleetModel
 from tests.household import SKILLS, at, bring, carrier, manipulator
 

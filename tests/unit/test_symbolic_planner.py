@@ -9,14 +9,14 @@ import pytest
 
 from fleet.allocators.base import Allocated, NotAllocated
 from fleet.allocators.milp import MilpAllocator
-from fleet.core.checker import check_plan
-from fleet.core.skills import Variable, skills_from_data
-from fleet.core.world_model import WorldModel
+from fleet.core.checker.plan_checker import check_plan
+from fleet.core.model.skills import Variable, skills_from_data
+from fleet.core.model.world import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
-from fleet.planners.symbolic import SymbolicPlanner
-from keyexpr_schema.goals import Condition, Goal
-from keyexpr_schema.plans import Plan
-from keyexpr_schema.world import Surface
+from fleet.planners.symbolic.planner import SymbolicPlanner
+from keyexpr_schema.payloads.goals import Condition, Goal
+from keyexpr_schema.payloads.plans import Plan
+from keyexpr_schema.payloads.world import Surface
 from tests.household import PLACES, SKILLS, at, bring, carrier, fact, home, manipulator
 
 

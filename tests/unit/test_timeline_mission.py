@@ -14,12 +14,12 @@ from fleet.timeline.read import rows, summary
 from fleet.timeline.recorder import Recorder
 from fleet.timeline.sink import open_stream
 from keyexpr_schema import keyspace as keys
-from keyexpr_schema.plans import PlanAddress
-from keyexpr_schema.robots import RobotActivity, RobotAddress, RobotState
-from keyexpr_schema.service import Reject, RejectAddress
-from keyexpr_schema.simulation import Frame, Frames, SimAddress, SimClock
-from keyexpr_schema.tasks import Report, ReportAddress, ReportState, TaskAddress, TaskState
-from keyexpr_schema.world import Fact, FactAddress
+from keyexpr_schema.payloads.plans import PlanAddress
+from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
+from keyexpr_schema.payloads.service import Reject, RejectAddress
+from keyexpr_schema.payloads.simulation import Frame, Frames, SimAddress, SimClock
+from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState, TaskAddress, TaskState
+from keyexpr_schema.payloads.world import Fact, FactAddress
 
 
 def written(path: Path, changes: list[Put], backlog: bool = False) -> Path:

@@ -19,7 +19,7 @@ from fleet.timeline.sink import Sink, open_stream
 from fleet.timeline.text import DRAWN, drawable
 from fleet.timeline.trails import CORNERS, Trail
 from fleet.timeline.utilisation import Utilisation
-from keyexpr_schema.tasks import TaskState
+from keyexpr_schema.payloads.tasks import TaskState
 
 
 def test_a_zenoh_timestamp_gives_its_wall_time() -> None:

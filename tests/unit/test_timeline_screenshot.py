@@ -13,8 +13,8 @@ from fleet.timeline.recorder import Recorder
 from fleet.timeline.screenshot import DRIVER, main
 from fleet.timeline.sink import open_stream
 from fleet.timeline.text import DRAWN
-from keyexpr_schema.goals import Goal, GoalAddress
 from keyexpr_schema.keyspace import GOAL_SPEC
+from keyexpr_schema.payloads.goals import Goal, GoalAddress
 
 
 def driver_is_installed() -> bool:

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from keyexpr_schema.tasks import Order, Report, ReportState
-from keyexpr_schema.world import Fact
+from keyexpr_schema.payloads.tasks import Order, Report, ReportState
+from keyexpr_schema.payloads.world import Fact
 from workers.errors import JournalBusy, JournalUnreadable
-from workers.intake import Phase, attempt_name
+from workers.fencing import Phase, attempt_name
 from workers.journal import Journal
 from workers.reports import report_on
 
@@ -59,7 +59,7 @@ import os, signal, sys
 sys.path.insert(0, {str(Path(__file__).parent)!r})
 from pathlib import Path
 from test_worker_journal import fact, order
-from keyexpr_schema.tasks import ReportState
+from keyexpr_schema.payloads.tasks import ReportState
 from workers.journal import Journal
 from workers.reports import report_on
 journal = Journal(Path({str(path)!r})).__enter__()

@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 
 from keyexpr_schema.errors import NoAnswer
-from keyexpr_schema.tasks import ReportState
+from keyexpr_schema.payloads.tasks import ReportState
 from workers.errors import SkillFailed
 from workers.retry import Ended, run_attempt
 

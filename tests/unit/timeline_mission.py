@@ -15,11 +15,11 @@ from typing import Any
 import yaml
 
 from keyexpr_schema import keyspace as keys
-from keyexpr_schema.goals import Condition, Goal, GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.key import Key
-from keyexpr_schema.plans import Plan, PlanAddress, PlanState, PlanStatus, Task
-from keyexpr_schema.robots import RobotActivity, RobotAddress, RobotSpec, RobotState
-from keyexpr_schema.simulation import (
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress, GoalState, GoalStatus
+from keyexpr_schema.payloads.plans import Plan, PlanAddress, PlanState, PlanStatus, Task
+from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotSpec, RobotState
+from keyexpr_schema.payloads.simulation import (
     Body,
     Frame,
     Frames,
@@ -31,7 +31,7 @@ from keyexpr_schema.simulation import (
     Truth,
     TruthAddress,
 )
-from keyexpr_schema.tasks import (
+from keyexpr_schema.payloads.tasks import (
     Order,
     OrderAddress,
     Report,
@@ -42,7 +42,7 @@ from keyexpr_schema.tasks import (
     TaskState,
     Try,
 )
-from keyexpr_schema.world import Fact, FactAddress, Place, PlaceAddress
+from keyexpr_schema.payloads.world import Fact, FactAddress, Place, PlaceAddress
 
 WALL_S = 1_760_000_000.0
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)

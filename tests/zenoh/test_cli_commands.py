@@ -15,7 +15,6 @@ import zenoh
 
 from cli.command import CONNECT_TIMEOUT_S
 from keyexpr_schema.errors import UndecodablePayload
-from keyexpr_schema.goals import Goal, GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.keyspace import (
     ANSWER,
     GOAL_SPEC,
@@ -31,13 +30,14 @@ from keyexpr_schema.keyspace import (
     ROBOT_STATE,
     TASK_RECORD,
 )
-from keyexpr_schema.plans import Plan, PlanAddress, PlanState, PlanStatus, Task, Violation
-from keyexpr_schema.requests import Answer, PlanRequest, RequestAddress
-from keyexpr_schema.robots import AliveAddress, RobotActivity, RobotAddress, RobotState
-from keyexpr_schema.service import PlannerAddress, PlannerAliveAddress, PlannerStatus
-from keyexpr_schema.session import Session, SessionConfig, open_session
-from keyexpr_schema.tasks import TaskAddress, TaskRecord, TaskState
-from keyexpr_schema.wire import zenoh_config
+from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState, GoalStatus
+from keyexpr_schema.payloads.plans import Plan, PlanAddress, PlanState, PlanStatus, Task, Violation
+from keyexpr_schema.payloads.requests import Answer, PlanRequest, RequestAddress
+from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotAddress, RobotState
+from keyexpr_schema.payloads.service import PlannerAddress, PlannerAliveAddress, PlannerStatus
+from keyexpr_schema.payloads.tasks import TaskAddress, TaskRecord, TaskState
+from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from keyexpr_schema.transport.wire import zenoh_config
 from tests.robotctl import Robotctl
 
 CONFIGS = Path(__file__).parents[2] / "configs"

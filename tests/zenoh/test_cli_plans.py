@@ -14,7 +14,6 @@ import pytest
 import yaml
 
 from cli.plans.files import read_plan, write_plan
-from keyexpr_schema.goals import GoalAddress, GoalState
 from keyexpr_schema.keyspace import (
     ANSWER,
     FACT,
@@ -24,10 +23,11 @@ from keyexpr_schema.keyspace import (
     SIM_CLOCK,
     TASK_RECORD,
 )
-from keyexpr_schema.plans import Plan, PlanAddress, PlanState, Task
-from keyexpr_schema.session import Session
-from keyexpr_schema.simulation import SimAddress, SimClock
-from keyexpr_schema.world import FactAddress
+from keyexpr_schema.payloads.goals import GoalAddress, GoalState
+from keyexpr_schema.payloads.plans import Plan, PlanAddress, PlanState, Task
+from keyexpr_schema.payloads.simulation import SimAddress, SimClock
+from keyexpr_schema.payloads.world import FactAddress
+from keyexpr_schema.transport.session import Session
 from tests.planner_process import carry_out, next_order, person, planner, value
 from tests.robotctl import Robotctl
 

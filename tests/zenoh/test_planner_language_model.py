@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from keyexpr_schema.goals import GoalAddress, GoalState
 from keyexpr_schema.keyspace import GOAL_STATUS, PLAN_STATUS
-from keyexpr_schema.plans import PlanAddress
+from keyexpr_schema.payloads.goals import GoalAddress, GoalState
+from keyexpr_schema.payloads.plans import PlanAddress
 from tests.llm_server import LlmServer, Reply
 from tests.planner_process import ask_for_plan, finish, person, planner, value
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from keyexpr_schema.goals import Goal, GoalAddress, GoalState
 from keyexpr_schema.keyspace import (
     ANSWER,
     FACT,
@@ -24,13 +23,14 @@ from keyexpr_schema.keyspace import (
     ROBOT_SPEC,
     TASK_RECORD,
 )
-from keyexpr_schema.plans import PlanAddress
-from keyexpr_schema.requests import PlanRequest, RequestAddress
-from keyexpr_schema.robots import AliveAddress, RobotAddress
-from keyexpr_schema.service import PlannerAddress
-from keyexpr_schema.session import SessionConfig, open_session
-from keyexpr_schema.tasks import OrderAddress
-from keyexpr_schema.world import FactAddress
+from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState
+from keyexpr_schema.payloads.plans import PlanAddress
+from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
+from keyexpr_schema.payloads.robots import AliveAddress, RobotAddress
+from keyexpr_schema.payloads.service import PlannerAddress
+from keyexpr_schema.payloads.tasks import OrderAddress
+from keyexpr_schema.payloads.world import FactAddress
+from keyexpr_schema.transport.session import SessionConfig, open_session
 from tests.household import fact, manipulator
 from tests.planner_process import (
     DEADLINE_S,

@@ -13,11 +13,11 @@ import zenoh
 
 from fleet.service.router_process import with_port
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.goals import Goal, GoalAddress
 from keyexpr_schema.keyspace import GOAL_SPEC
-from keyexpr_schema.router import CannotListen, run_router
-from keyexpr_schema.session import SessionConfig, open_session
-from keyexpr_schema.wire import read_sample, stamp_of_text, zenoh_config
+from keyexpr_schema.payloads.goals import Goal, GoalAddress
+from keyexpr_schema.transport.router import CannotListen, run_router
+from keyexpr_schema.transport.session import SessionConfig, open_session
+from keyexpr_schema.transport.wire import read_sample, stamp_of_text, zenoh_config
 
 MODULE = "fleet.service.router_process"
 KEYEXPR = "robotfleet/goals/g1/spec"

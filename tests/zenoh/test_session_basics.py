@@ -9,10 +9,10 @@ import time
 import pytest
 
 from keyexpr_schema.errors import Unreachable
-from keyexpr_schema.goals import Goal, GoalAddress
 from keyexpr_schema.keyspace import GOAL_SPEC, STORE_JOURNAL
-from keyexpr_schema.service import StoreAddress, StoreQuery
-from keyexpr_schema.session import SessionConfig, open_session
+from keyexpr_schema.payloads.goals import Goal, GoalAddress
+from keyexpr_schema.payloads.service import StoreAddress, StoreQuery
+from keyexpr_schema.transport.session import SessionConfig, open_session
 
 
 def goal(name: str, text: str = "bring the cup") -> Goal:

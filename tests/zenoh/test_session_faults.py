@@ -19,15 +19,15 @@ from keyexpr_schema.errors import (
     UndecodablePayload,
     Unreachable,
 )
-from keyexpr_schema.goals import Goal, GoalAddress
 from keyexpr_schema.keyspace import FACT, GOAL_SPEC, REJECT, ROBOT_ALIVE, SIM_MOTION, SIM_SENSES
-from keyexpr_schema.motions import MotionOutcome, MotionState, Senses
-from keyexpr_schema.robots import AliveAddress
-from keyexpr_schema.session import Session, Watch, open_session
-from keyexpr_schema.simulation import MotionCall, SimRobotAddress
-from keyexpr_schema.storage import Write
-from keyexpr_schema.wire import zenoh_config
-from keyexpr_schema.world import Fact, FactAddress
+from keyexpr_schema.payloads.goals import Goal, GoalAddress
+from keyexpr_schema.payloads.motions import MotionOutcome, MotionState, Senses
+from keyexpr_schema.payloads.robots import AliveAddress
+from keyexpr_schema.payloads.simulation import MotionCall, SimRobotAddress
+from keyexpr_schema.payloads.world import Fact, FactAddress
+from keyexpr_schema.transport.session import Session, Watch, open_session
+from keyexpr_schema.transport.storage import Write
+from keyexpr_schema.transport.wire import zenoh_config
 
 AT = FactAddress("cup_1", "at")
 
@@ -159,8 +159,8 @@ def test_an_exception_in_the_block_still_lets_the_interpreter_end(router):
     program = f"""
 import asyncio
 from keyexpr_schema.keyspace import GOAL_SPEC, ROBOT_ALIVE
-from keyexpr_schema.robots import AliveAddress
-from keyexpr_schema.session import SessionConfig, open_session
+from keyexpr_schema.payloads.robots import AliveAddress
+from keyexpr_schema.transport.session import SessionConfig, open_session
 
 async def main():
     async with open_session(SessionConfig(endpoints=({router.endpoint!r},))) as session:

@@ -15,9 +15,9 @@ import pytest
 
 from keyexpr_schema.errors import NoAnswer
 from keyexpr_schema.keyspace import SIM_CLOCK, SIM_MOTION, SIM_SCENE, SIM_SENSES, SIM_TRUTH
-from keyexpr_schema.motions import Motion, MotionKind, MotionOutcome, MotionState
-from keyexpr_schema.session import Session, SessionConfig, open_session
-from keyexpr_schema.simulation import MotionCall, SimAddress, SimRobotAddress
+from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState
+from keyexpr_schema.payloads.simulation import MotionCall, SimAddress, SimRobotAddress
+from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.embodiment import SimEmbodiment
 from sim.kinematic import Durations, KinematicBackend
 from sim.server import SimServer

@@ -17,11 +17,11 @@ import pytest
 from fleet.timeline import viewer
 from fleet.timeline.errors import UnreadableRecording
 from fleet.timeline.read import Row, rows, summary
-from keyexpr_schema.goals import Goal, GoalAddress
 from keyexpr_schema.keyspace import GOAL_SPEC, SIM_CLOCK, SIM_FRAMES, TASK_RECORD
-from keyexpr_schema.session import Session, open_session
-from keyexpr_schema.simulation import Frame, Frames, SimAddress, SimClock
-from keyexpr_schema.tasks import TaskAddress, TaskRecord, TaskState
+from keyexpr_schema.payloads.goals import Goal, GoalAddress
+from keyexpr_schema.payloads.simulation import Frame, Frames, SimAddress, SimClock
+from keyexpr_schema.payloads.tasks import TaskAddress, TaskRecord, TaskState
+from keyexpr_schema.transport.session import Session, open_session
 
 DEADLINE_S = 30.0
 

@@ -12,9 +12,9 @@ from msgspec.structs import replace
 from worker_world import DEADLINE_S, Planner
 
 from keyexpr_schema.keyspace import ROBOT_SPEC
-from keyexpr_schema.robots import RobotAddress
-from keyexpr_schema.session import SessionConfig, open_session
-from keyexpr_schema.tasks import ReportState
+from keyexpr_schema.payloads.robots import RobotAddress
+from keyexpr_schema.payloads.tasks import ReportState
+from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.kinematic import KinematicBackend
 from sim.server import SimServer
 from sim.world_file import load_mission

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from worker_world import Fleet, running_fleet
 
-from keyexpr_schema.session import SessionConfig
-from keyexpr_schema.tasks import Report, ReportState
+from keyexpr_schema.payloads.tasks import Report, ReportState
+from keyexpr_schema.transport.session import SessionConfig
 from sim.backend import Backend
 from sim.mujoco_world import MujocoBackend
 from sim.world_file import Mission

@@ -15,10 +15,10 @@ from conftest import RouterProcess
 from worker_world import DEADLINE_S, Planner
 
 from keyexpr_schema.keyspace import ROBOT_STATE
-from keyexpr_schema.robots import RobotActivity
-from keyexpr_schema.session import SessionConfig, open_session
-from keyexpr_schema.tasks import ReportState
-from keyexpr_schema.world import NOTHING
+from keyexpr_schema.payloads.robots import RobotActivity
+from keyexpr_schema.payloads.tasks import ReportState
+from keyexpr_schema.payloads.world import NOTHING
+from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.world_file import load_mission
 
 SIM = """

@@ -14,11 +14,11 @@ from msgspec.structs import replace
 from worker_world import DEADLINE_S, Fleet, running_fleet
 
 from keyexpr_schema.keyspace import FACT, ORDER, REJECT, REPORT, ROBOT_ALIVE, ROBOT_STATE
-from keyexpr_schema.motions import MotionKind
-from keyexpr_schema.robots import RobotActivity, RobotAddress, RobotState
-from keyexpr_schema.session import SessionConfig
-from keyexpr_schema.tasks import OrderAddress, Report, ReportAddress, ReportState
-from keyexpr_schema.world import NOTHING, Fact, FactAddress
+from keyexpr_schema.payloads.motions import MotionKind
+from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
+from keyexpr_schema.payloads.tasks import OrderAddress, Report, ReportAddress, ReportState
+from keyexpr_schema.payloads.world import NOTHING, Fact, FactAddress
+from keyexpr_schema.transport.session import SessionConfig
 from sim.backend import Backend
 from sim.kinematic import Durations, KinematicBackend
 from sim.world_file import Mission

@@ -14,11 +14,11 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from keyexpr_schema.keyspace import FACT, OBJECT, ORDER, PLACE, REPORT, ROBOT_SPEC
-from keyexpr_schema.motions import Motion, MotionOutcome, MotionState, Senses
-from keyexpr_schema.robots import RobotAddress
-from keyexpr_schema.session import Session, SessionConfig, open_session
-from keyexpr_schema.tasks import FINAL_REPORTS, Order, OrderAddress, Report, ReportState
-from keyexpr_schema.world import Fact, FactAddress, ObjectAddress, PlaceAddress
+from keyexpr_schema.payloads.motions import Motion, MotionOutcome, MotionState, Senses
+from keyexpr_schema.payloads.robots import RobotAddress
+from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Order, OrderAddress, Report, ReportState
+from keyexpr_schema.payloads.world import Fact, FactAddress, ObjectAddress, PlaceAddress
+from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.backend import Backend
 from sim.world_file import Mission, load_mission
 from workers.journal import Journal

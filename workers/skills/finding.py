@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import AsyncGenerator
 
-from keyexpr_schema.motions import Detection, MotionKind
-from keyexpr_schema.robots import PoseMRad
+from keyexpr_schema.payloads.motions import Detection, MotionKind
+from keyexpr_schema.payloads.robots import PoseMRad
 from workers.context import SkillContext
 from workers.errors import SkillFailed
 from workers.skills.viewing import Viewing

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from keyexpr_schema.motions import MotionKind
+from keyexpr_schema.payloads.motions import MotionKind
 from workers.context import SkillContext
 from workers.errors import SkillFailed
 from workers.skill import Kind, skill

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import dist
 
-from keyexpr_schema.motions import Detection, MotionKind, PointM
-from keyexpr_schema.world import NOTHING
+from keyexpr_schema.payloads.motions import Detection, MotionKind, PointM
+from keyexpr_schema.payloads.world import NOTHING
 from workers.context import SkillContext
 from workers.errors import SkillFailed
 from workers.skill import Kind, skill

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from math import cos, dist, sin
 
-from keyexpr_schema.motions import PointM
-from keyexpr_schema.world import Place, Surface
+from keyexpr_schema.payloads.motions import PointM
+from keyexpr_schema.payloads.world import Place, Surface
 from workers.skills.viewing import cells
 
 PointM2 = tuple[float, float]

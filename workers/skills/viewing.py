@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from math import dist, sqrt
 
-from keyexpr_schema.robots import RobotSpec
-from keyexpr_schema.world import Place
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.world import Place
 
 PointM2 = tuple[float, float]
 

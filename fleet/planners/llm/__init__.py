@@ -1,8 +1,8 @@
 """Planning by language model: configuration, planner, and interpreter of goal sentences."""
 
-from fleet.planners.llm.caller import ModelCaller
-from fleet.planners.llm.config import LlmConfig, load_llm_config
-from fleet.planners.llm.errors import BadLlmConfig
+from fleet.llm.client import ModelCaller
+from fleet.llm.configuration import LlmConfig, load_llm_config
+from fleet.llm.errors import BadLlmConfig
 from fleet.planners.llm.interpreter import LlmInterpreter
 from fleet.planners.llm.planner import LlmPlanner
 

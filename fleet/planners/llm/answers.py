@@ -8,11 +8,11 @@ from typing import Annotated, Any, Literal, TypeVar
 
 import msgspec
 
-from fleet.core.skills import SkillModel
-from fleet.core.world_model import WorldModel
-from fleet.planners.llm.wording import useful_skills
-from keyexpr_schema.goals import Goal
+from fleet.core.model.skills import SkillModel
+from fleet.core.model.world import WorldModel
+from fleet.llm.wording import useful_skills
 from keyexpr_schema.ids import ACTOR_PREFIX, Id
+from keyexpr_schema.payloads.goals import Goal
 
 ACTOR_PATTERN = r"^\?[A-Za-z0-9_-]{1,30}$"
 MAX_ENUMERATED = 100
@@ -33,7 +33,7 @@ class Answer(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class StepAnswer(Answer, frozen=True, kw_only=True):
-    """A task of a flat list: a `keyexpr_schema.plans.Task` less its name, order and duration."""
+    """A task of a flat list: a plan's `Task` less its name, order and duration."""
 
     skill: Id
     args: dict[str, str]

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
-from fleet.core.graph import TaskGraph
-from fleet.core.lifting import Strand, tasks_from
-from fleet.core.skills import Variable
-from fleet.core.world_model import WorldModel
+from fleet.core.model.skills import Variable
+from fleet.core.model.task_graph import TaskGraph
+from fleet.core.model.world import WorldModel
 from fleet.planners.base import PlanningProblem
+from fleet.planners.deordering import Strand, tasks_from
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, StepAnswer, TaskAnswer, actor_of
-from keyexpr_schema.goals import Condition, Goal
 from keyexpr_schema.ids import ACTOR_PREFIX
-from keyexpr_schema.plans import Plan, Task
-from keyexpr_schema.world import Value
+from keyexpr_schema.payloads.goals import Condition, Goal
+from keyexpr_schema.payloads.plans import Plan, Task
+from keyexpr_schema.payloads.world import Value
 
 
 @dataclass(frozen=True)

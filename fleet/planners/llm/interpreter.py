@@ -6,23 +6,23 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from fleet.core.language import Vocabulary
-from fleet.core.skills import SkillModel
+from fleet.core.model.skills import SkillModel
+from fleet.language import Vocabulary
+from fleet.llm.client import ModelCaller
+from fleet.llm.configuration import LlmConfig
+from fleet.llm.conversation import Conversation, GivenUp, Ledger, Rejected
+from fleet.llm.prompts import load_prompts
+from fleet.llm.wording import cleaned, vocabulary_text
 from fleet.planners.llm.answers import Answer, read_answer, schema_of
-from fleet.planners.llm.caller import ModelCaller
-from fleet.planners.llm.config import LlmConfig
-from fleet.planners.llm.conversation import Conversation, GivenUp, Ledger, Rejected
-from fleet.planners.llm.prompts import load_prompts
-from fleet.planners.llm.wording import cleaned, vocabulary_text
-from keyexpr_schema.goals import Condition
 from keyexpr_schema.ids import Id
-from keyexpr_schema.plans import Violation
+from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.plans import Violation
 
 log = logging.getLogger(__name__)
 
 MAX_CONDITIONS = 100
 DERIVED = {"located": "it is known where the object is", "held": "a hand holds the object"}
-"""Relations that follow from others; `keyexpr_schema.goals.Condition` says how."""
+"""Relations that follow from others; `keyexpr_schema.payloads.goals.Condition` says how."""
 
 Stages = tuple[tuple[Condition, ...], ...]
 

@@ -8,20 +8,20 @@ from dataclasses import replace as changed
 
 from msgspec.structs import replace
 
-from fleet.core.skills import SkillModel
-from fleet.core.world_model import WorldModel
+from fleet.core.model.skills import SkillModel
+from fleet.core.model.world import WorldModel
+from fleet.llm.client import ModelCaller
+from fleet.llm.configuration import LlmConfig
+from fleet.llm.conversation import Conversation, GivenUp, Ledger, Rejected
+from fleet.llm.prompts import load_prompts
+from fleet.llm.wording import problem_text, skills_text, useful_skills
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema, read_answer
-from fleet.planners.llm.caller import ModelCaller
-from fleet.planners.llm.config import LlmConfig
-from fleet.planners.llm.conversation import Conversation, GivenUp, Ledger, Rejected
 from fleet.planners.llm.draft import Draft, conditions_of, draft_of, merged, plan_of, world_after
 from fleet.planners.llm.interpreter import LlmInterpreter
-from fleet.planners.llm.prompts import load_prompts
 from fleet.planners.llm.verify import why_not, without_useless
-from fleet.planners.llm.wording import problem_text, skills_text, useful_skills
-from keyexpr_schema.goals import Goal
-from keyexpr_schema.plans import Making, Plan
+from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.plans import Making, Plan
 
 log = logging.getLogger(__name__)
 

@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterable
 
 from msgspec.structs import replace
 
-from fleet.core.binding import least_loaded
-from fleet.core.checker import check_plan
-from fleet.core.graph import TaskGraph
-from fleet.core.schedule import best_schedule
-from fleet.core.skills import Variable
-from fleet.core.world_model import WorldModel
-from keyexpr_schema.plans import Plan, Task, Violation
+from fleet.core.checker.plan_checker import check_plan
+from fleet.core.model.skills import Variable
+from fleet.core.model.task_graph import TaskGraph
+from fleet.core.model.world import WorldModel
+from fleet.core.schedule.actor_constraints import least_loaded
+from fleet.core.schedule.plan_schedule import best_schedule
+from keyexpr_schema.payloads.plans import Plan, Task, Violation
 
 
 def why_not(plan: Plan, world: WorldModel) -> tuple[Violation, ...]:

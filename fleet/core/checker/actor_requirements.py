@@ -1,0 +1,147 @@
+"""What an actor needs of the robot that will be it, and which robots can be it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from fleet.core.model.skills import Action, Variable
+from fleet.core.model.world import WorldModel, known_value, room_left
+from keyexpr_schema.payloads.world import Value
+
+Left = tuple[str, Value]
+"""A relation and its value, as an actor leaves them of its robot."""
+
+
+@dataclass
+class Requirement:
+    """What a robot must bring to be an actor: roles to fill, facts that hold of it at the start."""
+
+    roles: list[tuple[Action, str]] = field(default_factory=list)
+    facts: dict[str, tuple[Value, str]] = field(default_factory=dict)
+    """By relation: the value needed, and the task that needs it first."""
+    valued: dict[Variable, str] = field(default_factory=dict)
+    """Variables whose value at the start must be this robot, and the task that needs it first."""
+    space: int = 0
+    """Room needed in its basket, in objects."""
+    pinned_to: str | None = None
+
+
+class Candidates:
+    """Which robots of the team can be which actors.
+
+    A robot can be an actor if it can play its roles, and if what the actor needs of it holds now or
+    is left so by another actor that the robot can be first: a robot with a full hand can pick once
+    it has put down what it carries. That goes for states such as an empty hand, not for things and
+    places: what one actor picked, another one cannot count on holding. Whether the robot really
+    becomes that other actor, the check of the allocated plan has to say.
+    """
+
+    def __init__(
+        self,
+        requirements: Mapping[str, Requirement],
+        leaves: Mapping[str, frozenset[Left]],
+        world: WorldModel,
+    ) -> None:
+        """`leaves` has for every actor the facts that it leaves of its robot."""
+        self._requirements, self._world = requirements, world
+        alike: dict[object, list[str]] = {}
+        for robot in world.team:
+            spec = world.robots[robot]
+            alike.setdefault((spec.skills, tuple(spec.capabilities.items())), []).append(robot)
+        self._kinds = list(alike.values())
+        self._playable: dict[tuple[object, ...], list[str]] = {}
+        fitting = {actor: self._fitting(each) for actor, each in requirements.items()}
+        unmet = {
+            actor: {robot: list(self._unmet(robot, requirements[actor])) for robot in robots}
+            for actor, robots in fitting.items()
+        }
+        offered: dict[str, set[Left]] = {robot: set() for robot in world.team}
+        for actor, rows in unmet.items():
+            for robot, missing in rows.items():
+                if not missing:
+                    offered[robot] |= {
+                        (relation, value)
+                        for relation, value in leaves.get(actor, frozenset())
+                        if not isinstance(value, str) or world.kind_of(value) is None
+                    }
+        self.able: dict[str, tuple[str, ...]] = {
+            actor: tuple(
+                robot
+                for robot, missing in rows.items()
+                if all(
+                    (relation, requirements[actor].facts[relation][0]) in offered[robot]
+                    for relation in missing
+                )
+            )
+            for actor, rows in unmet.items()
+        }
+
+    def reasons(self, actor: str) -> Iterator[str]:
+        """Why each robot of the team that cannot be the actor cannot."""
+        requirement = self._requirements[actor]
+        for robot in self._world.team:
+            if robot in self.able[actor]:
+                continue
+            if (reason := self._unfit(robot, requirement)) is not None:
+                yield reason
+                continue
+            for relation in self._unmet(robot, requirement):
+                value, task = requirement.facts[relation]
+                has = known_value(Variable(relation, robot), self._world.facts, self._world)
+                told = "unknown" if has is None else has
+                yield f"{task} needs {relation}({robot}) = {value}, and it is {told}"
+                break
+
+    def _fitting(self, requirement: Requirement) -> list[str]:
+        """Robots that could be the actor, if all else were as it needs it."""
+        able = self._able_to_play(requirement)
+        if requirement.pinned_to is not None:
+            able = [requirement.pinned_to] if requirement.pinned_to in able else []
+        if requirement.valued or requirement.space > 0:
+            able = [robot for robot in able if self._unfit(robot, requirement) is None]
+        return able
+
+    def _able_to_play(self, requirement: Requirement) -> list[str]:
+        """Asked once of robots that are alike, for roles that ask the same of them."""
+        key = tuple(self._asks(action, parameter) for action, parameter in requirement.roles)
+        if key not in self._playable:
+            able = {
+                robot
+                for kind in self._kinds
+                if not any(self._world.lacks(kind[0], *role) for role in requirement.roles)
+                for robot in kind
+            }
+            self._playable[key] = [robot for robot in self._world.team if robot in able]
+        return self._playable[key]
+
+    def _asks(self, action: Action, parameter: str) -> tuple[object, ...]:
+        measured = (
+            self._world.measure(need.measure, action.args[need.of])
+            for need in action.skill.needs.get(parameter, ())
+            if need.measure is not None and need.of is not None
+        )
+        return action.skill.name, parameter, *measured
+
+    def _unfit(self, robot: str, requirement: Requirement) -> str | None:
+        """Why the robot could not be the actor whatever had happened before."""
+        if requirement.pinned_to not in (None, robot):
+            return f"the plan wants {requirement.pinned_to} and not {robot}"
+        for action, parameter in requirement.roles:
+            if reason := self._world.lacks(robot, action, parameter):
+                return reason
+        for variable, task in requirement.valued.items():
+            if (has := known_value(variable, self._world.facts, self._world)) != robot:
+                return f"{task} needs {variable} = {robot}, and it is {has}"
+        if requirement.space > 0:
+            room = room_left(robot, self._world.facts, self._world)
+            if room < requirement.space:
+                needed = f"{requirement.space} are needed"
+                return f"{robot}'s basket has room for {room} more and {needed}"
+        return None
+
+    def _unmet(self, robot: str, requirement: Requirement) -> Iterator[str]:
+        """Relations that do not hold of the robot now as the actor needs them."""
+        for relation, (value, _) in requirement.facts.items():
+            if known_value(Variable(relation, robot), self._world.facts, self._world) != value:
+                yield relation

@@ -1,0 +1,207 @@
+"""The flow of a plan: conditions and effects over every order that its graph allows."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+
+from fleet.core.checker.actor_requirements import Requirement
+from fleet.core.model.skills import Action, Literal, Variable
+from fleet.core.model.task_graph import TaskGraph
+from fleet.core.model.world import WorldModel, capacity, condition_holds, known_value
+from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.plans import Plan, Violation
+from keyexpr_schema.payloads.world import Value
+
+
+class PlanFlow:
+    """Conditions and effects over every order that the graph allows."""
+
+    def __init__(
+        self, plan: Plan, world: WorldModel, graph: TaskGraph, actions: Mapping[str, Action]
+    ) -> None:
+        self.violations: list[Violation] = []
+        self.requirements: dict[str, Requirement] = defaultdict(Requirement)
+        self._plan, self._world, self._graph, self._actions = plan, world, graph, actions
+        self._writers: dict[Variable, list[tuple[str, Value]]] = defaultdict(list)
+        for task in graph.order:
+            for literal in actions[task].after:
+                self._writers[literal.variable].append((task, literal.value))
+        self._positions = {
+            thing: rows
+            for thing in world.objects
+            if (rows := self._writers.get(Variable("at", thing)))
+        }
+
+    def check(self) -> None:
+        """Fill `violations` and `requirements`."""
+        self._one_task_at_a_time()
+        for task in self._graph.order:
+            action = self._actions[task]
+            for parameter in action.skill.robot_parameters:
+                self.requirements[action.args[parameter]].roles.append((action, parameter))
+            for literal in action.before:
+                self._check_condition(task, literal)
+            for carrier in action.space_in:
+                self._check_space(task, carrier)
+        final = self._final_facts()
+        for condition in self._plan.conditions:
+            if not condition_holds(final, condition):
+                self.violations.append(
+                    Violation(
+                        code="goal-unmet",
+                        sentence=f"{condition} does not hold when the plan is done",
+                        condition=condition,
+                    )
+                )
+
+    def _one_task_at_a_time(self) -> None:
+        last: dict[str, str] = {}
+        for task in self._graph.order:
+            for robot in self._actions[task].participants:
+                before = last.get(robot)
+                if before is not None and not self._graph.precedes(before, task):
+                    self.violations.append(
+                        Violation(
+                            code="robot-in-two-places",
+                            sentence=f"{before} and {task} both need {robot.removeprefix('?')} "
+                            "and nothing says which comes first",
+                            task=task,
+                        )
+                    )
+                last[robot] = task
+
+    def _check_condition(self, task: str, literal: Literal) -> None:
+        graph, variable = self._graph, literal.variable
+        rows = [row for row in self._writers.get(variable, ()) if row[0] != task]
+        restorers = [w for w, value in rows if value == literal.value and graph.precedes(w, task)]
+        for writer, value in rows:
+            if value == literal.value or graph.precedes(task, writer):
+                continue
+            if not any(graph.precedes(writer, restorer) for restorer in restorers):
+                verb = "makes" if graph.precedes(writer, task) else "may make"
+                self._unmet(
+                    "condition-undone",
+                    task,
+                    literal,
+                    f"{task} needs {literal}, and {writer} {verb} it {value} before",
+                )
+                return
+        if not restorers:
+            self._check_at_start(task, literal)
+
+    def _check_at_start(self, task: str, literal: Literal) -> None:
+        variable = literal.variable
+        if variable.subject.startswith(ACTOR_PREFIX):
+            facts = self.requirements[variable.subject].facts
+            facts.setdefault(variable.relation, (literal.value, task))
+            return
+        has = known_value(variable, self._world.facts, self._world)
+        wanted = literal.value
+        an_actor = isinstance(wanted, str) and wanted.startswith(ACTOR_PREFIX)
+        if an_actor and has in self._world.robots:
+            # Who has it must be the actor: something is taken out of a basket, or back.
+            self.requirements[str(wanted)].valued.setdefault(variable, task)
+        elif has != wanted:
+            told = "that is not known" if has is None else f"it is {has}"
+            self._unmet(
+                "condition-unmet", task, literal, f"{task} needs {literal}, and at the start {told}"
+            )
+
+    def _unmet(self, code: str, task: str, literal: Literal, sentence: str) -> None:
+        subject = literal.variable.subject.removeprefix(ACTOR_PREFIX)
+        value = literal.value
+        if isinstance(value, str):
+            value = value.removeprefix(ACTOR_PREFIX)
+        self.violations.append(
+            Violation(
+                code=code,
+                sentence=sentence,
+                task=task,
+                condition=Condition(
+                    relation=literal.variable.relation, subject=subject, value=value
+                ),
+            )
+        )
+
+    def _check_space(self, task: str, carrier: str) -> None:
+        graph = self._graph
+        initial = 0
+        planned = 0
+        own = {
+            literal.variable.subject
+            for literal in self._actions[task].after
+            if literal.variable.relation == "at" and literal.value == carrier
+        }
+        for thing in self._world.objects:
+            if thing in own:
+                continue
+            rows = self._positions.get(thing, ())
+            if any(
+                value == carrier
+                and writer != task
+                and not graph.precedes(task, writer)
+                and not any(
+                    other != carrier and graph.precedes(writer, w) and graph.precedes(w, task)
+                    for w, other in rows
+                )
+                for writer, value in rows
+            ):
+                planned += 1
+            elif (
+                self._world.value("at", thing) == carrier
+                and self._world.value("holding", carrier) != thing
+                and not any(graph.precedes(writer, task) for writer, _ in rows)
+            ):
+                initial += 1
+        if carrier.startswith(ACTOR_PREFIX):
+            requirement = self.requirements[carrier]
+            freed = sum(self._leaves(variable, task) for variable in requirement.valued)
+            requirement.space = max(requirement.space, planned + 1 - freed)
+        elif initial + planned + 1 > capacity(carrier, self._world):
+            self.violations.append(
+                Violation(
+                    code="no-space",
+                    sentence=f"{task} puts an object into {carrier}'s basket, which takes "
+                    f"{capacity(carrier, self._world)} and may hold {initial + planned} by then",
+                    task=task,
+                )
+            )
+
+    def _leaves(self, variable: Variable, task: str) -> bool:
+        """Whether what an actor has in its basket at the start is out of it before the task."""
+        if variable.relation != "at":
+            return False
+        holder = self._world.value("at", variable.subject)
+        in_hand = self._world.value("holding", str(holder)) == variable.subject
+        rows = self._positions.get(variable.subject, ())
+        return not in_hand and any(self._graph.precedes(writer, task) for writer, _ in rows)
+
+    def _final_facts(self) -> dict[Variable, Value]:
+        """Every variable at the end; unknown where the order of its last writers is open."""
+        final: dict[Variable, Value] = dict(self._world.facts)
+        # What is required of an actor at the start holds of the robot that will be it.
+        for actor, requirement in self.requirements.items():
+            for relation, (value, _) in requirement.facts.items():
+                final[Variable(relation, actor)] = value
+        for variable, rows in self._writers.items():
+            final[variable] = _agreed(
+                [
+                    value
+                    for writer, value in rows
+                    if not any(self._graph.precedes(writer, other) for other, _ in rows)
+                ]
+            )
+        pinned = {ACTOR_PREFIX + actor: robot for actor, robot in self._plan.pins.items()}
+        for variable in self._writers:
+            value = final[variable]
+            if isinstance(value, str) and value in pinned:
+                value = final[variable] = pinned[value]
+            if variable.subject in pinned:
+                final[Variable(variable.relation, pinned[variable.subject])] = value
+        return final
+
+
+def _agreed(values: Sequence[Value]) -> Value:
+    return values[0] if all(value == values[0] for value in values) else None

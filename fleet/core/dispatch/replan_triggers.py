@@ -1,0 +1,107 @@
+"""What comes up that a plan does not provide for: facts against it, finds, new robots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from msgspec.structs import replace
+
+from fleet.core import events
+from fleet.core.handlers.goals import believe
+from fleet.core.model.preconditions import Skills, action_of
+from fleet.core.model.skills import Action, Variable
+from fleet.core.plan_entry import set_book
+from fleet.core.state import OUTSTANDING, PlanBook, State
+from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.plans import PlanState
+from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
+from keyexpr_schema.payloads.world import Fact
+
+
+def fact_told(state: State, event: events.FactTold, skills: Skills) -> State:
+    """Believe the fact: its key holds the latest word. A plan that it contradicts is made again."""
+    fact = event.fact
+    changed = believe(state, fact)
+    if changed is state:
+        return state
+    state = changed
+    for book in state.plans.values():
+        if book.state is PlanState.RUNNING and book.replan_reason is None:
+            reason = _contradiction(book, fact, skills)
+            if reason is not None:
+                state = set_book(state, replace(book, replan_reason=reason))
+    return state
+
+
+def _contradiction(book: PlanBook, fact: Fact, skills: Skills) -> str | None:
+    """Why a fact is against the plan: a task needs it otherwise, and nothing before it changes it.
+
+    What a robot says of the work it is doing is part of that work.
+    """
+    known = Variable(fact.relation, fact.subject)
+    unfinished = {
+        record.task: (record, action)
+        for record in book.current()
+        if record.state not in ENDED_TASKS and (action := action_of(record, skills)) is not None
+    }
+    for record, action in unfinished.values():
+        needed = [literal for literal in action.before if literal.variable == known]
+        if not needed or needed[0].value == fact.value:
+            continue
+        if record.state in OUTSTANDING and fact.source == record.robot:
+            continue
+        if not any(
+            known == literal.variable
+            for before in _before(record.task, unfinished)
+            for literal in unfinished[before][1].after
+        ):
+            return f"{record.task} needs {needed[0]}, and {fact.source} says otherwise"
+    return None
+
+
+def _before(task: str, unfinished: Mapping[str, tuple[TaskRecord, Action]]) -> set[str]:
+    """The unfinished tasks that come before a task."""
+    found: set[str] = set()
+    ahead = [task]
+    while ahead:
+        record = unfinished[ahead.pop()][0]
+        for before in (*record.after, *record.behind):
+            if before in unfinished and before not in found:
+                found.add(before)
+                ahead.append(before)
+    return found
+
+
+def why_replan(state: State, book: PlanBook, skills: Skills) -> str | None:
+    """What has come up that the plan does not provide for."""
+    world = state.world(skills)
+    for thing in book.plan.seeks:
+        where = world.value("at", thing)
+        if where is not None:
+            return f"{thing} was found: it is at {where}"
+    current = list(book.current())
+    if all(record.state is TaskState.SUCCEEDED for record in current):
+        for goal in book.plan.goals:
+            status = state.goal_states.get(goal)
+            if status is None or status.state is GoalState.REACHED:
+                continue
+            unmet = [c for c in status.conditions if not world.holds(c)]
+            if unmet:
+                return f"every task is done, and {unmet[0]} does not hold"
+    return None
+
+
+def new_robots(state: State, book: PlanBook) -> PlanBook | None:
+    """The book with the wish that robots take part that came since the plan was made.
+
+    More of a kind that is there already can share what is left. A new kind may help in ways that
+    the plan knows nothing of, so that everything is planned again.
+    """
+    new = sorted(set(state.team()) - set(book.team))
+    if not book.team or not new or all(r.state is not TaskState.WAITING for r in book.current()):
+        return None
+    reason = f"{' and '.join(new)} can help now"
+    kinds = {state.robots[robot].model for robot in book.team if robot in state.robots}
+    if all(state.robots[robot].model in kinds for robot in new):
+        return replace(book, replan_reason=reason, outside_reason=reason)
+    return replace(book, replan_reason=reason, anew_reason=reason)

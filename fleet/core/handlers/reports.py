@@ -1,0 +1,150 @@
+"""What reports of workers mean for a plan's tasks."""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from fleet.core import events
+from fleet.core.effects import PLANNER_SOURCE
+from fleet.core.handlers.goals import believe, believe_if_newer, mark_goals, without_goal
+from fleet.core.model.durations import learn
+from fleet.core.model.preconditions import Skills, action_of, unmet_before
+from fleet.core.model.skills import Action
+from fleet.core.plan_entry import give_up, open_goals, set_record
+from fleet.core.state import OUTSTANDING, PlanBook, State, put
+from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.tasks import Report, ReportState, TaskRecord, TaskState
+from keyexpr_schema.payloads.world import Fact
+
+MAX_FAILURES = 6
+"""After so many failed tasks a goal is given up, and the plan goes on without it."""
+MAX_ATTEMPTS = 3
+"""Orders given for one task to one robot; each order has the worker's own tries inside."""
+
+
+def report_told(state: State, event: events.ReportTold, skills: Skills) -> State:
+    """Take in what a worker says; a report of an attempt that is not current only brings facts."""
+    report = event.report
+    for fact in report.facts:
+        state = believe_if_newer(state, fact)
+    book = state.plans.get(report.plan)
+    record = book.records.get(report.task) if book else None
+    if (
+        book is None
+        or record is None
+        or record.state not in OUTSTANDING
+        or (report.robot, report.attempt) != (record.robot, record.attempt)
+    ):
+        return state
+    match report.state:
+        case ReportState.STARTED:
+            if record.state is TaskState.RUNNING:
+                return state
+            record = replace(record, state=TaskState.RUNNING, started_s=report.started_s)
+            return set_record(state, book, record)
+        case ReportState.SUCCEEDED:
+            return _succeeded(state, book, record, report, skills)
+        case ReportState.CANCELLED:
+            return set_record(state, book, _ended(record, report, TaskState.CANCELLED))
+        case ReportState.FAILED:
+            return _failed(state, book, record, report)
+        case ReportState.INTERRUPTED:
+            return _interrupted(state, book, record, report, skills)
+        case ReportState.REFUSED:
+            if report.retryable and record.attempt < MAX_ATTEMPTS:
+                return set_record(state, book, _again(record, report))
+            return _failed(state, book, record, report)
+
+
+def _ended(record: TaskRecord, report: Report, to: TaskState) -> TaskRecord:
+    return replace(
+        record,
+        state=to,
+        tries=(*record.tries, *report.tries),
+        reason=report.reason,
+        started_s=record.started_s if report.started_s is None else report.started_s,
+        ended_s=report.ended_s,
+    )
+
+
+def _again(record: TaskRecord, report: Report) -> TaskRecord:
+    return replace(
+        record,
+        state=TaskState.WAITING,
+        tries=(*record.tries, *report.tries),
+        reason=report.reason,
+    )
+
+
+def _succeeded(
+    state: State, book: PlanBook, record: TaskRecord, report: Report, skills: Skills
+) -> State:
+    told = {(fact.relation, fact.subject) for fact in report.facts}
+    action = action_of(record, skills)
+    state = _learned(state, record, report, action)
+    for literal in action.after if action is not None else ():
+        if tuple(literal.variable) not in told:
+            state = believe(
+                state,
+                Fact(
+                    subject=literal.variable.subject,
+                    relation=literal.variable.relation,
+                    value=literal.value,
+                    source=PLANNER_SOURCE,
+                    time_s=report.ended_s or state.time_s,
+                ),
+            )
+    return set_record(state, book, _ended(record, report, TaskState.SUCCEEDED))
+
+
+def _learned(state: State, record: TaskRecord, report: Report, action: Action | None) -> State:
+    """Take the attempt's duration into account, all of its tries included."""
+    spec = state.robots.get(report.robot)
+    if (
+        spec is None
+        or action is None
+        or record.way_s is None
+        or report.started_s is None
+        or report.ended_s is None
+    ):
+        return state
+    took_s = report.ended_s - report.started_s
+    known = learn(state.durations, spec.model, action.skill, took_s, record.way_s, report.ended_s)
+    return state if known is state.durations else replace(state, durations=dict(known))
+
+
+def _failed(state: State, book: PlanBook, record: TaskRecord, report: Report) -> State:
+    record = _ended(record, report, TaskState.FAILED)
+    if book.ended or record.task in book.dropping:
+        return set_record(state, book, record)
+    reason = f"{record.task} ({record.skill}) failed: {report.reason}"
+    book = replace(book, replan_reason=reason)
+    if record.goal is not None and record.goal in book.plan.goals:
+        count = book.failures.get(record.goal, 0) + 1
+        book = replace(book, failures=put(book.failures, record.goal, count))
+        if count >= MAX_FAILURES:
+            told = f"given up after {count} failed tasks; the last: {reason}"
+            if open_goals(state, book) == [record.goal]:
+                book = replace(book, records=put(book.records, record.task, record))
+                return give_up(state, book, told)
+            state = mark_goals(state, (record.goal,), GoalState.FAILED, book.plan.plan, told)
+            book = replace(book, plan=without_goal(state, book.plan, record.goal))
+    return set_record(state, book, record)
+
+
+def _interrupted(
+    state: State, book: PlanBook, record: TaskRecord, report: Report, skills: Skills
+) -> State:
+    """A worker came back in the middle of an attempt: the world decides what it is worth."""
+    if book.ended or record.task in book.dropping:
+        return set_record(state, book, _ended(record, report, TaskState.CANCELLED))
+    action = action_of(record, skills)
+    if action is None:
+        return _failed(state, book, record, report)
+    world = state.world(skills)
+    if all(world.value(*literal.variable) == literal.value for literal in action.after):
+        record = _ended(record, report, TaskState.SUCCEEDED)
+        return set_record(state, book, replace(record, reason="found done after an interruption"))
+    if unmet_before(action, world) is None and record.attempt < MAX_ATTEMPTS:
+        return set_record(state, book, _again(record, report))
+    return _failed(state, book, record, report)

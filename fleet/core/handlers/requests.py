@@ -1,0 +1,263 @@
+"""What people ask of the planner: plans, replans, and control of plans."""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from fleet.core import events
+from fleet.core.handlers.goals import active_plan_of, mark_goals
+from fleet.core.plan_entry import answer, next_task, set_book
+from fleet.core.state import Job, PlanBook, State, put, without
+from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
+from keyexpr_schema.payloads.plans import Plan, PlanState, Task
+from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest
+
+AUTO = "auto-"
+"""How the names of requests begin that nobody made: goals that wait are planned by themselves."""
+
+
+def plan_asked(state: State, event: events.PlanAsked) -> State:
+    """Start to plan for the goals asked for, or say why not."""
+    ask = event.request
+    if (
+        ask.request in state.answers
+        or ask.request in state.previews
+        or any(
+            book.job is not None and book.job.request == ask.request
+            for book in state.plans.values()
+        )
+    ):
+        return state
+    goals = ask.goals or tuple(
+        goal
+        for goal in sorted(state.goals, key=lambda g: (state.goals[g].ordinal, g))
+        if state.goal_states[goal].state is GoalState.WAITING and not active_plan_of(state, goal)
+    )
+    if reason := _why_not_plan(state, ask.plan, goals):
+        return answer(state, ask.request, False, reason)
+    name = ask.plan or _new_plan_name(state)
+    job = Job(
+        job=state.jobs + 1,
+        plan=name,
+        revision=1,
+        goals=goals,
+        strategy=ask.strategy,
+        planner=ask.planner,
+        allocator=ask.allocator,
+        first_task=1,
+        request=ask.request,
+        dry_run=ask.dry_run,
+        partial=ask.request.startswith(AUTO),
+    )
+    if ask.dry_run:
+        return replace(state, jobs=job.job, previews=put(state.previews, ask.request, job))
+    empty = Plan(
+        plan=name,
+        goals=goals,
+        conditions=(),
+        tasks=(),
+        strategy=ask.strategy,
+        made_by=ask.planner,
+        allocator=ask.allocator,
+        autostart=ask.start,
+    )
+    book = PlanBook(
+        plan=empty, state=PlanState.PLANNING, planner=ask.planner, start=ask.start, job=job
+    )
+    return set_book(replace(state, jobs=job.job), book)
+
+
+def _why_not_plan(state: State, plan: str | None, goals: tuple[str, ...]) -> str | None:
+    if not goals:
+        return "there is no goal that waits for a plan; add one first"
+    if plan is not None and (plan in state.plans or plan in state.past_plans):
+        return f"there is a plan {plan} already; choose another name or delete it"
+    for goal in goals:
+        if goal not in state.goals:
+            known = ", ".join(sorted(state.goals)) or "none"
+            return f"there is no goal {goal}; known are {known}"
+        status = state.goal_states[goal]
+        if status.state is GoalState.READING:
+            return f"what goal {goal} means is still being worked out; ask again"
+        if status.state in ENDED_GOALS:
+            return f"goal {goal} is {status.state.value}" + (
+                f": {status.reason}" if status.reason else ""
+            )
+        if other := active_plan_of(state, goal):
+            return f"goal {goal} is already in plan {other}"
+    return None
+
+
+def _new_plan_name(state: State) -> str:
+    number = 1
+    while f"plan-{number}" in state.plans or f"plan-{number}" in state.past_plans:
+        number += 1
+    return f"plan-{number}"
+
+
+def plan_proposed(state: State, event: events.PlanProposed) -> State:
+    """Take a plan that someone put into planning: it is checked and allocated like any other."""
+    plan = event.plan
+    if plan.plan in state.plans or plan.plan in state.past_plans:
+        return state
+    job = Job(
+        job=state.jobs + 1,
+        plan=plan.plan,
+        revision=plan.revision,
+        goals=plan.goals,
+        strategy=plan.strategy,
+        planner="symbolic",
+        allocator=plan.allocator,
+        first_task=1,
+        proposal=plan,
+    )
+    book = PlanBook(plan=plan, state=PlanState.PLANNING, start=plan.autostart, job=job)
+    return set_book(replace(state, jobs=job.job), book)
+
+
+def replan_asked(state: State, event: events.ReplanAsked) -> State:
+    """Plan again from what is known now."""
+    ask = event.request
+    if ask.request in state.answers:
+        return state
+    book = state.plans.get(ask.plan)
+    if book is None:
+        return answer(state, ask.request, False, _no_plan(state, ask.plan))
+    if book.state is not PlanState.RUNNING:
+        sentence = f"plan {ask.plan} is {book.state.value}, not running"
+        return answer(state, ask.request, False, sentence)
+    if book.cancelling:
+        return answer(state, ask.request, False, f"plan {ask.plan} is being cancelled")
+    if ask.goals and (reason := _why_not_plan(state, None, ask.goals)):
+        return answer(state, ask.request, False, reason)
+    goals = tuple(dict.fromkeys([*book.plan.goals, *ask.goals]))
+    # What a person asks for is no sign that the world does not go along: counting begins anew.
+    book = replace(
+        book,
+        plan=replace(book.plan, goals=goals),
+        replan_reason=ask.reason,
+        anew_reason=ask.reason,
+        replans=0,
+    )
+    state = set_book(state, book)
+    return answer(state, ask.request, True, f"plan {ask.plan} is made again", ask.plan)
+
+
+def take_waiting_goals(state: State) -> State:
+    """Goals that wait go into the running plan, or, where none runs, into a new one."""
+    waiting = tuple(
+        goal
+        for goal in sorted(state.goals, key=lambda g: (state.goals[g].ordinal, g))
+        if state.goal_states[goal].state is GoalState.WAITING
+        and state.goal_states[goal].reason is None
+        and active_plan_of(state, goal) is None
+    )
+    if not waiting:
+        return state
+    if any(book.state is PlanState.PLANNING for book in state.plans.values()):
+        return state  # what comes meanwhile goes into the plan that is being made
+    for book in state.plans.values():
+        if book.state is PlanState.RUNNING and not book.cancelling:
+            goals = (*book.plan.goals, *waiting)
+            reason = f"{', '.join(waiting)} came up"
+            book = replace(book, plan=replace(book.plan, goals=goals), replan_reason=reason)
+            return set_book(state, book)
+    request = PlanRequest(request=f"{AUTO}{state.jobs + 1}", goals=waiting)
+    asked = events.PlanAsked(request=request, time_s=state.time_s, wall_time_s=state.wall_time_s)
+    return plan_asked(state, asked)
+
+
+def _no_plan(state: State, plan: str) -> str:
+    return f"there is no plan {plan}; known are {', '.join(sorted(state.plans)) or 'none'}"
+
+
+def control_asked(state: State, event: events.ControlAsked) -> State:
+    """Start, cancel, delete or extend a plan, or say why not."""
+    ask = event.request
+    if ask.request in state.answers or any(
+        book.amendment_request == ask.request for book in state.plans.values()
+    ):
+        return state
+    book = state.plans.get(ask.plan)
+    if book is None:
+        return answer(state, ask.request, False, _no_plan(state, ask.plan))
+    if ask.control is Control.START:
+        if book.state is not PlanState.READY:
+            return answer(
+                state,
+                ask.request,
+                False,
+                f"plan {ask.plan} is {book.state.value}; only a ready plan can be started",
+            )
+        state = set_book(state, replace(book, state=PlanState.RUNNING, start=True))
+        state = mark_goals(state, book.plan.goals, GoalState.RUNNING, ask.plan)
+        return answer(state, ask.request, True, f"plan {ask.plan} is running", ask.plan)
+    if ask.control is Control.APPROVE:
+        if book.state is not PlanState.PROPOSED:
+            sentence = f"plan {ask.plan} is {book.state.value}; only a proposed plan is approved"
+            return answer(state, ask.request, False, sentence)
+        to = PlanState.RUNNING if book.start else PlanState.READY
+        state = set_book(state, replace(book, state=to))
+        if book.start:
+            state = mark_goals(state, book.plan.goals, GoalState.RUNNING, ask.plan)
+        return answer(state, ask.request, True, f"plan {ask.plan} is {to.value}", ask.plan)
+    if ask.control is Control.CANCEL:
+        if book.ended:
+            return answer(state, ask.request, False, f"plan {ask.plan} is {book.state.value}")
+        waiting = book.job.request if book.job is not None else None
+        state = answer(state, waiting, False, f"plan {ask.plan} was cancelled while it was made")
+        state = set_book(state, replace(book, cancelling=True, job=None))
+        return answer(state, ask.request, True, f"plan {ask.plan} is being cancelled", ask.plan)
+    if ask.control is Control.DELETE:
+        if not book.ended and book.state not in (PlanState.READY, PlanState.PROPOSED):
+            return answer(
+                state,
+                ask.request,
+                False,
+                f"plan {ask.plan} is {book.state.value}; cancel it before deleting it",
+            )
+        state = mark_goals(state, book.plan.goals, GoalState.WAITING, None)
+        state = replace(state, plans=without(state.plans, ask.plan))
+        return answer(state, ask.request, True, f"plan {ask.plan} is deleted")
+    return _add_task(state, book, ask)
+
+
+def _add_task(state: State, book: PlanBook, ask: ControlRequest) -> State:
+    if book.state not in (PlanState.READY, PlanState.RUNNING):
+        sentence = f"plan {ask.plan} is {book.state.value}; tasks go to ready or running plans"
+        return answer(state, ask.request, False, sentence)
+    if ask.skill is None:
+        return answer(state, ask.request, False, "the request names no skill for the new task")
+    if book.amendment is not None or book.job is not None:
+        sentence = f"plan {ask.plan} is being changed; add the task when that is done"
+        return answer(state, ask.request, False, sentence)
+    for before in ask.after:
+        if before not in book.records:
+            sentence = (
+                f"the new task cannot wait for {before}: plan {ask.plan} has "
+                f"{', '.join(book.records) or 'no tasks'}"
+            )
+            return answer(state, ask.request, False, sentence)
+    if "robot" in ask.args:
+        sentence = (
+            f"name the robot that does it as the request's robot, not as robot={ask.args['robot']}"
+        )
+        return answer(state, ask.request, False, sentence)
+    number = next_task(book)
+    task = Task(
+        task=f"t{number}",
+        skill=ask.skill,
+        args={"robot": f"{ACTOR_PREFIX}x{number}", **ask.args},
+        actor=f"x{number}",
+        after=ask.after,
+    )
+    pins = put(book.plan.pins, task.actor, ask.robot) if ask.robot else book.plan.pins
+    book = replace(
+        book,
+        plan=replace(book.plan, pins=pins),
+        amendment=task,
+        amendment_request=ask.request,
+        replan_reason=f"task {task.task} is added",
+    )
+    return set_book(state, book)

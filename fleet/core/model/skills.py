@@ -1,0 +1,248 @@
+"""Skill models: what the planner knows of each skill, and ground actions made from them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from fleet.errors import BadSkillFile
+from keyexpr_schema.payloads.world import Value
+
+
+class Variable(NamedTuple):
+    """One state variable, written `relation(subject)`; the subject may be an actor (`?a1`)."""
+
+    relation: str
+    subject: str
+
+    def __str__(self) -> str:
+        return f"{self.relation}({self.subject})"
+
+
+class Literal(NamedTuple):
+    """`variable = value`."""
+
+    variable: Variable
+    value: Value
+
+    def __str__(self) -> str:
+        return f"{self.variable} = {'unknown' if self.value is None else self.value}"
+
+
+class Need(NamedTuple):
+    """A capability that a robot must have; with `measure`, at least as much as `of` measures.
+
+    `mass` is an object's, kg; `height` is that of the highest surface in a place, m.
+    """
+
+    capability: str
+    measure: str | None = None
+    of: str | None = None
+
+
+MEASURES = {"mass": "object", "height": "place"}
+"""What can be measured, and of which type of parameter."""
+
+
+PARAMETER_TYPES = ("robot", "object", "place")
+SPACE = "space"
+"""The one counted condition: `space(carrier)` holds while the carrier's basket has room."""
+
+
+@dataclass(frozen=True)
+class Action:
+    """A skill with its arguments filled in."""
+
+    skill: SkillModel
+    args: Mapping[str, str]
+    before: tuple[Literal, ...]
+    after: tuple[Literal, ...]
+    space_in: tuple[str, ...]
+    """Robots whose baskets must have room for one more object."""
+
+    @property
+    def actor(self) -> str:
+        """The robot (or `?actor`) that does it."""
+        return self.args[self.skill.actor_parameter]
+
+    @cached_property
+    def variables(self) -> frozenset[Variable]:
+        """Every state variable that it reads or writes."""
+        return frozenset(literal.variable for literal in (*self.before, *self.after))
+
+    @cached_property
+    def participants(self) -> tuple[str, ...]:
+        """Every robot that takes part, the actor first."""
+        return tuple(self.args[name] for name in self.skill.robot_parameters)
+
+
+@dataclass(frozen=True)
+class SkillModel:
+    """A typed action: parameters, preconditions, effects, duration, and what its robots need."""
+
+    name: str
+    about: str
+    parameters: Mapping[str, str]
+    needs: Mapping[str, tuple[Need, ...]]
+    before: tuple[tuple[str, str, str | Value], ...]
+    after: tuple[tuple[str, str, str | Value], ...]
+    space_in: tuple[str, ...]
+    duration_s: float
+    travel_to: str | None
+
+    @cached_property
+    def robot_parameters(self) -> tuple[str, ...]:
+        """Parameters that stand for robots, the actor's first."""
+        return tuple(name for name, kind in self.parameters.items() if kind == "robot")
+
+    @property
+    def actor_parameter(self) -> str:
+        """The parameter that stands for the robot that does the task."""
+        return self.robot_parameters[0]
+
+    def ground(self, args: Mapping[str, str]) -> Action:
+        """The action with these arguments; they must name every parameter.
+
+        Raises:
+            KeyError: an argument is missing.
+        """
+
+        def fill(rows: Iterable[tuple[str, str, str | Value]]) -> tuple[Literal, ...]:
+            return tuple(
+                Literal(
+                    Variable(relation, args[subject]),
+                    args[value] if isinstance(value, str) and value in self.parameters else value,
+                )
+                for relation, subject, value in rows
+            )
+
+        return Action(
+            self,
+            dict(args),
+            fill(self.before),
+            fill(self.after),
+            tuple(args[name] for name in self.space_in),
+        )
+
+
+_CONDITION = re.compile(r"^\s*(\w+)\(\s*(\w+)\s*\)\s*=\s*([\w.+-]+)\s*$")
+_SPACE = re.compile(rf"^\s*{SPACE}\(\s*(\w+)\s*\)\s*$")
+_NEED = re.compile(r"^\s*(\w+)(?:\s*>=\s*(\w+)\(\s*(\w+)\s*\))?\s*$")
+_FIELDS = frozenset({"about", "parameters", "needs", "before", "after", "duration_s", "travel_to"})
+
+
+def skills_from_data(data: Any, where: str) -> dict[str, SkillModel]:
+    """Skill models from the parsed YAML of a skill file; `where` names the file in errors.
+
+    Raises:
+        BadSkillFile: one sentence that names skill and field, and says what would be right.
+    """
+    if not isinstance(data, dict) or not isinstance(data.get("skills"), dict):
+        raise BadSkillFile(f"{where}: there must be a mapping `skills:` of skill names to models")
+    return {
+        str(name): _skill(str(name), model, f"{where}: skill {name}")
+        for name, model in data["skills"].items()
+    }
+
+
+def _skill(name: str, model: Any, where: str) -> SkillModel:
+    if not isinstance(model, dict):
+        raise BadSkillFile(f"{where} must be a mapping with {', '.join(sorted(_FIELDS))}")
+    if unknown := set(model) - _FIELDS:
+        raise BadSkillFile(
+            f"{where} has no field {', '.join(sorted(map(str, unknown)))}; "
+            f"its fields are {', '.join(sorted(_FIELDS))}"
+        )
+    parameters = model.get("parameters")
+    if not isinstance(parameters, dict) or not all(
+        kind in PARAMETER_TYPES for kind in parameters.values()
+    ):
+        raise BadSkillFile(
+            f"{where}: `parameters` must map names to one of {', '.join(PARAMETER_TYPES)}"
+        )
+    if "robot" not in parameters.values():
+        raise BadSkillFile(f"{where} needs a parameter of type robot: the one that does it")
+    duration = model.get("duration_s", 10.0)
+    if isinstance(duration, bool) or not isinstance(duration, int | float) or duration < 0:
+        raise BadSkillFile(f"{where}: `duration_s` must be a number of seconds, not {duration!r}")
+    travel_to = model.get("travel_to")
+    if travel_to is not None and parameters.get(travel_to) != "place":
+        raise BadSkillFile(f"{where}: `travel_to` must name a parameter of type place")
+    before_text = _list_of_text(model.get("before", []), f"{where}: `before`")
+    space_in = tuple(m[1] for text in before_text if (m := _SPACE.match(text)))
+    for subject in space_in:
+        if parameters.get(subject) != "robot":
+            raise BadSkillFile(f"{where}: {SPACE}({subject}) must name a parameter of type robot")
+    after_text = _list_of_text(model.get("after", []), f"{where}: `after`")
+    return SkillModel(
+        name=name,
+        about=str(model.get("about", "")),
+        parameters=parameters,
+        needs=_needs(model.get("needs", {}), parameters, where),
+        before=tuple(
+            _condition(text, parameters, f"{where}: `before`")
+            for text in before_text
+            if not _SPACE.match(text)
+        ),
+        after=tuple(_condition(text, parameters, f"{where}: `after`") for text in after_text),
+        space_in=space_in,
+        duration_s=float(duration),
+        travel_to=travel_to,
+    )
+
+
+def _list_of_text(value: Any, where: str) -> list[str]:
+    if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+        raise BadSkillFile(f"{where} must be a list of conditions such as `at(robot) = place`")
+    return value
+
+
+def _condition(
+    text: str, parameters: Mapping[str, str], where: str
+) -> tuple[str, str, str | Value]:
+    match = _CONDITION.match(text)
+    if match is None:
+        raise BadSkillFile(f"{where}: {text!r} must look like `at(robot) = place`")
+    relation, subject, value = match.groups()
+    if subject not in parameters:
+        raise BadSkillFile(
+            f"{where}: {text!r} speaks of {subject!r}, which is not a parameter; "
+            f"those are {', '.join(parameters)}"
+        )
+    return relation, subject, value if value in parameters else parse_value(value)
+
+
+def parse_value(text: str) -> Value:
+    """`true`, `false`, `unknown` and numbers as such; anything else is a word."""
+    named: dict[str, Value] = {"true": True, "false": False, "unknown": None}
+    if text in named:
+        return named[text]
+    try:
+        return float(text) if "." in text else int(text)
+    except ValueError:
+        return text
+
+
+def _needs(data: Any, parameters: Mapping[str, str], where: str) -> dict[str, tuple[Need, ...]]:
+    if not isinstance(data, dict):
+        raise BadSkillFile(f"{where}: `needs` must map robot parameters to lists of capabilities")
+    needs: dict[str, tuple[Need, ...]] = {}
+    for parameter, rows in data.items():
+        if parameters.get(parameter) != "robot":
+            raise BadSkillFile(f"{where}: `needs` names {parameter!r}, which is no robot parameter")
+        found = []
+        for text in _list_of_text(rows, f"{where}: `needs`"):
+            match = _NEED.match(text)
+            if match is None or (
+                match[2] and parameters.get(match[3], "nothing") != MEASURES.get(match[2])
+            ):
+                raise BadSkillFile(
+                    f"{where}: {text!r} must look like `drive`, `grip >= mass(object)` or "
+                    "`reach >= height(place)`"
+                )
+            found.append(Need(match[1], match[2], match[3]))
+        needs[parameter] = tuple(found)
+    return needs

@@ -1,0 +1,223 @@
+"""What the planner believes of the world at one moment: a frozen snapshot, and questions to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from fleet.core.model.durations import pace, work_s
+from fleet.core.model.skills import Action, Literal, SkillModel, Variable
+from keyexpr_schema.payloads.durations import Durations
+from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.world import NOTHING, Fact, Object, Place, Value
+
+TRAVEL_SPEED_M_S = 0.5
+"""Speed assumed for a robot whose spec gives none, m/s; a slow walk indoors."""
+UNITS = {"mass": "kg", "height": "m"}
+LOCATED = "located"
+HELD = "held"
+"""Relations of goal conditions that are derived from `at` and `holding`."""
+UNKNOWN_TRAVEL_M = 5.0
+"""Distance assumed where the map has none, m; about one room to the next."""
+
+
+@dataclass(frozen=True)
+class WorldModel:
+    """Places, objects and robots that exist, and the facts believed of them.
+
+    `available` names the robots whose workers are connected now; only those get work. `durations`
+    are those learned, by type of robot; skill models and top speeds hold for the others.
+    """
+
+    skills: Mapping[str, SkillModel]
+    places: Mapping[str, Place] = field(default_factory=dict)
+    objects: Mapping[str, Object] = field(default_factory=dict)
+    robots: Mapping[str, RobotSpec] = field(default_factory=dict)
+    available: frozenset[str] = frozenset()
+    facts: Mapping[Variable, Value] = field(default_factory=dict)
+    durations: Mapping[str, Durations] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        skills: Mapping[str, SkillModel],
+        places: Iterable[Place],
+        objects: Iterable[Object],
+        robots: Iterable[RobotSpec],
+        facts: Iterable[Fact],
+        available: Iterable[str] | None = None,
+        durations: Mapping[str, Durations] | None = None,
+    ) -> WorldModel:
+        """A model from payloads; without `available` every robot is taken to be connected."""
+        specs = {spec.robot: spec for spec in robots}
+        return cls(
+            skills=skills,
+            places={place.place: place for place in places},
+            objects={thing.object: thing for thing in objects},
+            robots=specs,
+            available=frozenset(specs if available is None else available),
+            facts={Variable(fact.relation, fact.subject): fact.value for fact in facts},
+            durations=durations or {},
+        )
+
+    def value(self, relation: str, subject: str) -> Value:
+        """The believed value of a variable; `None` is unknown."""
+        return self.facts.get(Variable(relation, subject))
+
+    def kind_of(self, name: str) -> str | None:
+        """`robot`, `object` or `place`, or `None` for a name that stands for nothing."""
+        if name in self.robots:
+            return "robot"
+        if name in self.objects:
+            return "object"
+        return "place" if name in self.places else None
+
+    @cached_property
+    def team(self) -> tuple[str, ...]:
+        """The robots that can get work now, in a fixed order."""
+        return tuple(sorted(self.available & self.robots.keys()))
+
+    def capability(self, robot: str, name: str) -> float | None:
+        """The parameter of a robot's capability, or `None` if it lacks it."""
+        return self.robots[robot].capabilities.get(name)
+
+    def lacks(self, robot: str, action: Action, parameter: str) -> str | None:
+        """Why `robot` cannot stand for a robot `parameter` of the action, or `None` if it can."""
+        spec = self.robots[robot]
+        skill = action.skill
+        if parameter == skill.actor_parameter and skill.name not in spec.skills:
+            return f"{robot} does not have the skill {skill.name}"
+        for need in skill.needs.get(parameter, ()):
+            has = spec.capabilities.get(need.capability)
+            if has is None:
+                return f"{robot} has no {need.capability}"
+            if need.measure is not None and need.of is not None:
+                thing = action.args[need.of]
+                least = self.measure(need.measure, thing)
+                if least > has:
+                    return (
+                        f"{thing} has a {need.measure} of {least:g} {UNITS[need.measure]}, "
+                        f"{robot}'s {need.capability} is {has:g} {UNITS[need.measure]}"
+                    )
+        return None
+
+    def measure(self, what: str, name: str) -> float:
+        """The mass of an object [kg], or the height of the highest surface in a place [m]."""
+        if what == "mass":
+            return self.objects[name].mass_kg if name in self.objects else 0.0
+        place = self.places.get(name)
+        return max((surface.z_m for surface in place.surfaces), default=0.0) if place else 0.0
+
+    def work_s(self, robot: str, skill: SkillModel) -> float:
+        """Seconds that a skill takes a robot, without the way to it."""
+        return work_s(self._durations(robot), skill)
+
+    def travel_s(self, robot: str, origin: Value, target: str) -> float:
+        """Seconds that a robot takes from one place to another; from anywhere if unknown."""
+        return pace(self._durations(robot)) * self.way_s(robot, origin, target)
+
+    def way_s(self, robot: str, origin: Value, target: str) -> float:
+        """Seconds from one place to another at a robot's top speed; from anywhere if unknown."""
+        speed = self.capability(robot, "drive") or TRAVEL_SPEED_M_S
+        place = self.places.get(target)
+        if place is None or origin == target:
+            return 0.0
+        if isinstance(origin, str) and origin in self.places:
+            metres = self.places[origin].travel_m.get(target, UNKNOWN_TRAVEL_M)
+        else:
+            known = place.travel_m.values()
+            metres = sum(known) / len(known) if known else UNKNOWN_TRAVEL_M
+        return metres / speed
+
+    def _durations(self, robot: str) -> Durations | None:
+        spec = self.robots.get(robot)
+        return None if spec is None else self.durations.get(spec.model)
+
+    def holds(self, condition: Condition) -> bool:
+        """Whether the facts say that the condition holds."""
+        return condition_holds(self.facts, condition)
+
+    def with_facts(self, facts: Mapping[Variable, Value]) -> WorldModel:
+        """The same world with some facts changed."""
+        return WorldModel(
+            self.skills,
+            self.places,
+            self.objects,
+            self.robots,
+            self.available,
+            {**self.facts, **facts},
+            self.durations,
+        )
+
+
+def condition_holds(facts: Mapping[Variable, Value], condition: Condition) -> bool:
+    """Whether a condition holds in `facts`.
+
+    `at(object) = place` also holds while the object lies in the basket of a robot that is there:
+    it is at a robot, and that robot's hand does not hold it. `located(object) = true` and
+    `held(object) = true` are read off `at` and `holding`. Of several subjects one is enough.
+    """
+    return any(
+        _holds_for(facts, condition.relation, subject, condition.value)
+        for subject in condition.subjects
+    )
+
+
+def _holds_for(facts: Mapping[Variable, Value], relation: str, subject: str, wanted: Value) -> bool:
+    where = facts.get(Variable("at", subject))
+    if relation == LOCATED:
+        return (where is not None) is wanted
+    if relation == HELD:
+        held = isinstance(where, str) and facts.get(Variable("holding", where)) == subject
+        return held is wanted
+    value = facts.get(Variable(relation, subject))
+    if value is None:
+        return False
+    if value == wanted:
+        return True
+    return (
+        relation == "at"
+        and isinstance(value, str)
+        and facts.get(Variable("at", value)) == wanted
+        and facts.get(Variable("holding", value), NOTHING) != subject
+    )
+
+
+def known_value(variable: Variable, facts: Mapping[Variable, Value], world: WorldModel) -> Value:
+    """The value of a variable in `facts`; the hand of a robot that has none holds nothing."""
+    value = facts.get(variable)
+    if value is None and variable.relation == "holding" and variable.subject in world.robots:
+        return None if world.capability(variable.subject, "grip") else NOTHING
+    return value
+
+
+def first_unmet(
+    action: Action, facts: Mapping[Variable, Value], world: WorldModel
+) -> Literal | None:
+    """The first precondition of the action that does not hold in `facts`; baskets aside."""
+    for literal in action.before:
+        if known_value(literal.variable, facts, world) != literal.value:
+            return literal
+    return None
+
+
+def room_left(robot: str, facts: Mapping[Variable, Value], world: WorldModel) -> int:
+    """How many more objects go into a robot's basket."""
+    return capacity(robot, world) - len(in_basket(robot, facts, world))
+
+
+def capacity(robot: str, world: WorldModel) -> int:
+    """How many objects a robot's basket takes."""
+    return int(world.capability(robot, "basket") or 0)
+
+
+def in_basket(robot: str, facts: Mapping[Variable, Value], world: WorldModel) -> list[str]:
+    """The objects in a robot's basket: at the robot, and not in its hand."""
+    return [
+        thing
+        for thing in world.objects
+        if facts.get(Variable("at", thing)) == robot
+        and facts.get(Variable("holding", robot)) != thing
+    ]

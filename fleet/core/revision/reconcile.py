@@ -1,0 +1,195 @@
+"""From one revision of a plan to the next: what goes on, what is dropped, what is new.
+
+A new plan starts from the facts as they are, so it says again what is already under way. A task of
+it that is the same call by the same robot as one under way *is* that one and goes on undisturbed;
+one that equals a waiting task keeps its name. What the new plan does not want is dropped: waiting
+tasks at once, tasks under way by cancelling their orders, and nothing that touches the same facts
+starts before that is confirmed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from msgspec.structs import replace
+
+from fleet.core import events
+from fleet.core.model.skills import SkillModel
+from fleet.core.model.task_graph import TaskGraph
+from fleet.core.model.world import WorldModel
+from fleet.core.state import OUTSTANDING, PlanBook
+from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.payloads.plans import Plan, PlanChange, Task
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+
+Call = tuple[str, tuple[tuple[str, str], ...]]
+"""A skill and its arguments, with robots in place of actors: what makes two tasks the same."""
+
+
+@dataclass(frozen=True)
+class Revision:
+    """A plan as it is taken over: with the names of tasks that go on, and every record."""
+
+    plan: Plan
+    records: dict[str, TaskRecord]
+    dropping: tuple[str, ...]
+    change: PlanChange
+
+
+def revise(
+    book: PlanBook, event: events.PlanMade, world: WorldModel, started: frozenset[str]
+) -> Revision:
+    """Take over the plan in `event`; `started` were under way when it was being made."""
+    calls = {task.task: _call(task, event.allocation) for task in event.plan.tasks}
+    going_on, skipped = _going_on(book, event, calls, world, started)
+    names = {**_same_waiting(book, calls, going_on), **going_on}
+    plan = _renamed(event.plan, names)
+    records = dict(book.records)
+    for old, task in zip(event.plan.tasks, plan.tasks, strict=True):
+        records[task.task] = _record(
+            plan, task, calls[old.task], records.get(task.task), event, old.task, names
+        )
+        if old.task in skipped:
+            records[task.task] = replace(
+                records[task.task], state=TaskState.SUCCEEDED, reason="it is so already"
+            )
+    wanted = {task.task for task in plan.tasks}
+    dropping: list[str] = []
+    dropped = 0
+    for name, record in book.records.items():
+        if name in wanted:
+            continue
+        if record.state in OUTSTANDING:
+            dropping.append(name)
+            dropped += 1
+        elif record.state is TaskState.WAITING:
+            dropped += 1
+            records[name] = replace(record, state=TaskState.CANCELLED, reason="not in the new plan")
+    # A task that is so already may have been waiting: then it is kept, and counts once.
+    added = sum(task.task not in {*names, *skipped} for task in event.plan.tasks)
+    change = PlanChange(kept=len(names), dropped=dropped, added=added)
+    return Revision(plan, records, tuple(dropping), change)
+
+
+def _call(task: Task, allocation: Mapping[str, str]) -> Call:
+    return task.skill, tuple(
+        sorted(
+            (name, allocation[value.removeprefix(ACTOR_PREFIX)])
+            if value.startswith(ACTOR_PREFIX)
+            else (name, value)
+            for name, value in task.args.items()
+        )
+    )
+
+
+def _call_of(record: TaskRecord) -> Call:
+    return record.skill, tuple(sorted(record.args.items()))
+
+
+def _going_on(
+    book: PlanBook,
+    event: events.PlanMade,
+    calls: Mapping[str, Call],
+    world: WorldModel,
+    started: frozenset[str],
+) -> tuple[dict[str, str], frozenset[str]]:
+    """New tasks that are already under way, with their old names; and what need not be done again.
+
+    A task under way can only be one of the new plan if all that comes before it there holds
+    already; those tasks are skipped.
+    """
+    graph = TaskGraph(
+        {
+            task.task: {*task.after, *event.extra_after.get(task.task, ())}
+            for task in event.plan.tasks
+        }
+    )
+    under_way = {
+        _call_of(record): name
+        for name, record in book.records.items()
+        if name in started and record.state in {*OUTSTANDING, TaskState.SUCCEEDED}
+    }
+    names: dict[str, str] = {}
+    skipped: set[str] = set()
+    for task in graph.order:
+        old = under_way.get(calls[task])
+        if old is None or old in names.values():
+            continue
+        before = {name for name in graph.order if graph.precedes(name, task)} - names.keys()
+        if all(_holds_already(calls[name], world) for name in before):
+            names[task] = old
+            skipped |= before
+    return names, frozenset(skipped)
+
+
+def _holds_already(call: Call, world: WorldModel) -> bool:
+    skill: SkillModel | None = world.skills.get(call[0])
+    return skill is not None and all(
+        world.value(*literal.variable) == literal.value
+        for literal in skill.ground(dict(call[1])).after
+    )
+
+
+def _same_waiting(
+    book: PlanBook, calls: Mapping[str, Call], going_on: Mapping[str, str]
+) -> dict[str, str]:
+    waiting: dict[Call, list[str]] = {}
+    for name, record in book.records.items():
+        if record.state is TaskState.WAITING:
+            waiting.setdefault(_call_of(record), []).append(name)
+    names: dict[str, str] = {}
+    for task, call in calls.items():
+        if task not in going_on and waiting.get(call):
+            names[task] = waiting[call].pop(0)
+    return names
+
+
+def _renamed(plan: Plan, names: Mapping[str, str]) -> Plan:
+    return replace(
+        plan,
+        tasks=tuple(
+            replace(
+                task,
+                task=names.get(task.task, task.task),
+                after=tuple(names.get(before, before) for before in task.after),
+            )
+            for task in plan.tasks
+        ),
+    )
+
+
+def _record(
+    plan: Plan,
+    task: Task,
+    call: Call,
+    known: TaskRecord | None,
+    event: events.PlanMade,
+    made_as: str,
+    names: Mapping[str, str],
+) -> TaskRecord:
+    record = TaskRecord(
+        plan=plan.plan,
+        revision=plan.revision,
+        task=task.task,
+        skill=task.skill,
+        args=dict(call[1]),
+        actor=task.actor,
+        robot=event.allocation[task.actor],
+        state=TaskState.WAITING,
+        after=task.after,
+        behind=tuple(names.get(b, b) for b in event.extra_after.get(made_as, ())),
+        goal=task.goal,
+        duration_s=event.durations_s.get(made_as, task.duration_s),
+    )
+    if known is None:
+        return record
+    # An order that stands keeps the revision it was given in, or its worker would refuse it.
+    return replace(
+        known,
+        revision=known.revision if known.state in OUTSTANDING else plan.revision,
+        actor=record.actor,
+        after=record.after,
+        behind=record.behind,
+        goal=record.goal,
+    )

@@ -1,0 +1,77 @@
+"""What is left of a plan, as a plan: for another allocation, or one more task, without planning."""
+
+from __future__ import annotations
+
+from collections.abc import Set
+
+from msgspec.structs import replace
+
+from fleet.core.model.task_graph import TaskGraph
+from fleet.core.plan_entry import next_task
+from fleet.core.state import OUTSTANDING, PlanBook
+from keyexpr_schema.payloads.plans import Plan, Task
+from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
+
+HAD_ROBOT = OUTSTANDING | {TaskState.SUCCEEDED}
+
+
+def remaining_plan(
+    book: PlanBook, revision: int, gone: Set[str] = frozenset(), addition: Task | None = None
+) -> Plan:
+    """The tasks that have not ended and are for goals that the plan still has, under new names, and
+    `addition` under its own.
+
+    Actors whose robot is `gone` begin anew, with everything that they had done. The others stay
+    with their robot once they have begun. Whether that is still a plan, the checker has to say.
+    """
+    anew = {actor for actor, robot in book.allocation.items() if robot in gone}
+    todo = [
+        task
+        for task in book.plan.tasks
+        if (task.goal is None or task.goal in book.plan.goals)
+        and (
+            task.actor in anew
+            or task.task not in book.records
+            or book.records[task.task].state not in ENDED_TASKS
+        )
+    ]
+    first = next_task(book) + (addition is not None)
+    names = {task.task: f"t{first + number}" for number, task in enumerate(todo)}
+    if addition is not None:
+        todo.append(addition)
+        names[addition.task] = addition.task
+    tasks = tuple(
+        replace(
+            task,
+            task=names[task.task],
+            after=tuple(names[before] for before in task.after if before in names),
+        )
+        for task in todo
+    )
+    actors = {task.actor for task in tasks}
+    begun = {actor: robot for actor, robot in begun_actors(book, gone).items() if actor in actors}
+    return replace(book.plan, revision=revision, tasks=tasks, pins={**begun, **book.plan.pins})
+
+
+def begun_actors(book: PlanBook, gone: Set[str] = frozenset()) -> dict[str, str]:
+    """The actors of the plan that robots, other than those `gone`, have begun to be."""
+    return {
+        record.actor: record.robot
+        for record in book.records.values()
+        if record.state in HAD_ROBOT
+        and record.robot is not None
+        and record.robot not in gone
+        and book.allocation.get(record.actor) == record.robot
+    }
+
+
+def actors_in_order(book: PlanBook) -> tuple[str, ...]:
+    """The plan's actors by when their first task would start, if all went as predicted."""
+    current = {record.task: record for record in book.current()}
+    graph = TaskGraph({task: {*r.after, *r.behind} & current.keys() for task, r in current.items()})
+    start_s: dict[str, float] = {}
+    spans = graph.earliest({task: record.duration_s for task, record in current.items()})
+    for task, (begin_s, _) in spans.items():
+        actor = current[task].actor
+        start_s[actor] = min(begin_s, start_s.get(actor, begin_s))
+    return tuple(sorted(start_s, key=start_s.__getitem__))

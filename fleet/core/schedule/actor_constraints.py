@@ -1,0 +1,100 @@
+"""Which actors cannot be the same robot, and a quick binding of actors to robots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from fleet.core.checker.plan_checker import CheckedPlan
+from fleet.core.model.world import WorldModel
+from fleet.core.schedule.actor_order import carried_at_end
+from fleet.core.schedule.plan_schedule import actors_of
+from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.payloads.plans import Plan, Violation
+
+Pair = tuple[str, str]
+
+
+def actors_apart(plan: Plan, checked: CheckedPlan) -> frozenset[Pair]:
+    """Pairs of actors that must be different robots, each pair in order of name.
+
+    Those that meet in one task; and those that both still have a load when the plan is done: a
+    robot on its way to a second delivery would carry the first one off.
+    """
+    apart: set[Pair] = set()
+    for action in checked.actions.values():
+        actors = sorted(name.removeprefix(ACTOR_PREFIX) for name in action.participants)
+        apart.update((a, b) for i, a in enumerate(actors) for b in actors[i + 1 :])
+    loaded = sorted(set(carried_at_end(checked).values()))
+    pins = plan.pins
+    apart.update(
+        (a, b)
+        for i, a in enumerate(loaded)
+        for b in loaded[i + 1 :]
+        # Two that must be the same robot cannot be kept apart; the checker of the allocated plan
+        # sees whether one load is carried off with the other.
+        if a not in pins or pins[a] != pins.get(b)
+    )
+    return frozenset(apart)
+
+
+def able_robots(plan: Plan, checked: CheckedPlan) -> dict[str, tuple[str, ...]]:
+    """The robots of the team that can be each actor, in the order of the plan's actors."""
+    return {actor: checked.able[actor] for actor in actors_of(plan)}
+
+
+def tasks_nobody_can_do(
+    plan: Plan, checked: CheckedPlan, world: WorldModel
+) -> tuple[Violation, ...]:
+    """Tasks with a part that no connected robot can take, each with what is lacking.
+
+    `checked` must have actions: the plan's form is right.
+    """
+    found = []
+    for task in plan.tasks:
+        action = checked.actions[task.task]
+        for parameter in action.skill.robot_parameters:
+            lacks = [world.lacks(robot, action, parameter) for robot in world.team]
+            if all(lacks):
+                told = "; ".join(dict.fromkeys(map(str, lacks))) or "no robot is connected"
+                part = "" if parameter == action.skill.actor_parameter else f" (as its {parameter})"
+                found.append(
+                    Violation(
+                        code="no-robot",
+                        sentence=f"no robot can do task {task.task}, {task.skill}{part}: {told}",
+                        task=task.task,
+                    )
+                )
+    return tuple(found)
+
+
+def task_counts(plan: Plan) -> dict[str, int]:
+    """The number of tasks of each actor."""
+    counts = dict.fromkeys(actors_of(plan), 0)
+    for task in plan.tasks:
+        counts[task.actor] += 1
+    return counts
+
+
+def least_loaded(plan: Plan, checked: CheckedPlan, world: WorldModel) -> Mapping[str, str] | None:
+    """Each actor in turn to the able robot with the fewest tasks so far; `None` if one is left.
+
+    Actors with the fewest choices come first.
+    """
+    able = able_robots(plan, checked)
+    apart = actors_apart(plan, checked)
+    counts = task_counts(plan)
+    load = dict.fromkeys(world.team, 0)
+    allocation: dict[str, str] = {}
+    for actor in sorted(able, key=lambda name: len(able[name])):
+        taken = {
+            allocation.get(two if one == actor else one)
+            for one, two in apart
+            if actor in (one, two)
+        }
+        free = [robot for robot in able[actor] if robot not in taken]
+        if not free:
+            return None
+        robot = min(free, key=lambda name: load[name])
+        allocation[actor] = robot
+        load[robot] += counts[actor]
+    return allocation

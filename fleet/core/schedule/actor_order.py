@@ -1,0 +1,47 @@
+"""Which of a robot's actors must come first, and which last."""
+
+from __future__ import annotations
+
+from fleet.core.checker.plan_checker import CheckedPlan
+from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.payloads.world import Value
+
+
+def carried_at_end(checked: CheckedPlan) -> dict[str, str]:
+    """Objects that the plan leaves with an actor, in its basket or hand, and which actor.
+
+    Such actors come last: their robot would carry the object off.
+    """
+    holder: dict[str, Value] = {}
+    for task in checked.graph.order if checked.graph else ():
+        for literal in checked.actions[task].after:
+            if literal.variable.relation == "at":
+                holder[literal.variable.subject] = literal.value
+    return {
+        thing: value.removeprefix(ACTOR_PREFIX)
+        for thing, value in holder.items()
+        if isinstance(value, str) and value.startswith(ACTOR_PREFIX)
+    }
+
+
+def first_actors(checked: CheckedPlan) -> frozenset[str]:
+    """Actors that need their robot as it is now, and as some other actor would not leave it."""
+    last = {ACTOR_PREFIX + actor for actor in carried_at_end(checked).values()}
+    leaves: dict[str, dict[str, Value]] = {}
+    for task in checked.graph.order if checked.graph else ():
+        for variable, value in checked.actions[task].after:
+            leaves.setdefault(variable.subject, {})[variable.relation] = value
+    left: dict[str, set[Value]] = {}
+    for subject, rows in leaves.items():
+        if subject not in last:
+            for relation, value in rows.items():
+                left.setdefault(relation, set()).add(value)
+    return frozenset(
+        name.removeprefix(ACTOR_PREFIX)
+        for name, requirement in checked.requirements.items()
+        if name.startswith(ACTOR_PREFIX)
+        and any(
+            left.get(relation, set()) - {value}
+            for relation, (value, _) in requirement.facts.items()
+        )
+    )

@@ -1,0 +1,92 @@
+"""Facts that statements claim, checked against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fleet.errors import NotUnderstood
+from fleet.language.clauses import Clauses
+from fleet.language.refusals import one_of
+from fleet.language.subjects import Subject
+from fleet.language.vocabulary import Vocabulary
+from keyexpr_schema.payloads.world import NOTHING, Value
+
+
+class Claims(Clauses):
+    """Collects facts; a later one may not contradict an earlier one."""
+
+    def __init__(self, text: str, words: Vocabulary) -> None:
+        super().__init__(text, words, "a fact")
+        self.facts: dict[tuple[str, str], Value] = {}
+
+    def fact(self, relation: str, subject: str, value: Value) -> None:
+        """Keep a fact.
+
+        Raises:
+            NotUnderstood: the text said something else of it.
+        """
+        before = self.facts.setdefault((relation, subject), value)
+        if before != value:
+            shown = ["nobody knows where" if v is None else str(v) for v in (before, value)]
+            raise NotUnderstood(
+                f"it says two things of {relation}({subject}): {' and '.join(shown)}"
+            )
+
+    def put(
+        self, things: Sequence[Subject], target: str | None, surface: str | None = None
+    ) -> None:
+        """These are at the target, on a surface there if one is named."""
+        if self.cursor.word() == "or":
+            raise self.cursor.refusal("")
+        mentions = [self.subjects.settle(thing) for thing in things]
+        for mention in mentions:
+            if mention.open:
+                raise NotUnderstood(
+                    f"{self.cursor.said(self.began)!r} does not say which of "
+                    f"{one_of(mention.subjects)}: name it"
+                )
+            if mention.sort == "robot" and target not in self.words.places:
+                raise NotUnderstood("a robot is at a place, not on a robot: name the place")
+            for name in mention.subjects:
+                self.fact("at", name, target)
+                if surface is not None and mention.sort == "object":
+                    self.fact("on", name, surface)
+        self.subjects.remember(mentions)
+
+    def lost(self, things: Sequence[Subject]) -> None:
+        """Nobody knows where these are."""
+        mentions = [self.subjects.settle(thing) for thing in things]
+        for mention in mentions:
+            if mention.open:
+                raise NotUnderstood(f"it does not say which of {one_of(mention.subjects)}: name it")
+            for name in mention.subjects:
+                self.fact("at", name, None)
+        self.subjects.remember(mentions)
+
+    def holding(
+        self, robots: Sequence[Subject], held: Sequence[Subject] | None, in_hand: bool = True
+    ) -> None:
+        """What a robot has in its hand (`None`: nothing) or on it."""
+        names = [name for robot in robots for name in self.subjects.settle(robot).subjects]
+        objects = [n for thing in held or () for n in self.subjects.settle(thing).subjects]
+        opened = any(self.subjects.settle(s).open for s in (*robots, *(held or ())))
+        if opened or (held is not None and (len(names) != 1 or (in_hand and len(objects) != 1))):
+            raise NotUnderstood(
+                f"{self.cursor.said(self.began)!r}: one hand holds one thing; say who holds what"
+            )
+        for name in names:
+            if in_hand:
+                self.fact("holding", name, objects[0] if objects else NOTHING)
+            for thing in objects:
+                self.fact("at", thing, name)
+
+    def looked_around(self, places: Sequence[str], value: bool) -> None:
+        """Somebody looked around in these places, or nobody did."""
+        if not value and len(places) > 1:
+            raise NotUnderstood(
+                f"{self.cursor.said(self.began)!r} could mean all or some of them: "
+                "say it of one place at a time"
+            )
+        self.cursor.take("yet")
+        for place in places:
+            self.fact("searched", place, value)

@@ -1,0 +1,250 @@
+"""Sentences that ask for something: with a verb in front, or with a subject and "should"."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fleet.errors import NotUnderstood
+from fleet.language.clauses import Clauses
+from fleet.language.locations import PLACES
+from fleet.language.mentions import Noun
+from fleet.language.refusals import suggestion
+from fleet.language.subjects import THINGS, Subject
+from fleet.language.tokens import words_in
+from fleet.language.verbs import (
+    BASE_VERBS,
+    EXAMPLE,
+    FINITE,
+    IMPERATIVES,
+    PARTICIPLES,
+    Doing,
+    longest,
+    verb_next,
+)
+from fleet.language.vocabulary import Vocabulary
+from fleet.language.wordlists import CLOSERS, HOME, LOCATED, MODALS, OPENERS, STANDING
+
+_QUESTIONS = frozenset(words_in("is are was were does did has what who why how which whose"))
+
+
+class Sentences(Clauses):
+    """Clauses with who shall do it, or what shall be so."""
+
+    def __init__(self, text: str, words: Vocabulary) -> None:
+        super().__init__(text, words)
+        self.told: list[Subject] = []  # whom the sentence speaks to: "HSR, go … and …"
+        self.elliptic = ""  # "move": "and the book to the kitchen" may follow; "be": "… is in …"
+
+    def polite(self) -> bool:
+        """Go past words of politeness; never past a name."""
+        cursor, start = self.cursor, self.cursor.at
+        opener = cursor.next_of(OPENERS) or cursor.next_of(CLOSERS)
+        if opener is None:
+            return False
+        end = cursor.lexicon.exact(cursor.tokens, start, (*THINGS, "place", "surface"))[0]
+        if end > start or verb_next(cursor):
+            return False
+        cursor.at += len(opener)
+        return True
+
+    # --- verbs -----------------------------------------------------------------------------------
+    def imperative(self) -> None:
+        """`bring …`, `go to …`: a verb comes next."""
+        cursor = self.cursor
+        verb = longest(cursor, IMPERATIVES)
+        assert verb is not None
+        cursor.at += len(verb)
+        self.verb, doing = verb[0], IMPERATIVES[verb]
+        if Doing.GO in doing and verb_next(cursor) and not cursor.next_of(HOME):
+            return self.imperative()  # "go get", "come find"
+        return self.do(doing, self.told or None)
+
+    def do(self, doing: frozenset[Doing], who: Sequence[Subject] | None) -> None:
+        """What follows a verb; `who` is named before it, if anybody is."""
+        self.elliptic = "move" if doing & {Doing.MOVE, Doing.GO, Doing.GIVE} else ""
+        if Doing.GO in doing and (Doing.MOVE not in doing or self._whereto_next()):
+            return self.go(who)
+        if Doing.PATROL in doing and any(not self._any_robot(s) for s in who or ()):
+            self._check_robots(who or ())
+            return self.patrol(who or ())
+        if who is not None:
+            self._check_who(who)
+        if Doing.MOVE in doing:
+            return self.move(fetch=Doing.FETCH in doing, tidy=Doing.TIDY in doing)
+        if Doing.GIVE in doing:
+            return self.move(give=True)
+        if Doing.TIDY in doing:
+            return self.tidy()
+        if Doing.FIND in doing:
+            return self.find()
+        if Doing.PICK in doing:
+            return self.pick()
+        return self.search()
+
+    def _whereto_next(self) -> bool:
+        cursor, start = self.cursor, self.cursor.at
+        found = cursor.preposition() is not None or cursor.word() in ("back", "there")
+        cursor.at = start
+        return found or bool(cursor.next_of(HOME))
+
+    @staticmethod
+    def _any_robot(subject: Subject) -> bool:
+        return isinstance(subject, Noun) and subject.generic and subject.count is None
+
+    def _check_robots(self, who: Sequence[Subject]) -> None:
+        if any(subject.sort != "robot" for subject in who):
+            raise NotUnderstood(f"{self.cursor.said(self.began)!r}: only robots do something")
+
+    def _check_who(self, who: Sequence[Subject]) -> None:
+        self._check_robots(who)
+        for subject in who:
+            names = subject.names if isinstance(subject, Noun) else subject.subjects
+            if not self._any_robot(subject) and len(self.words.robots) > 1:
+                raise NotUnderstood(
+                    f"{' and '.join(names)} cannot be told to do it: a goal says what must hold, "
+                    "and the allocator finds who does it; leave the name out"
+                )
+
+    # --- sentences with a subject -----------------------------------------------------------------
+    def there_should_be(self) -> None:
+        """`there should be NP in PLACE`, after "there"."""
+        cursor = self.cursor
+        if not (cursor.take_of(MODALS) and cursor.take("be")) and not cursor.take_word(
+            ("is", "are")
+        ):
+            raise self.no_clause()
+        things = self.subjects.read("an object", THINGS)
+        self._to_be(things)
+
+    def declarative(
+        self, *, states: bool = False, wanted: bool = False, told: bool = False
+    ) -> None:
+        """`NP should be …`, `NP, go to …`, and `NP to …` after another clause.
+
+        `states`: "make sure that" came before; `wanted`: "I need"; `told`: "let", "tell".
+        """
+        cursor, start = self.cursor, self.cursor.at
+        self.told = []
+        sorts = THINGS if self.nouns.starts(THINGS) or cursor.word() in ("it", "them") else PLACES
+        who = self.subjects.read("an object or a robot" if sorts == THINGS else "a place", sorts)
+        robots = all(s.sort == "robot" for s in who)
+        comma = robots and self.cursor.take(",")
+        while comma and self.polite():
+            pass
+        modal = bool(cursor.take_of(MODALS)) or told
+        infinitive = (wanted or told or states) and cursor.take("to")
+        if (infinitive or wanted) and cursor.take("be"):
+            modal = True
+        elif cursor.take_word(STANDING):
+            if not (modal or states or self.elliptic == "be"):
+                raise NotUnderstood(
+                    f"{self.cursor.line!r} states a fact; a goal says what should be: "
+                    '"the cup should be in the hallway"'
+                )
+            cursor.take("been")
+        elif cursor.take("have", "been") or cursor.take("has", "been"):
+            modal = True
+        elif cursor.take_word(("belongs", "belong")):
+            return self._belongs(who)
+        elif robots and (verb := longest(cursor, FINITE)):
+            cursor.at += len(verb)
+            self.told = [s for s in who if not (isinstance(s, Noun) and s.generic)]
+            return self.do(FINITE[verb], who)
+        elif not (wanted or self.elliptic) or comma or modal:
+            raise self.no_clause(start)
+        return self._to_be(who)
+
+    def _to_be(self, who: Sequence[Subject]) -> None:
+        """What follows "should be": a place, or what should have been done."""
+        cursor = self.cursor
+        self.elliptic = "be"
+        done = self._done()
+        if done & {Doing.FIND, Doing.PICK, Doing.SEARCH} and not done & {Doing.MOVE}:
+            self.elliptic = ""
+            relation = next(
+                name
+                for doing, name in (
+                    (Doing.FIND, "located"),
+                    (Doing.PICK, "held"),
+                    (Doing.SEARCH, "searched"),
+                )
+                if doing in done
+            )
+            return self._has_been(who, relation)
+        if any(s.sort in PLACES for s in who):
+            shown = cursor.said(self.began)
+            raise NotUnderstood(
+                f"{shown!r} is one place too many for one thing; if one is to come after the "
+                'other, say "then"'
+                if self.moved
+                else f"{shown!r} is a place, and places stay where they are: {EXAMPLE}"
+            )
+        parts, home = self.parts()
+        return self.to_target(who, self.where(parts, each=True), home or Doing.TIDY in done)
+
+    def _belongs(self, who: Sequence[Subject]) -> None:
+        """`NP belongs in PLACE`, after the verb."""
+        cursor = self.cursor
+        self.elliptic = "be"
+        if any(s.sort in PLACES for s in who):
+            raise NotUnderstood(f"{cursor.said(self.began)!r}: places stay where they are")
+        parts, home = self.parts()
+        where = self.where(parts)
+        if where.target_sort == "robot" or where.source is not None:
+            raise NotUnderstood(
+                f"{cursor.said(self.began)!r} does not say in which place it belongs: {EXAMPLE}"
+            )
+        return self.to_target(who, where, home)
+
+    def _done(self) -> frozenset[Doing]:
+        """The participle that comes next, past words such as "located" and "now"."""
+        cursor = self.cursor
+        while True:
+            verb = longest(cursor, PARTICIPLES)
+            start = cursor.at
+            if verb is not None:
+                cursor.at += len(verb)
+                doing = PARTICIPLES[verb]
+                if not doing & {Doing.FIND} or self._ends():
+                    return doing
+                cursor.at = start
+            if not cursor.take_of(LOCATED):
+                return frozenset()
+
+    def _ends(self) -> bool:
+        return self.cursor.at_border() or self.cursor.word() == "and"
+
+    def _has_been(self, who: Sequence[Subject], relation: str) -> None:
+        mentions = [self.subjects.settle(self.subjects.movable(s)) for s in who]
+        wanted = PLACES if relation == "searched" else ("object",)
+        for mention in mentions:
+            if mention.sort not in wanted:
+                raise NotUnderstood(
+                    f"{self.cursor.said(self.began)!r}: {relation} is said of "
+                    f"{'places' if relation == 'searched' else 'objects'} only"
+                )
+            self.draft.add(relation, mention, True)
+        if relation != "searched":
+            self.subjects.remember(mentions)
+
+    # --- refusals --------------------------------------------------------------------------------
+    def no_clause(self, start: int | None = None) -> NotUnderstood:
+        """What comes next is nothing that a goal could say."""
+        cursor = self.cursor
+        here = cursor.at
+        first = here if start is None else start
+        cursor.at = here
+        special = cursor.refusal("")
+        cursor.at = first
+        if cursor.word() == "another" or cursor.word(1) == "other":
+            self.nouns.noun("an object", THINGS)  # says itself what is wrong with it
+            cursor.at = first
+        shown = cursor.said(*cursor.phrase())
+        if shown and shown.split()[0].casefold() in _QUESTIONS:
+            return NotUnderstood(
+                f"{self.cursor.line!r} is a question; a goal says what should hold: {EXAMPLE}"
+            )
+        hint = suggestion(shown.split()[0], BASE_VERBS) if shown and start is None else ""
+        if str(special):
+            return special
+        return NotUnderstood(f"{shown!r} is not understood as a goal{hint}: {EXAMPLE}")

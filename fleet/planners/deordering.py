@@ -1,0 +1,98 @@
+"""From a sequence of actions of certain robots to a DAG of tasks of actors."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fleet.core.model.skills import Action, Variable
+from fleet.core.model.task_graph import TaskGraph
+from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.payloads.plans import Task
+
+
+@dataclass(frozen=True)
+class Strand:
+    """Consecutive actions for one goal; each robot in it becomes an actor of its own.
+
+    `named` are robots that the goal itself speaks of: their actors are pinned to them.
+    """
+
+    goal: str
+    actions: tuple[Action, ...]
+    named: frozenset[str] = frozenset()
+
+
+def tasks_from(
+    strands: Sequence[Strand], first_task: int = 1, one_actor_each: bool = False
+) -> tuple[tuple[Task, ...], dict[str, str]]:
+    """Tasks that do what the strands do, with only the order that matters, and pinned actors.
+
+    A task waits for the last one before it that wrote what it reads, for those that read what it
+    overwrites, and for its robots' earlier tasks in the same strand (deordering by causal links).
+    Each robot becomes a new actor in every strand, or with `one_actor_each` one in all of them.
+    """
+    rows: list[tuple[str, str, Action]] = []
+    pins: dict[str, str] = {}
+    actor_count = 0
+    actors: dict[str, str] = {}
+    for strand in strands:
+        if not one_actor_each:
+            actors = {}
+        for action in strand.actions:
+            args = dict(action.args)
+            for parameter in action.skill.robot_parameters:
+                robot = args[parameter]
+                if robot not in actors:
+                    actor_count += 1
+                    # Names stay unique over the revisions of a plan, as the task numbers do.
+                    revision = f"{first_task}-" if first_task > 1 else ""
+                    actors[robot] = f"a{revision}{actor_count}"
+                    if robot in strand.named:
+                        pins[actors[robot]] = robot
+                args[parameter] = ACTOR_PREFIX + actors[robot]
+            lifted = action.skill.ground(args)
+            rows.append((f"t{first_task + len(rows)}", strand.goal, lifted))
+    after = _dependencies([(name, action) for name, _, action in rows])
+    reduced = TaskGraph(after).reduced()
+    tasks = tuple(
+        Task(
+            task=name,
+            skill=action.skill.name,
+            args=dict(action.args),
+            actor=action.actor.removeprefix(ACTOR_PREFIX),
+            after=reduced[name],
+            goal=goal,
+            duration_s=action.skill.duration_s,
+        )
+        for name, goal, action in rows
+    )
+    return tasks, pins
+
+
+def _dependencies(rows: Sequence[tuple[str, Action]]) -> dict[str, set[str]]:
+    after: dict[str, set[str]] = {}
+    writer: dict[Variable, str] = {}
+    readers: dict[Variable, set[str]] = defaultdict(set)
+    last: dict[str, str] = {}
+    for name, action in rows:
+        befores: set[str] = set()
+        for literal in action.before:
+            if literal.variable in writer:
+                befores.add(writer[literal.variable])
+        for literal in action.after:
+            befores |= readers[literal.variable]
+            if literal.variable in writer:
+                befores.add(writer[literal.variable])
+        for robot in action.participants:
+            if robot in last:
+                befores.add(last[robot])
+            last[robot] = name
+        for literal in action.before:
+            readers[literal.variable].add(name)
+        for literal in action.after:
+            writer[literal.variable] = name
+            readers[literal.variable] = set()
+        after[name] = befores - {name}
+    return after

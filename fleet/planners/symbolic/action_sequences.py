@@ -1,0 +1,252 @@
+"""Strands: sequences of actions that make one condition true, or that look for what it needs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass
+
+from msgspec.structs import replace
+
+from fleet.core.handlers.goals import SEARCHED
+from fleet.core.model.skills import Action, Variable
+from fleet.core.model.world import HELD, WorldModel
+from fleet.core.schedule.plan_schedule import predicted_duration_s
+from fleet.planners.base import PlanningProblem
+from fleet.planners.deordering import Strand
+from fleet.planners.symbolic.search import Facts, Found, cheapest, ground_actions, within_reach
+from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.world import NOTHING, Value
+
+ALTERNATIVES = 4
+"""Different strands sought for each condition."""
+UNLOADING_S = 30.0
+"""What it counts for, in seconds, that an object ends in a basket and not on a table: somebody
+still has to take it out, which is about one more task for a hand."""
+MAX_OBJECTS = 8
+"""Objects looked at as possible tools where an aim cannot be reached without one."""
+REUSE_CHARGE_S = 200.0
+"""What an action costs more for each strand that already uses it; more than any task takes."""
+
+
+@dataclass(frozen=True)
+class Aim:
+    """One condition of one goal."""
+
+    goal: str
+    condition: Condition
+
+    def subjects(self) -> list[Condition]:
+        """The condition for each of those for whom it may hold."""
+        return [
+            replace(self.condition, subject=subject, any_of=())
+            for subject in self.condition.subjects
+        ]
+
+
+@dataclass(frozen=True)
+class Options:
+    """Strands to choose one of, the cheapest first, and the facts after that one."""
+
+    strands: tuple[Strand, ...]
+    facts: Facts
+
+
+@dataclass(frozen=True)
+class Exploration:
+    """Strands that are all needed to find one of `seeks`, and what they make true."""
+
+    strands: tuple[Strand, ...]
+    conditions: tuple[Condition, ...]
+    seeks: tuple[str, ...]
+
+
+def aims_in_order(problem: PlanningProblem) -> list[Aim]:
+    """Conditions still to be reached: first those whose object a hand holds already, last those
+    that leave an object in a hand.
+    """
+    world = problem.world
+    held = {world.value("holding", robot) for robot in world.team}
+    aims = [
+        Aim(goal.goal, condition)
+        for goal in sorted(problem.goals, key=lambda g: (-g.priority, g.ordinal, g.goal))
+        for condition in goal.conditions
+        if not world.holds(condition)
+    ]
+    return sorted(
+        aims,
+        key=lambda aim: (
+            aim.condition.relation == HELD,
+            held.isdisjoint(aim.condition.subjects),
+        ),
+    )
+
+
+def options_for(
+    aim: Aim, facts: Facts, world: WorldModel, settled: frozenset[str] = frozenset()
+) -> Options | None:
+    """Different strands for an aim, or `None` where there is none.
+
+    Where a robot stands is left open at the start, so that every actor begins with the way to its
+    work, whatever its robot does before; `settled` robots are taken to be where `facts` say.
+    """
+    found = [
+        (result, condition)
+        for condition in aim.subjects()
+        for result in _different(condition, facts, world, settled)
+    ]
+    if not found:
+        return None
+    found.sort(key=lambda pair: pair[0].cost_s + _unloading_s(pair[0], pair[1], world))
+    strands: dict[object, Strand] = {}
+    for result, condition in found:
+        # What rides in a basket already rides with a certain robot.
+        rides_with = world.value("at", condition.subject)
+        spoken_of = (condition.subject, condition.value, rides_with)
+        named = frozenset(robot for robot in world.robots if robot in spoken_of)
+        content = tuple(_signature(action) for action in result.actions)
+        strands.setdefault(content, Strand(aim.goal, result.actions, named))
+    return Options(tuple(strands.values())[:ALTERNATIVES], found[0][0].facts)
+
+
+def _unloading_s(found: Found, condition: Condition, world: WorldModel) -> float:
+    """The charge for an object that ends in a basket."""
+    where = found.facts.get(Variable("at", condition.subject))
+    wanted = where == condition.value or condition.relation == HELD
+    return 0.0 if wanted or where not in world.robots else UNLOADING_S
+
+
+def _different(
+    condition: Condition, facts: Facts, world: WorldModel, settled: frozenset[str]
+) -> list[Found]:
+    """The cheapest sequence, and others made different by charging for what was used before."""
+    subject = condition.subject
+    robots = _representatives({subject, condition.value}, subject, facts, world)
+    start: Facts = dict(facts)
+    for robot in world.robots.keys() - settled:
+        start[Variable("at", robot)] = None
+    held = {
+        value
+        for robot in robots
+        if isinstance(value := facts.get(Variable("holding", robot)), str) and value != NOTHING
+    }
+    objects = sorted(held | ({subject} & world.objects.keys()))
+    results = _cheapest_few(condition, robots, objects, start, facts, world)
+    if results or not _needs_a_tool(condition, world):
+        return results
+    # Something else may be needed for it, such as a tool.
+    known = [thing for thing in world.objects if facts.get(Variable("at", thing)) is not None]
+    wider = sorted({*objects, *known[:MAX_OBJECTS]})
+    return _cheapest_few(condition, robots, wider, start, facts, world)
+
+
+def _needs_a_tool(condition: Condition, world: WorldModel) -> bool:
+    """Whether a skill for it takes more objects than the one that the condition is about."""
+    own = condition.subject in world.objects
+    return any(
+        list(skill.parameters.values()).count("object") > own
+        for skill in world.skills.values()
+        if any(row[0] == condition.relation for row in skill.after)
+    )
+
+
+def _cheapest_few(
+    condition: Condition,
+    robots: Sequence[str],
+    objects: Sequence[str],
+    start: Facts,
+    facts: Facts,
+    world: WorldModel,
+) -> list[Found]:
+    grounded = ground_actions(world, robots, objects, condition)
+    actions = within_reach(grounded, start, condition, world)
+    if not actions:
+        return []  # nothing that these objects are good for makes it true
+    used: dict[tuple[str, tuple[str, ...]], int] = {}
+
+    seconds: dict[tuple[int, Value], float] = {}
+    """By number of the action and where its robot comes from; charges change between searches."""
+    numbers = {id(action): number for number, action in enumerate(actions)}
+    stands = [Variable("at", action.actor) for action in actions]
+
+    def cost_s(action: Action, now: Mapping[Variable, Value]) -> float:
+        number = numbers[id(action)]
+        where = now.get(stands[number]) or facts.get(stands[number])
+        cost = seconds.get((number, where))
+        if cost is None:
+            cost = predicted_duration_s(action, where, action.actor, world)
+            cost += REUSE_CHARGE_S * used.get(_signature(action), 0)
+            seconds[number, where] = cost
+        return cost
+
+    results: list[Found] = []
+    for _ in range(ALTERNATIVES):
+        found = cheapest(actions, start, condition, world, cost_s)
+        if found is None:
+            break
+        results.append(_with_true_cost(found, world, facts))
+        for action in found.actions:
+            used[_signature(action)] = used.get(_signature(action), 0) + 1
+        seconds.clear()
+    return results
+
+
+def _with_true_cost(found: Found, world: WorldModel, facts: Facts) -> Found:
+    """The same sequence with its true cost [s], without what was charged to make it different."""
+    where: dict[str, Value] = {robot: facts.get(Variable("at", robot)) for robot in world.robots}
+    seconds = 0.0
+    for action in found.actions:
+        seconds += predicted_duration_s(action, where.get(action.actor), action.actor, world)
+        for literal in action.after:
+            if literal.variable == Variable("at", action.actor):
+                where[action.actor] = literal.value
+    return Found(found.actions, seconds, found.facts)
+
+
+def _signature(action: Action) -> tuple[str, tuple[str, ...]]:
+    return action.skill.name, tuple(action.args.values())
+
+
+def _representatives(named: Set[Value], subject: str, facts: Facts, world: WorldModel) -> list[str]:
+    """One robot of each kind that is interchangeable now, and those that are spoken of."""
+    kinds: dict[object, str] = {}
+    for robot in world.team:
+        spec = world.robots[robot]
+        kind = (
+            spec.skills,
+            tuple(sorted(spec.capabilities.items())),
+            facts.get(Variable("holding", robot)),
+            robot if robot in named or facts.get(Variable("at", subject)) == robot else None,
+        )
+        kinds.setdefault(kind, robot)
+    return sorted(kinds.values())
+
+
+def exploration_for(aims: Sequence[Aim], problem: PlanningProblem) -> Exploration | None:
+    """Looking around in every place where nobody has looked yet, for all that the aims lack.
+
+    `None` where nothing is left to look for, or nobody can look.
+    """
+    world = problem.world
+    seeks = tuple(
+        dict.fromkeys(
+            subject
+            for aim in aims
+            for subject in aim.condition.subjects
+            if subject in world.objects and world.value("at", subject) is None
+        )
+    )
+    if not seeks:
+        return None
+    facts: Facts = dict(world.facts)
+    strands: list[Strand] = []
+    conditions: list[Condition] = []
+    for place in world.places:
+        if place in problem.searched:
+            continue
+        facts[Variable(SEARCHED, place)] = False
+        condition = Condition(relation=SEARCHED, subject=place, value=True)
+        options = options_for(Aim(aims[0].goal, condition), facts, world)
+        if options is not None:
+            strands.append(options.strands[0])
+            conditions.append(condition)
+    return Exploration(tuple(strands), tuple(conditions), seeks) if strands else None

@@ -1,0 +1,33 @@
+"""What an allocator is told besides plan and world: who is busy, what matters, who did what."""
+
+from __future__ import annotations
+
+from fleet.allocators.base import Circumstances
+from fleet.core.dispatch.delays import behind_s
+from fleet.core.state import Job, State
+
+
+def circumstances_of(job: Job, state: State, busy: frozenset[str]) -> Circumstances:
+    """The circumstances of a planning job, in seconds from now; actors in `busy` are under way."""
+    goals = [state.goals[goal] for goal in job.goals if goal in state.goals]
+    return Circumstances(
+        ready_s={
+            robot: wait_s for robot in state.robots if (wait_s := _busy_s(job, state, robot)) > 0.0
+        },
+        priority={goal.goal: goal.priority for goal in goals if goal.priority},
+        due_s={goal.goal: goal.due_s - state.time_s for goal in goals if goal.due_s is not None},
+        home={actor: robot for actor, robot in job.home.items() if robot in state.robots},
+        sequence=job.sequence,
+        under_way=busy | frozenset(job.begun),
+    )
+
+
+def _busy_s(job: Job, state: State, robot: str) -> float:
+    """How long the robot is taken, s; work of the job's own plan is in the new plan once more."""
+    late_s = behind_s(state, robot)
+    for plan, book in state.plans.items():
+        for record in book.outstanding():
+            if record.robot == robot and plan != job.plan:
+                begun_s = state.time_s if record.started_s is None else record.started_s
+                return late_s + max(0.0, begun_s + record.duration_s - state.time_s)
+    return late_s

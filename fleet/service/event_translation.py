@@ -1,0 +1,93 @@
+"""From changes on keys to events of the core."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from fleet.core import events
+from fleet.core.events import Event
+from fleet.core.state import State
+from keyexpr_schema.key import Key
+from keyexpr_schema.keyspace import (
+    CONTROL_REQUEST,
+    FACT,
+    GOAL_SPEC,
+    OBJECT,
+    PLACE,
+    PLAN_REQUEST,
+    PLAN_SPEC,
+    REPLAN_REQUEST,
+    REPORT,
+    ROBOT_SPEC,
+    STATEMENT,
+)
+from keyexpr_schema.transport.watch import Change
+
+At = Mapping[str, Any]
+"""`time_s` and `wall_time_s` of an event."""
+
+_PUT: dict[str, Callable[[Any, At], Event]] = {
+    GOAL_SPEC.name: lambda v, at: events.GoalTold(goal=v, **at),
+    FACT.name: lambda v, at: events.FactTold(fact=v, **at),
+    STATEMENT.name: lambda v, at: events.StatementTold(statement=v, **at),
+    PLACE.name: lambda v, at: events.PlaceTold(place=v, **at),
+    OBJECT.name: lambda v, at: events.ObjectTold(object=v, **at),
+    ROBOT_SPEC.name: lambda v, at: events.RobotTold(spec=v, **at),
+    REPORT.name: lambda v, at: events.ReportTold(report=v, **at),
+    PLAN_REQUEST.name: lambda v, at: events.PlanAsked(request=v, **at),
+    REPLAN_REQUEST.name: lambda v, at: events.ReplanAsked(request=v, **at),
+    CONTROL_REQUEST.name: lambda v, at: events.ControlAsked(request=v, **at),
+    PLAN_SPEC.name: lambda v, at: events.PlanProposed(plan=v, **at),
+}
+_DELETED: dict[str, Callable[[Any, At], Event]] = {
+    GOAL_SPEC.name: lambda a, at: events.GoalForgotten(goal=a.goal, **at),
+    FACT.name: lambda a, at: events.FactForgotten(subject=a.subject, relation=a.relation, **at),
+    STATEMENT.name: lambda a, at: events.StatementForgotten(statement=a.statement, **at),
+    PLACE.name: lambda a, at: events.PlaceForgotten(place=a.place, **at),
+    OBJECT.name: lambda a, at: events.ObjectForgotten(object=a.object, **at),
+    ROBOT_SPEC.name: lambda a, at: events.RobotForgotten(robot=a.robot, **at),
+}
+
+WATCHED: tuple[Key[Any, Any], ...] = (
+    PLACE,
+    OBJECT,
+    ROBOT_SPEC,
+    STATEMENT,
+    FACT,
+    GOAL_SPEC,
+    REPORT,
+    PLAN_SPEC,
+    PLAN_REQUEST,
+    REPLAN_REQUEST,
+    CONTROL_REQUEST,
+)
+"""Keys the planner listens to; names come before the sentences that use them."""
+
+
+def event_of(change: Change[Any, Any], at: At) -> Event | None:
+    """The event that a change means, or `None` if it means nothing to the planner.
+
+    A payload that speaks of another address than its own key's is ignored: keys are the truth.
+    """
+    if change.value is None:
+        make = _DELETED.get(change.key.name)
+        return make(change.address, at) if make else None
+    for field in change.address.__struct_fields__:
+        if getattr(change.value, field, None) != getattr(change.address, field):
+            return None
+    return _PUT[change.key.name](change.value, at)
+
+
+def missed_deletions(state: State, seen: set[str], at: At) -> list[Event]:
+    """Events for what the state knows and a complete listing (`seen`, key expressions) lacks."""
+    known: list[tuple[Key[Any, Any], Any]] = [
+        *((GOAL_SPEC, GOAL_SPEC.address(goal)) for goal in state.goals),
+        *((STATEMENT, STATEMENT.address(name)) for name in state.statements),
+        *((PLACE, PLACE.address(place)) for place in state.places),
+        *((OBJECT, OBJECT.address(thing)) for thing in state.objects),
+        *((ROBOT_SPEC, ROBOT_SPEC.address(robot)) for robot in state.robots),
+    ]
+    return [
+        _DELETED[key.name](address, at) for key, address in known if key.build(address) not in seen
+    ]

@@ -1,0 +1,92 @@
+"""Payloads about goals."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from keyexpr_schema.ids import Id
+from keyexpr_schema.key import Address, Payload
+from keyexpr_schema.payloads.world import Value
+
+
+class GoalAddress(Address, frozen=True):
+    """One goal."""
+
+    goal: str
+
+
+class Condition(Payload, frozen=True, kw_only=True):
+    """`relation(subject) = value` must hold, e.g. `at(cup_1) = hallway`.
+
+    A goal `at(object) = place` also holds when the object lies in the basket of a robot that is
+    at the place; it does not while a hand holds the object. Two relations are derived from others:
+    `located(object) = true` holds when it is known where the object is, `held(object) = true` when
+    a hand holds it. With `any_of`, it is enough that the condition holds for one of those subjects
+    (`subject` is then the first of them): "a cup", "some robot".
+    """
+
+    relation: Id
+    subject: Id
+    value: Value
+    any_of: tuple[Id, ...] = ()
+
+    @property
+    def subjects(self) -> tuple[str, ...]:
+        """Whom the condition may hold for."""
+        return self.any_of or (self.subject,)
+
+    def __str__(self) -> str:
+        value = "unknown" if self.value is None else self.value
+        return f"{self.relation}({' or '.join(self.subjects)}) = {value}"
+
+
+class Goal(Payload, frozen=True, kw_only=True):
+    """A sentence, and the facts that must hold when it is done.
+
+    With no `conditions` the planner reads them out of `text`. `due_s` is when it should be done, on
+    the fleet's clock [s]; plans are made so that goals are as little late as can be.
+    """
+
+    goal: Id
+    text: str
+    conditions: tuple[Condition, ...] = ()
+    priority: int = 0
+    ordinal: int = 0
+    """Order in which goals were given; ties in priority go to the lower one."""
+    due_s: float | None = None
+
+
+class GoalState(str, Enum):
+    """Where a goal stands."""
+
+    READING = "reading"
+    """A language model works out what the sentence means."""
+    WAITING = "waiting"
+    PLANNED = "planned"
+    RUNNING = "running"
+    REACHED = "reached"
+    FAILED = "failed"
+    REJECTED = "rejected"
+
+
+ENDED_GOALS = frozenset({GoalState.REACHED, GoalState.FAILED, GoalState.REJECTED})
+
+
+class GoalStatus(Payload, frozen=True, kw_only=True):
+    """What the planner says of a goal. `reason` is a sentence where it failed or was rejected.
+
+    A goal that says "first …, then …" has several `stages`, reached one after the other;
+    `conditions` are those of the stage that it is at, `stage` counts from 0. `note` is a sentence
+    about words of the goal that are no part of what must hold: remarks that ask for nothing, and
+    what it takes for granted against what is believed.
+    """
+
+    goal: Id
+    state: GoalState
+    conditions: tuple[Condition, ...] = ()
+    stages: tuple[tuple[Condition, ...], ...] = ()
+    stage: int = 0
+    plan: Id | None = None
+    reason: str | None = None
+    note: str | None = None
+    time_s: float = 0.0

@@ -1,0 +1,89 @@
+"""What a robot's driver can be told to do, and what it says back; the same for every embodiment.
+
+Metres and radians in the world frame (x east, y north, z up); seconds on the fleet's clock
+(simulated time in a simulation).
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from keyexpr_schema.ids import Id
+from keyexpr_schema.key import Payload
+from keyexpr_schema.payloads.robots import PoseMRad
+
+PointM = tuple[float, float, float]
+
+
+class MotionKind(str, Enum):
+    """What a robot's driver can be told to do.
+
+    go_to             drive to a free spot inside `place`
+    look              look around from here; the outcome lists what was seen
+    approach          drive to where the hand reaches `point_m` (a robot without a hand: next to it)
+    grasp             close the hand on `object` near `point_m` and lift it
+    release           set the held object down at `point_m` (the point its base shall touch)
+    release_in_basket let the held object down into the basket of `robot`
+    stow              fold the arm into its carrying pose
+    """
+
+    GO_TO = "go_to"
+    LOOK = "look"
+    APPROACH = "approach"
+    GRASP = "grasp"
+    RELEASE = "release"
+    RELEASE_IN_BASKET = "release_in_basket"
+    STOW = "stow"
+
+
+class Motion(Payload, frozen=True, kw_only=True):
+    """One command to a robot's driver."""
+
+    kind: MotionKind
+    place: Id | None = None
+    object: Id | None = None
+    robot: Id | None = None
+    point_m: PointM | None = None
+    timeout_s: float = 120.0
+
+
+class Detection(Payload, frozen=True, kw_only=True):
+    """Something a robot sees from where it stands."""
+
+    object: Id
+    kind: Id
+    point_m: PointM
+    """Centre of the object's base."""
+    place: Id | None = None
+    support: str = "floor"
+    """What it lies on: `floor`, a surface, or a robot (in its basket)."""
+
+
+class Senses(Payload, frozen=True, kw_only=True):
+    """What a robot knows of itself without looking: odometry, hand and basket sensors."""
+
+    robot: Id
+    time_s: float
+    pose_m_rad: PoseMRad
+    place: Id | None
+    holding: Id | None = None
+    basket: tuple[Id, ...] = ()
+    moving: bool = False
+
+
+class MotionState(str, Enum):
+    """How a motion stands."""
+
+    RUNNING = "running"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    STOPPED = "stopped"
+
+
+class MotionOutcome(Payload, frozen=True, kw_only=True):
+    """How a motion stands or ended. `reason` is a sentence where it failed or was stopped."""
+
+    state: MotionState
+    senses: Senses
+    reason: str | None = None
+    detections: tuple[Detection, ...] = ()

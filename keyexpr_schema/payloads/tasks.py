@@ -1,0 +1,141 @@
+"""Payloads about work in progress: task records, orders, reports."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from keyexpr_schema.ids import Id
+from keyexpr_schema.key import Address, Payload
+from keyexpr_schema.payloads.world import Fact
+
+
+class TaskAddress(Address, frozen=True):
+    """One task of one plan."""
+
+    plan: str
+    task: str
+
+
+class OrderAddress(Address, frozen=True):
+    """A task in one robot's in-tray."""
+
+    robot: str
+    plan: str
+    task: str
+
+
+class ReportAddress(Address, frozen=True):
+    """What a robot says of one attempt at a task."""
+
+    robot: str
+    plan: str
+    task: str
+    attempt: int
+
+
+class TaskState(str, Enum):
+    """Where a task stands, in the planner's books."""
+
+    WAITING = "waiting"
+    ORDERED = "ordered"
+    RUNNING = "running"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+
+
+ENDED_TASKS = frozenset({TaskState.SUCCEEDED, TaskState.FAILED, TaskState.CANCELLED})
+
+
+class Try(Payload, frozen=True, kw_only=True):
+    """One try of a skill inside an attempt, and why it failed (`None`: it did not)."""
+
+    number: int
+    started_s: float
+    ended_s: float
+    reason: str | None = None
+
+
+class TaskRecord(Payload, frozen=True, kw_only=True):
+    """Everything the planner knows of one task; `args` have robots in place of actors."""
+
+    plan: Id
+    revision: int
+    task: Id
+    skill: Id
+    args: dict[str, str]
+    actor: Id
+    robot: Id | None
+    state: TaskState
+    after: tuple[Id, ...] = ()
+    behind: tuple[Id, ...] = ()
+    """Tasks that its robot has to do first, because of the allocation."""
+    goal: Id | None = None
+    attempt: int = 0
+    tries: tuple[Try, ...] = ()
+    reason: str | None = None
+    duration_s: float = 0.0
+    """Predicted duration."""
+    way_s: float | None = None
+    """Of that, the way there at the robot's top speed, as known when the task was ordered; `None`
+    where nobody knew where the robot set out from."""
+    ordered_s: float | None = None
+    started_s: float | None = None
+    ended_s: float | None = None
+
+
+class Order(Payload, frozen=True, kw_only=True):
+    """A task given to a robot.
+
+    `(epoch, revision, attempt)` fences it: a worker refuses an order older than one it has seen.
+    `cancelled` asks the worker to stop the attempt and report. `deadline_s` bounds the whole
+    attempt on the fleet's clock, counted from its start.
+    """
+
+    robot: Id
+    plan: Id
+    revision: int
+    task: Id
+    attempt: int
+    epoch: int
+    skill: Id
+    args: dict[str, str]
+    deadline_s: float
+    cancelled: bool = False
+
+
+class ReportState(str, Enum):
+    """How an attempt stands, in the worker's words."""
+
+    STARTED = "started"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    INTERRUPTED = "interrupted"
+    CANCELLED = "cancelled"
+    REFUSED = "refused"
+
+
+FINAL_REPORTS = frozenset(ReportState) - {ReportState.STARTED}
+
+
+class Report(Payload, frozen=True, kw_only=True):
+    """What a worker says of an attempt. Put again on the same key as the attempt goes on.
+
+    `facts` are what the attempt changed or discovered. `retryable` says whether the same order
+    could succeed if it were given again.
+    """
+
+    robot: Id
+    plan: Id
+    revision: int
+    task: Id
+    attempt: int
+    epoch: int
+    incarnation: Id
+    state: ReportState
+    tries: tuple[Try, ...] = ()
+    facts: tuple[Fact, ...] = ()
+    reason: str | None = None
+    retryable: bool = True
+    started_s: float | None = None
+    ended_s: float | None = None

@@ -1,0 +1,208 @@
+"""Level-triggered watching of keys: what is stored, then what changes, then what was missed.
+
+The rule for deletions. A deletion that passes on the link is believed. One that was missed shows
+only as a key that a listing lacks, and empty is not absent: after a reconnection Zenoh answers
+with less than there is, and a store that is away answers with nothing. So a key is taken for
+deleted when two listings in a row lack it, both taken in one generation of the link, and in the
+second one the store proved to be there (it listed something else, or it answered for its journal).
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import OrderedDict
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol
+
+from keyexpr_schema.errors import ForeignKey, UndecodablePayload, Unreachable
+from keyexpr_schema.key import A, Kept, Key, P
+from keyexpr_schema.transport.link import Link
+from keyexpr_schema.transport.wire import Wire, text_of_stamp
+
+RELIST_S = 5.0
+"""Period of re-listing while nothing seems wrong."""
+_RETRY_S = 0.2
+
+
+@dataclass(frozen=True)
+class Change(Generic[A, P]):
+    """A new value of one key; `value` None: deleted. `timestamp` is Zenoh's, as text."""
+
+    key: Key[A, P]
+    address: A
+    value: P | None
+    timestamp: str
+
+
+class Reader(Protocol):
+    """What a watch needs of a session."""
+
+    @property
+    def link(self) -> Link: ...
+
+    @property
+    def component(self) -> str: ...
+
+    def decode(self, key: Key[Any, P], wire: Wire) -> P: ...
+
+    def reject(self, keyexpr: str, data: bytes, reason: str) -> None: ...
+
+    async def listing(self, pattern: str, timeout_s: float) -> tuple[Wire, ...]: ...
+
+    async def store_answers(self, timeout_s: float) -> bool: ...
+
+
+class _Selection:
+    """One watched pattern and what is known of the keys in it."""
+
+    def __init__(self, watch: Watch, key: Key[Any, Any], pattern: str) -> None:
+        self.watch, self.key, self.pattern = watch, key, pattern
+        self.stamps: dict[str, int] = {}
+        self.live: set[str] = set()
+        self.missing: set[str] = set()
+        self.missing_generation = 0
+
+    def offer(self, wire: Wire) -> None:
+        """Pass on what is newer than what is known of its key."""
+        stamp = wire.stamp
+        known = self.stamps.get(wire.keyexpr)
+        if "*" in wire.keyexpr:
+            # A wildcard put or delete: it concerns the keys that exist, which a listing shows.
+            self.watch.relist()
+            return
+        try:
+            address = self.key.parse(wire.keyexpr)
+        except ForeignKey as error:
+            # The pattern matches it and the store may keep it, but nobody can have an id in it.
+            self.watch.reader.reject(wire.keyexpr, wire.data, str(error))
+            return
+        if known is not None and stamp <= known and stamp:
+            return
+        if stamp:
+            self.stamps[wire.keyexpr] = stamp
+        self.missing.discard(wire.keyexpr)
+        (self.live.discard if wire.deleted else self.live.add)(wire.keyexpr)
+        try:
+            value = None if wire.deleted else self.watch.reader.decode(self.key, wire)
+        except UndecodablePayload as error:
+            self.watch.reader.reject(wire.keyexpr, wire.data, str(error))
+            return
+        self.watch.deliver(wire.keyexpr, Change(self.key, address, value, text_of_stamp(stamp)))
+
+    async def relist(self) -> bool:
+        """List once; whether it has to be done again soon (something known was not in it)."""
+        link = self.watch.reader.link
+        generation = link.generation
+        known = set(self.live)
+        wires = await self.watch.reader.listing(self.pattern, 3.0)
+        for wire in wires:
+            self.offer(wire)
+        missing = (known & self.live) - {wire.keyexpr for wire in wires}
+        if link.generation != generation or not link.up:
+            return True
+        again = self.missing & missing if self.missing_generation == generation else set()
+        self.missing, self.missing_generation = missing - again, generation
+        if again and not (wires or await self.watch.reader.store_answers(1.0)):
+            self.missing = missing
+            return False  # cannot be told apart from a store that is away: keep what is known
+        for keyexpr in sorted(again & self.live):
+            self.live.discard(keyexpr)
+            address = self.key.parse(keyexpr)
+            stamp = text_of_stamp(self.stamps.get(keyexpr, 0))
+            self.watch.deliver(keyexpr, Change(self.key, address, None, stamp))
+        return bool(self.missing)
+
+
+class Watch:
+    """An async iterator of `Change`; made by `Session.watch`.
+
+    Values of `Kept.STREAM` and `Kept.LATEST` keys that were not taken yet are replaced by newer
+    ones of the same key; of other keys every change that was seen is delivered.
+    """
+
+    def __init__(self, reader: Reader, selections: list[tuple[Key[Any, Any], str]]) -> None:
+        self.reader = reader
+        self._selections = [_Selection(self, key, pattern) for key, pattern in selections]
+        self._ready: OrderedDict[object, Change[Any, Any]] = OrderedDict()
+        self._number = 0
+        self._filled = asyncio.Event()
+        self._synced = asyncio.Event()
+        self._wake = asyncio.Event()
+        self._failure: BaseException | None = None
+
+    def __aiter__(self) -> Watch:
+        return self
+
+    async def __anext__(self) -> Change[Any, Any]:
+        while not self._ready:
+            if self._failure is not None:
+                raise self._failure
+            self._filled.clear()
+            await self._filled.wait()
+        return self._ready.popitem(last=False)[1]
+
+    async def synced(self) -> None:
+        """Wait until everything that is stored was handed to the iterator once."""
+        await self._synced.wait()
+
+    def relist(self) -> None:
+        """List soon."""
+        self._wake.set()
+
+    def deliver(self, keyexpr: str, change: Change[Any, Any]) -> None:
+        """Queue `change` for the iterator."""
+        self._number += 1
+        latest = change.key.kept in (Kept.STREAM, Kept.LATEST)
+        slot: object = keyexpr if latest else self._number
+        self._ready.pop(slot, None)
+        self._ready[slot] = change
+        self._filled.set()
+
+    @asynccontextmanager
+    async def running(self) -> AsyncIterator[Watch]:
+        """Subscribe, then list and keep listing, until the block ends."""
+        link = self.reader.link
+        async with AsyncExitStack() as stack:
+            for selection in self._selections:
+                await stack.enter_async_context(link.subscribed(selection.pattern, selection.offer))
+            stack.enter_context(link.listening(self.relist))
+            task = asyncio.create_task(self._list_for_ever())
+            task.add_done_callback(self._end)
+            try:
+                yield self
+            finally:
+                task.cancel()
+                await asyncio.gather(task, return_exceptions=True)
+
+    def _end(self, task: asyncio.Task[None]) -> None:
+        """A fault of the listing must reach the reader, who would wait for ever."""
+        if not task.cancelled():
+            self._failure = task.exception()
+            self._filled.set()
+            self._synced.set()
+
+    async def _list_for_ever(self) -> None:
+        stored = [selection for selection in self._selections if selection.key.stored]
+        if not stored:
+            self._synced.set()
+            return
+        while True:
+            self._wake.clear()
+            again = False
+            try:
+                for selection in stored:
+                    again |= await selection.relist()
+                self._synced.set()
+            except Unreachable:
+                again = True
+            await _wait(self._wake, _RETRY_S if again else RELIST_S)
+
+
+async def _wait(event: asyncio.Event, timeout_s: float) -> None:
+    try:
+        async with asyncio.timeout(timeout_s):
+            await event.wait()
+    except TimeoutError:
+        return

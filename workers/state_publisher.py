@@ -1,0 +1,110 @@
+"""Publishes a robot's state: at once when it changes, at 2 Hz while it drives."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from math import dist
+
+from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.keyspace import ROBOT_STATE
+from keyexpr_schema.payloads.motions import Senses
+from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
+from keyexpr_schema.payloads.tasks import Order
+from keyexpr_schema.transport.session import Session
+from workers.embodiment import Embodiment
+from workers.errors import BodyUnreachable
+
+SENSE_S = 0.2
+"""Wall seconds between two readings of the robot's own sensors."""
+DRIVING_S = 0.5
+"""Wall seconds between two states of which only the pose differs."""
+REPEAT_S = 5.0
+"""Wall seconds after which a state is put again: a put while no router was there is lost."""
+PATIENCE_S = 3.0
+"""Wall seconds after which sensors that do not answer count as silent."""
+STOOD_STILL_M = 0.01
+
+
+class Presence:
+    """What everybody may know of this robot. `activity` and `order` are set by its worker."""
+
+    def __init__(self, session: Session, body: Embodiment, incarnation: str) -> None:
+        self._session = session
+        self._body = body
+        self._incarnation = incarnation
+        self._activity = RobotActivity.RECOVERING
+        self._order: Order | None = None
+        self._senses: Senses | None = None
+        self._sent: RobotState | None = None
+        self._sent_wall_s = 0.0
+        self._silent = False
+        self._log = logging.getLogger(f"robotfleet.worker.{body.robot}")
+
+    def doing(self, activity: RobotActivity, order: Order | None = None) -> None:
+        """Say what the robot is about; goes out at once."""
+        self._activity, self._order = activity, order
+        self._publish()
+
+    async def feel(self) -> None:
+        """Read the sensors once, now; what changed goes out."""
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                self._senses = await self._body.senses()
+        except (BodyUnreachable, SchemaError, TimeoutError) as error:
+            if not self._silent:
+                self._log.warning("the robot's sensors give nothing: %s", str(error) or "no answer")
+            self._silent = True
+        else:
+            self._silent = False
+        self._publish()
+
+    async def run(self) -> None:
+        """Read the sensors and publish for ever; ends by being cancelled."""
+        connected = self._session.connected
+        while True:
+            if self._session.connected and not connected:
+                self._sent = None
+            connected = self._session.connected
+            await self.feel()
+            await asyncio.sleep(SENSE_S)
+
+    def _publish(self) -> None:
+        state, now = self._state(), asyncio.get_running_loop().time()
+        age_s = now - self._sent_wall_s
+        if age_s < REPEAT_S and not _differs(self._sent, state, age_s):
+            return
+        self._session.put(ROBOT_STATE, RobotAddress(state.robot), state)
+        self._sent, self._sent_wall_s = state, now
+
+    def _state(self) -> RobotState:
+        senses, order = self._senses, self._order
+        return RobotState(
+            robot=self._body.robot,
+            incarnation=self._incarnation,
+            activity=self._activity,
+            pose_m_rad=None if senses is None else senses.pose_m_rad,
+            place=None if senses is None else senses.place,
+            holding=None if senses is None else senses.holding,
+            basket=() if senses is None else senses.basket,
+            plan=None if order is None else order.plan,
+            task=None if order is None else order.task,
+            time_s=self._body.now_s() if senses is None else senses.time_s,
+        )
+
+
+def _differs(sent: RobotState | None, state: RobotState, age_s: float) -> bool:
+    """Whether `state` says something that the one sent `age_s` ago did not, and its time has come.
+
+    The pose is compared on the floor plan only: a robot that turns on the spot stays where it is
+    for everybody else.
+    """
+    if sent is None or _words(sent) != _words(state):
+        return True
+    if age_s < DRIVING_S or state.pose_m_rad is None or sent.pose_m_rad is None:
+        return sent.pose_m_rad is None and state.pose_m_rad is not None
+    return dist(sent.pose_m_rad[:2], state.pose_m_rad[:2]) > STOOD_STILL_M
+
+
+def _words(state: RobotState) -> tuple[object, ...]:
+    return (state.activity, state.place, state.holding, state.basket, state.plan, state.task)

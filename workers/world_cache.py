@@ -1,0 +1,96 @@
+"""What a worker knows of the world, from keys: places, objects, facts, other robots."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, ROBOT_SPEC, ROBOT_STATE
+from keyexpr_schema.payloads.motions import Detection
+from keyexpr_schema.payloads.robots import RobotSpec, RobotState
+from keyexpr_schema.payloads.world import Fact, FactAddress, Object, Place, Value
+from keyexpr_schema.transport.session import Change
+
+FLOOR = "floor"
+WORLD_KEYS = (PLACE, OBJECT, FACT, ROBOT_SPEC, ROBOT_STATE)
+"""The keys that `WorldView.apply` takes changes of."""
+
+
+class WorldView:
+    """The latest word on everything, kept up to date by `apply`."""
+
+    def __init__(self) -> None:
+        self.places: dict[str, Place] = {}
+        self.objects: dict[str, Object] = {}
+        self.robots: dict[str, RobotState] = {}
+        self.specs: dict[str, RobotSpec] = {}
+        self.facts: dict[FactAddress, Fact] = {}
+        self._changed = asyncio.Event()
+
+    def apply(self, change: Change[Any, Any]) -> None:
+        """Take over one change of one of `WORLD_KEYS`."""
+        address, value = change.address, change.value
+        if change.key is PLACE:
+            _put(self.places, address.place, value)
+        elif change.key is OBJECT:
+            _put(self.objects, address.object, value)
+        elif change.key is FACT:
+            _put(self.facts, address, value)
+        elif change.key is ROBOT_SPEC:
+            _put(self.specs, address.robot, value)
+        elif change.key is ROBOT_STATE:
+            _put(self.robots, address.robot, value)
+        self._changed.set()
+        self._changed = asyncio.Event()
+
+    async def until(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+        """Wait until `condition` holds, looking again at every change; whether it came to hold.
+
+        `timeout_s` is wall time: what is waited for are messages of others.
+        """
+        try:
+            async with asyncio.timeout(timeout_s):
+                while not condition():
+                    await self._changed.wait()
+        except TimeoutError:
+            return False
+        return True
+
+    def belief(self, relation: str, subject: str) -> Value:
+        """The value of the fact `relation(subject)`; `None` if unknown or never told."""
+        fact = self.facts.get(FactAddress(subject, relation))
+        return None if fact is None else fact.value
+
+    def believed_at(self, place: str) -> tuple[str, ...]:
+        """The known objects of which the facts say that they are at `place`, sorted."""
+        return tuple(sorted(o for o in self.objects if self.belief("at", o) == place))
+
+    def surface_place(self, surface: str) -> str | None:
+        """The place that a surface stands in."""
+        for place in self.places.values():
+            if any(s.surface == surface for s in place.surfaces):
+                return place.place
+        return None
+
+    def whereabouts(self, seen: Detection) -> str | None:
+        """The value of `at(object)` that a detection shows.
+
+        That is the place where the object lies on floor or furniture, or the robot in whose
+        basket it lies; `None` if the detection does not tell (in a hand, outside all places).
+        """
+        if seen.support == FLOOR:
+            if seen.place is not None:
+                return seen.place
+            x_m, y_m, _ = seen.point_m
+            return next((p.place for p in self.places.values() if p.contains(x_m, y_m)), None)
+        if (place := self.surface_place(seen.support)) is not None:
+            return place
+        return seen.support if seen.support in self.specs else None
+
+
+def _put(table: dict[Any, Any], name: object, value: object | None) -> None:
+    if value is None:
+        table.pop(name, None)
+    else:
+        table[name] = value

@@ -76,7 +76,8 @@ class OrderQueue:
 
     async def _refuse_misplaced(self, address: OrderAddress, order: Order) -> None:
         own = OrderAddress(order.robot, order.plan, order.task)
-        reason = f"the order at {ORDER.build(address)} says that it is the one at {ORDER.build(own)}"
+        here, there = ORDER.build(address), ORDER.build(own)
+        reason = f"the order at {here} says that it is the one at {there}"
         placed = replace(order, robot=address.robot, plan=address.plan, task=address.task)
         if attempt_name(placed) not in self._journal.ledger.attempts:
             await self._report_unless_stored(

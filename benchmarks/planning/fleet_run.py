@@ -30,10 +30,10 @@ from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotSta
 from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Report, ReportState
 from keyexpr_schema.payloads.world import Fact, FactAddress, ObjectAddress, PlaceAddress, Statement
 from keyexpr_schema.transport.watch import Change
-from sim.kinematic import KinematicBackend
+from sim.kinematic.backend import KinematicBackend
 from workers.skill import SkillRegistry
 from workers.skills.household import HOUSEHOLD
-from workers.world_cache import WorldView
+from workers.world_cache import WorldCache
 
 SEED = 7
 MOST_SIMULATED_S = 7200.0
@@ -79,7 +79,7 @@ class FleetRun:
         self._ended: asyncio.Future[None] = loop.create_future()
         loop.drive(self._go_on, lambda: self._fail(Stuck("everybody waits for somebody else")))
         self._places = {place.place: place for place in mission.places}
-        self._view = WorldView()
+        self._view = WorldCache()
         registry = SkillRegistry(HOUSEHOLD)
         self._robots = {
             spec.robot: Robot(

@@ -116,9 +116,9 @@ class FleetRun:
             task.cancel()
         with suppress(asyncio.CancelledError):
             await asyncio.gather(*working)
-        for book in self.state.plans.values():
-            if book.reason:
-                self.counts.reasons.append(book.reason)
+        for entry in self.state.plans.values():
+            if entry.reason:
+                self.counts.reasons.append(entry.reason)
         return wrong
 
     def witness(self) -> Witness:
@@ -230,9 +230,9 @@ class FleetRun:
 
     def _done(self) -> bool:
         """Whether nothing more will happen by itself."""
-        books = self.state.plans.values()
-        return all(book.ended or book.state in ENDED_PLANS for book in books) and not any(
-            book.outstanding() for book in books
+        entries = self.state.plans.values()
+        return all(entry.ended or entry.state in ENDED_PLANS for entry in entries) and not any(
+            entry.outstanding() for entry in entries
         )
 
     def goals_ended(self) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 
+from keyexpr_schema.facts import AT, HOLDING, NOTHING, ON, FactKey, Value
 from keyexpr_schema.payloads.motions import (
     Detection,
     Motion,
@@ -14,7 +15,7 @@ from keyexpr_schema.payloads.motions import (
     Senses,
 )
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec, RobotState
-from keyexpr_schema.payloads.world import NOTHING, Fact, FactAddress, Value
+from keyexpr_schema.payloads.world import Fact
 from workers.embodiment import Embodiment
 from workers.errors import SkillFailed
 from workers.world_cache import WorldView
@@ -32,7 +33,7 @@ class SkillContext:
         self.spec = spec
         self.body = body
         self.world = world
-        self._learned: dict[FactAddress, Fact] = {}
+        self._learned: dict[FactKey, Fact] = {}
         self._log = logging.getLogger(f"robotfleet.worker.{spec.robot}")
 
     @property
@@ -47,7 +48,7 @@ class SkillContext:
 
     def learn(self, relation: str, subject: str, value: Value) -> None:
         """Note that `relation(subject)` is `value` now; `None` says that it is unknown."""
-        self._learned[FactAddress(subject, relation)] = Fact(
+        self._learned[FactKey(relation, subject)] = Fact(
             subject=subject,
             relation=relation,
             value=value,
@@ -113,22 +114,22 @@ class SkillContext:
         for detection in seen:
             where = self.world.whereabouts(detection)
             if where is not None and self._believed(detection.object) != where:
-                self.learn("at", detection.object, where)
+                self.learn(AT, detection.object, where)
             # In a basket it is at the robot, which says all; `on` is of furniture and the floor.
-            if where in self.world.places and self._believed(detection.object, "on") != (
+            if where in self.world.places and self._believed(detection.object, ON) != (
                 detection.support
             ):
-                self.learn("on", detection.object, detection.support)
+                self.learn(ON, detection.object, detection.support)
         return seen
 
     async def holding(self) -> str | None:
         """The object in the hand, by the hand's own sensor; what it says is learned."""
         held = (await self.body.senses()).holding
-        self.learn("holding", self.robot, NOTHING if held is None else held)
+        self.learn(HOLDING, self.robot, NOTHING if held is None else held)
         if held is not None:
-            self.learn("at", held, self.robot)
-            if self._believed(held, "on") is not None:
-                self.learn("on", held, None)
+            self.learn(AT, held, self.robot)
+            if self._believed(held, ON) is not None:
+                self.learn(ON, held, None)
         return held
 
     async def be_in(self, place: str) -> Senses:
@@ -144,9 +145,9 @@ class SkillContext:
         if senses.place != place:
             self.log(f"is in {senses.place or 'no place'}, not in {place}: goes there first")
             senses = (await self.do(MotionKind.GO_TO, place=place)).senses
-        self.learn("at", self.robot, place)
+        self.learn(AT, self.robot, place)
         return senses
 
-    def _believed(self, object: str, relation: str = "at") -> Value:
-        fact = self._learned.get(FactAddress(object, relation))
+    def _believed(self, object: str, relation: str = AT) -> Value:
+        fact = self._learned.get(FactKey(relation, object))
         return fact.value if fact is not None else self.world.belief(relation, object)

@@ -6,6 +6,7 @@ import asyncio
 import logging
 
 from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.motions import Motion, MotionKind, Senses
 from keyexpr_schema.payloads.tasks import Order, ReportState
 from keyexpr_schema.payloads.world import Fact
@@ -58,10 +59,10 @@ async def self_knowledge(ctx: SkillContext) -> None:
     """Learn what the robot knows of itself: where it is, what is in its hand and its basket."""
     senses = await first_senses(ctx.body)
     if senses.place is not None:
-        ctx.learn("at", ctx.robot, senses.place)
+        ctx.learn(AT, ctx.robot, senses.place)
     await ctx.holding()
     for thing in senses.basket:
-        ctx.learn("at", thing, ctx.robot)
+        ctx.learn(AT, thing, ctx.robot)
 
 
 def stopped_half_way(ledger: Ledger) -> bool:
@@ -88,9 +89,9 @@ async def look_about(ctx: SkillContext, order: Order) -> tuple[Fact, ...]:
     senses = await first_senses(ctx.body)
     for name, where in seen.items():
         if where is not None and name != senses.holding:
-            ctx.learn("at", name, where)
+            ctx.learn(AT, name, where)
     if thing is not None and thing != senses.holding and seen.get(thing) is None:
-        believed = ctx.world.belief("at", thing)
+        believed = ctx.world.belief(AT, thing)
         if believed == ctx.robot or believed == senses.place:
-            ctx.learn("at", thing, None)
+            ctx.learn(AT, thing, None)
     return ctx.learned

@@ -16,6 +16,7 @@ import msgspec
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
 from fleet.core.checker.plan_checker import check_plan
 from fleet.core.schedule.plan_schedule import best_schedule
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.plans import Violation
 
 log = logging.getLogger(__name__)
@@ -108,7 +109,7 @@ def problem_text(problem: AllocationProblem) -> str:
     world = problem.world
     data = {
         "robots": [
-            {"robot": robot, "at": world.value("at", robot) or "unknown"} for robot in world.team
+            {"robot": robot, "at": world.value(AT, robot) or "unknown"} for robot in world.team
         ],
         "actors": [
             {

@@ -12,9 +12,9 @@ import msgspec
 from fleet.core.model.skills import SPACE, SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.language import Vocabulary
+from keyexpr_schema.facts import AT, Literal
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Violation
-from keyexpr_schema.payloads.world import Value
 
 MAX_TEXT = 300
 """Characters of one label or sentence; more is cut."""
@@ -53,7 +53,7 @@ def skills_text(skills: Iterable[SkillModel]) -> str:
 
 def _skill(skill: SkillModel) -> str:
     parameters = ", ".join(f"{name}: {kind}" for name, kind in skill.parameters.items())
-    before = [_literal(*row) for row in skill.before]
+    before = [str(row) for row in skill.before]
     before += [f"{SPACE}({carrier})" for carrier in skill.space_in]
     parts = [f"- {skill.name}({parameters}): {skill.about}".rstrip(": ")]
     needs = [
@@ -65,16 +65,8 @@ def _skill(skill: SkillModel) -> str:
     if needs:
         parts.append(f"Needs: {', '.join(needs)}.")
     parts.append(f"Before: {', '.join(before) or 'nothing'}.")
-    parts.append(f"After: {', '.join(_literal(*row) for row in skill.after) or 'nothing'}.")
+    parts.append(f"After: {', '.join(map(str, skill.after)) or 'nothing'}.")
     return " ".join(parts)
-
-
-def _literal(relation: str, subject: str, value: Value) -> str:
-    return f"{relation}({subject}) = {_value(value)}"
-
-
-def _value(value: Value) -> str:
-    return "unknown" if value is None else str(value).lower() if value is True else str(value)
 
 
 def useful_skills(world: WorldModel) -> list[SkillModel]:
@@ -102,9 +94,9 @@ def problem_text(world: WorldModel, goals: Iterable[Goal], keep: Iterable[Condit
         for name, thing in world.objects.items()
     ]
     facts = [
-        f"{variable} = {_value(value)}"
+        str(Literal(variable, value))
         for variable, value in world.facts.items()
-        if not (variable.relation == "at" and variable.subject in world.robots)
+        if not (variable.relation == AT and variable.subject in world.robots)
     ]
     wanted = [
         {

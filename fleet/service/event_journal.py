@@ -17,7 +17,7 @@ from typing import TextIO
 import msgspec
 
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.state import State
+from fleet.core.state import State, decode_state, encode_state
 from fleet.errors import FleetError
 
 SNAPSHOT_EVERY = 2000
@@ -82,7 +82,7 @@ class EventJournal:
             self._db.execute("DELETE FROM snapshots")
             self._db.execute(
                 "INSERT INTO snapshots (number, state) VALUES (?, ?)",
-                (cursor.lastrowid, msgspec.json.encode(state)),
+                (cursor.lastrowid, encode_state(state)),
             )
             self._db.execute("COMMIT")
 
@@ -100,7 +100,7 @@ class EventJournal:
         if row is None:
             return 0, State()
         try:
-            return int(row[0]), msgspec.json.decode(row[1], type=State)
+            return int(row[0]), decode_state(row[1])
         except msgspec.DecodeError:
             return 0, State()
 

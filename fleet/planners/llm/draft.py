@@ -7,16 +7,15 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
-from fleet.core.model.skills import Variable
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import Strand, tasks_from
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, StepAnswer, TaskAnswer, actor_of
+from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan, Task
-from keyexpr_schema.payloads.world import Value
 
 
 @dataclass(frozen=True)
@@ -131,7 +130,7 @@ def world_after(draft: Draft, world: WorldModel) -> WorldModel:
     """The world when a checked draft is done, as far as it is settled before robots are chosen."""
     graph = TaskGraph({task.task: task.after for task in draft.tasks})
     by_name = {task.task: task for task in draft.tasks}
-    facts: dict[Variable, Value] = {}
+    facts: dict[FactKey, Value] = {}
     for name in graph.order:
         task = by_name[name]
         for literal in world.skills[task.skill].ground(task.args).after:

@@ -14,6 +14,7 @@ from fleet.llm.conversation import Conversation, GivenUp, Ledger, Rejected
 from fleet.llm.prompts import load_prompts
 from fleet.llm.wording import cleaned, vocabulary_text
 from fleet.planners.llm.answers import Answer, read_answer, schema_of
+from keyexpr_schema.facts import HELD, LOCATED
 from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Violation
@@ -21,7 +22,7 @@ from keyexpr_schema.payloads.plans import Violation
 log = logging.getLogger(__name__)
 
 MAX_CONDITIONS = 100
-DERIVED = {"located": "it is known where the object is", "held": "a hand holds the object"}
+DERIVED = {LOCATED: "it is known where the object is", HELD: "a hand holds the object"}
 """Relations that follow from others; `keyexpr_schema.payloads.goals.Condition` says how."""
 
 Stages = tuple[tuple[Condition, ...], ...]
@@ -195,7 +196,7 @@ def _contradictions(number: int, stage: tuple[ConditionAnswer, ...]) -> list[Vio
 def _relations(skills: Mapping[str, SkillModel]) -> dict[str, _Relation]:
     rows: dict[str, set[tuple[str, str | bool]]] = {}
     for skill in skills.values():
-        for relation, subject, value in skill.after:
+        for (relation, subject), value in skill.after:
             if isinstance(value, str):
                 # `holding = nothing` is a word; `at = to` a parameter of some type.
                 shown: str | bool = skill.parameters.get(value, value)

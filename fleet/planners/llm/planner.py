@@ -20,6 +20,7 @@ from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema, rea
 from fleet.planners.llm.draft import Draft, conditions_of, draft_of, merged, plan_of, world_after
 from fleet.planners.llm.interpreter import LlmInterpreter
 from fleet.planners.llm.verify import why_not, without_useless
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Making, Plan
 
@@ -184,7 +185,7 @@ def _not_located(goals: Sequence[Goal], world: WorldModel) -> str | None:
     for goal in goals:
         for condition in goal.conditions:
             things = [subject for subject in condition.subjects if subject in world.objects]
-            if things and all(world.value("at", thing) is None for thing in things):
+            if things and all(world.value(AT, thing) is None for thing in things):
                 return " or ".join(things)
     return None
 

@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterable
 from msgspec.structs import replace
 
 from fleet.core.checker.plan_checker import check_plan
-from fleet.core.model.skills import Variable
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from fleet.core.schedule.actor_constraints import least_loaded
 from fleet.core.schedule.plan_schedule import best_schedule
+from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.plans import Plan, Task, Violation
 
 
@@ -65,7 +65,7 @@ def without_useless(plan: Plan, world: WorldModel) -> Plan:
     # Where robots stand may change before the plan starts: the way to the work is not useless.
     spoken_of = {subject for condition in plan.conditions for subject in condition.subjects}
     somewhere = world.with_facts(
-        {Variable("at", robot): None for robot in world.robots if robot not in spoken_of}
+        {FactKey(AT, robot): None for robot in world.robots if robot not in spoken_of}
     )
     if not check_plan(plan, somewhere).valid:
         somewhere = world

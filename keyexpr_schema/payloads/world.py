@@ -48,6 +48,8 @@ class ObjectAddress(Address, frozen=True):
 class Fact(Payload, frozen=True, kw_only=True):
     """One state variable and its value, with who said so and when.
 
+    `at(x)` is a place; for a thing that a robot has in its hand or basket it is that robot.
+    `holding(robot)` is an object or `nothing`.
     `time_s` is seconds on the fleet's clock (simulated time in a simulation).
     """
 

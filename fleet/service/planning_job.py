@@ -10,7 +10,7 @@ from dataclasses import replace as changed
 from msgspec.structs import replace
 
 from fleet.allocators.base import Allocated, Allocator, NotAllocated
-from fleet.core.events import PlanMade, PlanNotMade
+from fleet.core.events import PlanningFailed, PlanningSucceeded
 from fleet.core.handlers.goals import SEARCHED
 from fleet.core.model.world import WorldModel
 from fleet.core.state import Job, State
@@ -35,7 +35,7 @@ class _Made:
 
 def carry_out(
     job: Job, state: State, parts: Composition, at: Mapping[str, float]
-) -> PlanMade | PlanNotMade:
+) -> PlanningSucceeded | PlanningFailed:
     """Plan, check and allocate; how it ended, as an event stamped with `at`.
 
     `at` has the event's `time_s` and `wall_time_s`.
@@ -44,7 +44,7 @@ def carry_out(
     made = _plan_and_allocate(job, state, parts)
     took_s = time.perf_counter() - started
     if isinstance(made, NoPlan):
-        return PlanNotMade(
+        return PlanningFailed(
             **at,
             job=job.job,
             reason=made.reason,
@@ -54,7 +54,7 @@ def carry_out(
     allocated, schedule = made.allocated, made.allocated.schedule
     durations_s = {task: end_s - schedule.start_s[task] for task, end_s in schedule.end_s.items()}
     timed = [replace(task, duration_s=durations_s[task.task]) for task in made.plan.tasks]
-    return PlanMade(
+    return PlanningSucceeded(
         **at,
         job=job.job,
         plan=replace(made.plan, tasks=tuple(timed)),

@@ -18,7 +18,7 @@ from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact
 
 
-def fact_told(state: State, event: events.FactTold, skills: Skills) -> State:
+def fact_put(state: State, event: events.FactPut, skills: Skills) -> State:
     """Believe the fact: its key holds the latest word. A plan that it contradicts is made again."""
     fact = event.fact
     changed = believe(state, fact)

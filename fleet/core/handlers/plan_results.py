@@ -71,7 +71,7 @@ def _may_be_mended(book: PlanBook) -> bool:
     return book.replan_reason != book.anew_reason and not book.plan.seeks
 
 
-def plan_made(state: State, event: events.PlanMade, skills: Skills) -> State:
+def planning_succeeded(state: State, event: events.PlanningSucceeded, skills: Skills) -> State:
     """Take over a finished plan, or show it where it was only asked to be seen."""
     if (preview := _preview_of(state, event.job)) is not None:
         return _show(state, preview, event)
@@ -115,7 +115,7 @@ def plan_made(state: State, event: events.PlanMade, skills: Skills) -> State:
     return answer(state, job.request, True, _made_sentence(event), book.plan.plan)
 
 
-def _as_it_was(book: PlanBook, job: Job, event: events.PlanMade) -> bool:
+def _as_it_was(book: PlanBook, job: Job, event: events.PlanningSucceeded) -> bool:
     """Whether another allocation of what is left has turned out to be the one there is."""
     current = list(book.current())
     return (
@@ -133,7 +133,7 @@ def _new_reason(book: PlanBook, job: Job) -> str | None:
     return None if book.replan_reason == job.reason else book.replan_reason
 
 
-def _with_outcome(book: PlanBook, event: events.PlanMade) -> PlanBook:
+def _with_outcome(book: PlanBook, event: events.PlanningSucceeded) -> PlanBook:
     """The book with what a job came to: the plan, its allocation, and what is predicted of it."""
     return replace(
         book,
@@ -147,7 +147,7 @@ def _with_outcome(book: PlanBook, event: events.PlanMade) -> PlanBook:
     )
 
 
-def _made_sentence(event: events.PlanMade) -> str:
+def _made_sentence(event: events.PlanningSucceeded) -> str:
     plan = event.plan
     tasks, goals = _counted(plan.tasks, "task"), _counted(plan.goals, "goal")
     told = [f"plan {plan.plan} has {tasks} for {goals}"]
@@ -165,7 +165,7 @@ def _preview_of(state: State, job: int) -> Job | None:
     return next((found for found in state.previews.values() if found.job == job), None)
 
 
-def _show(state: State, job: Job, event: events.PlanMade) -> State:
+def _show(state: State, job: Job, event: events.PlanningSucceeded) -> State:
     assert job.request is not None
     book = _with_outcome(PlanBook(plan=event.plan, state=PlanState.READY), event)
     reply = Answer(
@@ -182,7 +182,7 @@ def _show(state: State, job: Job, event: events.PlanMade) -> State:
     )
 
 
-def plan_not_made(state: State, event: events.PlanNotMade) -> State:
+def planning_failed(state: State, event: events.PlanningFailed) -> State:
     """A job failed: a first plan is rejected, a running one goes on or is given up."""
     if (preview := _preview_of(state, event.job)) is not None:
         assert preview.request is not None

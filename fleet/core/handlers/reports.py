@@ -22,7 +22,7 @@ MAX_ATTEMPTS = 3
 """Orders given for one task to one robot; each order has the worker's own tries inside."""
 
 
-def report_told(state: State, event: events.ReportTold, skills: Skills) -> State:
+def report_received(state: State, event: events.ReportReceived, skills: Skills) -> State:
     """Take in what a worker says; a report of an attempt that is not current only brings facts."""
     report = event.report
     for fact in report.facts:

@@ -17,7 +17,7 @@ AUTO = "auto-"
 """How the names of requests begin that nobody made: goals that wait are planned by themselves."""
 
 
-def plan_asked(state: State, event: events.PlanAsked) -> State:
+def plan_requested(state: State, event: events.PlanRequested) -> State:
     """Start to plan for the goals asked for, or say why not."""
     ask = event.request
     if (
@@ -116,7 +116,7 @@ def plan_proposed(state: State, event: events.PlanProposed) -> State:
     return set_book(replace(state, jobs=job.job), book)
 
 
-def replan_asked(state: State, event: events.ReplanAsked) -> State:
+def replan_requested(state: State, event: events.ReplanRequested) -> State:
     """Plan again from what is known now."""
     ask = event.request
     if ask.request in state.answers:
@@ -164,15 +164,17 @@ def take_waiting_goals(state: State) -> State:
             book = replace(book, plan=replace(book.plan, goals=goals), replan_reason=reason)
             return set_book(state, book)
     request = PlanRequest(request=f"{AUTO}{state.jobs + 1}", goals=waiting)
-    asked = events.PlanAsked(request=request, time_s=state.time_s, wall_time_s=state.wall_time_s)
-    return plan_asked(state, asked)
+    asked = events.PlanRequested(
+        request=request, time_s=state.time_s, wall_time_s=state.wall_time_s
+    )
+    return plan_requested(state, asked)
 
 
 def _no_plan(state: State, plan: str) -> str:
     return f"there is no plan {plan}; known are {', '.join(sorted(state.plans)) or 'none'}"
 
 
-def control_asked(state: State, event: events.ControlAsked) -> State:
+def control_requested(state: State, event: events.ControlRequested) -> State:
     """Start, cancel, delete or extend a plan, or say why not."""
     ask = event.request
     if ask.request in state.answers or any(

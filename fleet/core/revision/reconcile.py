@@ -38,7 +38,7 @@ class Revision:
 
 
 def revise(
-    book: PlanBook, event: events.PlanMade, world: WorldModel, started: frozenset[str]
+    book: PlanBook, event: events.PlanningSucceeded, world: WorldModel, started: frozenset[str]
 ) -> Revision:
     """Take over the plan in `event`; `started` were under way when it was being made."""
     calls = {task.task: _call(task, event.allocation) for task in event.plan.tasks}
@@ -89,7 +89,7 @@ def _call_of(record: TaskRecord) -> Call:
 
 def _going_on(
     book: PlanBook,
-    event: events.PlanMade,
+    event: events.PlanningSucceeded,
     calls: Mapping[str, Call],
     world: WorldModel,
     started: frozenset[str],
@@ -164,7 +164,7 @@ def _record(
     task: Task,
     call: Call,
     known: TaskRecord | None,
-    event: events.PlanMade,
+    event: events.PlanningSucceeded,
     made_as: str,
     names: Mapping[str, str],
 ) -> TaskRecord:

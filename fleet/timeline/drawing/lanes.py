@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import rerun as rr
 
-from fleet.timeline.palette import CANCELLED, FAILED, Palette, Rgba
-from fleet.timeline.sink import Sink, entity
-from fleet.timeline.text import drawable
+from fleet.timeline.drawing.palette import CANCELLED, FAILED, Palette, Rgba
+from fleet.timeline.drawing.sink import Sink, entity
+from fleet.timeline.drawing.text import drawable
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 IDLE = ""

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import networkx
 import rerun as rr
 
-from fleet.timeline.lanes import call_text
-from fleet.timeline.palette import TASK_STATES
-from fleet.timeline.sink import Sink, entity
-from fleet.timeline.text import drawable
+from fleet.timeline.drawing.lanes import call_text
+from fleet.timeline.drawing.palette import TASK_STATES
+from fleet.timeline.drawing.sink import Sink, entity
+from fleet.timeline.drawing.text import drawable
 from keyexpr_schema.payloads.plans import Plan, PlanStatus
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 

@@ -6,9 +6,9 @@ import math
 
 import rerun as rr
 
-from fleet.timeline.lanes import Lanes
-from fleet.timeline.palette import FLEET, Palette
-from fleet.timeline.sink import Sink, entity
+from fleet.timeline.drawing.lanes import Lanes
+from fleet.timeline.drawing.palette import FLEET, Palette
+from fleet.timeline.drawing.sink import Sink, entity
 
 STEP_S = 1.0
 """One sample a second of fleet time."""

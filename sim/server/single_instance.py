@@ -13,7 +13,7 @@ CLOCK_S = 0.6
 """How long to listen for the other's clock [s, wall]; it ticks twenty times a second."""
 
 
-async def no_other_world(session: Session) -> None:
+async def ensure_single_world(session: Session) -> None:
     """Return when no other simulation is heard; where none ever was, at once.
 
     Two that start at the same moment in a new realm do not hear each other here.

@@ -24,9 +24,9 @@ from keyexpr_schema.payloads.motions import (
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from sim.backend import Backend
-from sim.kinematic_scene import draw_frame, draw_scene
+from sim.files.world_schema import FLOOR, WorldFile
+from sim.kinematic.scene import draw_frame, draw_scene
 from sim.navigation.routes import Route, Routes
-from sim.world_schema import FLOOR, WorldFile
 
 REACH_M = 1.2
 """How far from a robot's centre its hand gets, sideways; generous, as stances here are coarse."""
@@ -36,7 +36,7 @@ MISS_M = 0.15
 
 
 @dataclass(frozen=True)
-class Durations:
+class MotionModel:
     """How long motions take, and which of them fail.
 
     Driving takes the route's length over the robot's `drive` speed; the rest takes the seconds
@@ -103,12 +103,12 @@ class KinematicBackend(Backend):
         self,
         world: WorldFile,
         robots: Sequence[tuple[RobotSpec, PoseMRad]],
-        durations: Durations | None = None,
+        motion_model: MotionModel | None = None,
         seed: int = 0,
         step_s: float | None = None,
     ) -> None:
         super().__init__(world, tuple(spec.robot for spec, _ in robots))
-        self._durations = durations or Durations()
+        self._motion_model = motion_model or MotionModel()
         self._step_s = step_s
         self._routes = Routes(world)
         self._events: list[tuple[float, int, str]] = []
@@ -166,17 +166,17 @@ class KinematicBackend(Backend):
         me.begun_s = self.time_s
         nth = me.counts[motion.kind] = me.counts.get(motion.kind, 0) + 1
         kind = motion.kind.value
-        scripted = self._durations.failures.get(robot, {}).get(kind, ())
-        unlucky = me.chance.random() < self._durations.failure_chance.get(kind, 0.0)
-        factor = math.exp(me.chance.gauss(0.0, self._durations.spread))
-        takes_s = self._durations.handling_s(motion.kind)
+        scripted = self._motion_model.failures.get(robot, {}).get(kind, ())
+        unlucky = me.chance.random() < self._motion_model.failure_chance.get(kind, 0.0)
+        factor = math.exp(me.chance.gauss(0.0, self._motion_model.spread))
+        takes_s = self._motion_model.handling_s(motion.kind)
         if motion.kind in (MotionKind.GO_TO, MotionKind.APPROACH):
             me.route = self._route(me, motion)
             if me.route is None:
                 self._end(me, f"there is no way to {motion.place or motion.point_m} from here")
                 return
             me.node = me.route.node
-            takes_s = me.route.length_m / me.capabilities["drive"] + self._durations.settle_s
+            takes_s = me.route.length_m / me.capabilities["drive"] + self._motion_model.settle_s
         if nth in scripted or unlucky:
             me.failure = _MISHAPS.get(motion.kind, "something was in the way")
         takes_s *= factor

@@ -38,7 +38,7 @@ class Phase(str, Enum):
 
 
 @dataclass(frozen=True)
-class Entry:
+class Attempt:
     """One attempt. `report` is its last word; there once it has ended."""
 
     order: Order
@@ -96,7 +96,7 @@ class Ledger:
     """The highest planner epoch seen."""
     revisions: dict[str, int] = field(default_factory=dict)
     """The highest revision seen, by plan."""
-    entries: dict[AttemptName, Entry] = field(default_factory=dict)
+    attempts: dict[AttemptName, Attempt] = field(default_factory=dict)
     _latest: dict[TaskName, int] = field(default_factory=dict)
 
     def latest(self, plan: str, task: str) -> int:
@@ -108,32 +108,32 @@ class Ledger:
         self.epoch = max(self.epoch, order.epoch)
         self.revisions[order.plan] = max(self.revisions.get(order.plan, 0), order.revision)
 
-    def put(self, entry: Entry) -> None:
+    def put(self, attempt: Attempt) -> None:
         """Enter an attempt, or how it stands now."""
-        name = attempt_name(entry.order)
-        self.saw(entry.order)
-        self.entries[name] = entry
+        name = attempt_name(attempt.order)
+        self.saw(attempt.order)
+        self.attempts[name] = attempt
         self._latest[name[:2]] = max(self.latest(*name[:2]), name[2])
 
     def drop(self, name: AttemptName) -> None:
         """Forget an attempt that is queued (its order was withdrawn). The fences stay."""
-        if (entry := self.entries.get(name)) is not None and entry.phase is Phase.QUEUED:
-            del self.entries[name]
+        if (attempt := self.attempts.get(name)) is not None and attempt.phase is Phase.QUEUED:
+            del self.attempts[name]
 
-    def phases(self, phase: Phase) -> Iterable[Entry]:
+    def phases(self, phase: Phase) -> Iterable[Attempt]:
         """The attempts that stand so, in the order of their arrival."""
-        return (e for e in list(self.entries.values()) if e.phase is phase)
+        return (e for e in list(self.attempts.values()) if e.phase is phase)
 
 
 def decide(ledger: Ledger, order: Order) -> Decision:
     """What to do with `order`, given everything seen before. Changes nothing."""
-    entry = ledger.entries.get(attempt_name(order))
+    attempt = ledger.attempts.get(attempt_name(order))
     objection = _objection(ledger, order)
-    if entry is not None and entry.phase is Phase.ENDED:
-        if entry.report is None:
+    if attempt is not None and attempt.phase is Phase.ENDED:
+        if attempt.report is None:
             return Ignore()
-        return Repeat(entry.report)
-    if entry is not None:
+        return Repeat(attempt.report)
+    if attempt is not None:
         if objection is not None:
             # A refusal would stand on the report key of an attempt that is under way.
             return Ignore()
@@ -159,10 +159,10 @@ def superseded(ledger: Ledger, order: Order) -> tuple[AttemptName, ...]:
     """
     return tuple(
         name
-        for name, entry in ledger.entries.items()
+        for name, attempt in ledger.attempts.items()
         if name[:2] == (order.plan, order.task)
         and name[2] < order.attempt
-        and entry.phase is not Phase.ENDED
+        and attempt.phase is not Phase.ENDED
     )
 
 

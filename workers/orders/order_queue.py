@@ -12,7 +12,7 @@ from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.keyspace import ORDER, REPORT
 from keyexpr_schema.payloads.tasks import Order, OrderAddress, Report, ReportState
 from keyexpr_schema.transport.session import Session
-from workers.fencing import (
+from workers.orders.fencing import (
     Accept,
     AttemptName,
     Cancel,
@@ -24,12 +24,12 @@ from workers.fencing import (
     malformed,
     superseded,
 )
-from workers.journal import Journal
-from workers.outbox import Outbox
-from workers.reports import report_address, report_on
+from workers.orders.journal import Journal
+from workers.orders.outbox import Outbox
+from workers.orders.reports import make_report, report_address
 
 
-class InTray:
+class OrderQueue:
     """Orders as they come in; `next` hands out one at a time.
 
     `cancelled` is set while the order that was handed out last should be stopped.
@@ -56,7 +56,7 @@ class InTray:
             self._queued.clear()
             await self._queued.wait()
         self._running = self._queue.popleft()
-        return self._journal.ledger.entries[self._running].order
+        return self._journal.ledger.attempts[self._running].order
 
     async def put(self, address: OrderAddress, order: Order | None) -> None:
         """Take in what stands on an order's key; `None`: nothing any more."""
@@ -75,14 +75,13 @@ class InTray:
             self._journal.dropped(name)
 
     async def _refuse_misplaced(self, address: OrderAddress, order: Order) -> None:
-        said = OrderAddress(order.robot, order.plan, order.task)
-        reason = (
-            f"the order at {ORDER.build(address)} says that it is the one at {ORDER.build(said)}"
-        )
+        own = OrderAddress(order.robot, order.plan, order.task)
+        here, there = ORDER.build(address), ORDER.build(own)
+        reason = f"the order at {here} says that it is the one at {there}"
         placed = replace(order, robot=address.robot, plan=address.plan, task=address.task)
-        if attempt_name(placed) not in self._journal.ledger.entries:
-            await self._say(
-                report_on(
+        if attempt_name(placed) not in self._journal.ledger.attempts:
+            await self._report_unless_stored(
+                make_report(
                     placed, self._incarnation, ReportState.REFUSED, reason=reason, retryable=False
                 )
             )
@@ -99,34 +98,34 @@ class InTray:
         elif isinstance(decision, Renew):
             self._journal.renewed(order)
         elif isinstance(decision, Cancel):
-            if name in self._journal.ledger.entries:
+            if name in self._journal.ledger.attempts:
                 self._journal.renewed(order)
                 self._cancel(name)
             else:
                 self._end_unstarted(order, "the order was cancelled before it started")
         elif isinstance(decision, Repeat):
-            await self._say(decision.report)
+            await self._report_unless_stored(decision.report)
         elif isinstance(decision, Refuse):
             self._log.warning("refuses %s of %s: %s", order.task, order.plan, decision.reason)
-            refusal = report_on(
+            refusal = make_report(
                 order, self._incarnation, ReportState.REFUSED, reason=decision.reason
             )
-            await self._say(refusal)
+            await self._report_unless_stored(refusal)
 
     def _cancel(self, name: AttemptName, why: str = "the order was cancelled") -> None:
         if name == self._running:
             self.cancelled.set()
         elif name in self._queue:
             self._queue.remove(name)
-            order = self._journal.ledger.entries[name].order
+            order = self._journal.ledger.attempts[name].order
             self._end_unstarted(order, f"{why} before it started")
 
     def _end_unstarted(self, order: Order, reason: str) -> None:
-        report = report_on(order, self._incarnation, ReportState.CANCELLED, reason=reason)
+        report = make_report(order, self._incarnation, ReportState.CANCELLED, reason=reason)
         self._journal.ended(order, report)
         self._outbox.wake()
 
-    async def _say(self, report: Report) -> None:
+    async def _report_unless_stored(self, report: Report) -> None:
         """Report what is no news to the journal, unless it stands there already."""
         address = report_address(report)
         try:

@@ -11,7 +11,7 @@ import msgspec
 from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.world import Object, Place, Surface
-from sim.yaml_file import Entry
+from sim.files.yaml_file import FileEntry
 
 FLOOR = "floor"
 """Where an object lies that lies on no surface."""
@@ -25,7 +25,7 @@ Rectangle = tuple[float, float, float, float]
 Rgba = tuple[float, float, float, float]
 
 
-class PlaceEntry(Entry, frozen=True):
+class PlaceEntry(FileEntry, frozen=True):
     """A named region of the floor: rectangles `(x_min, y_min, x_max, y_max)`."""
 
     label: str
@@ -33,14 +33,14 @@ class PlaceEntry(Entry, frozen=True):
     aliases: tuple[str, ...] = ()
 
 
-class WallEntry(Entry, frozen=True):
+class WallEntry(FileEntry, frozen=True):
     """A wall along a line, `wall_thickness_m` thick; doors are cut out of it."""
 
     from_m: PointXY
     to_m: PointXY
 
 
-class DoorEntry(Entry, frozen=True):
+class DoorEntry(FileEntry, frozen=True):
     """An opening in the wall at `center_m`."""
 
     between: tuple[Id, Id]
@@ -48,7 +48,7 @@ class DoorEntry(Entry, frozen=True):
     width_m: Positive
 
 
-class FurnitureEntry(Entry, frozen=True):
+class FurnitureEntry(FileEntry, frozen=True):
     """A `table` (its top is a surface with the name of the table) or a `block` (in the way only).
 
     `size_m` is (length along its own x, width along its own y, height).
@@ -61,7 +61,7 @@ class FurnitureEntry(Entry, frozen=True):
     yaw_deg: float = 0.0
 
 
-class ObjectKind(Entry, frozen=True):
+class ObjectKind(FileEntry, frozen=True):
     """What objects of one kind look like; a box has `size_m`, the others a radius.
 
     `categories` and `uses` are words for them: a bottle is a `drink`, and something to `drink`.
@@ -85,7 +85,7 @@ class ObjectKind(Entry, frozen=True):
         return (2 * radius, 2 * radius, self.height_m or 2 * radius)
 
 
-class ObjectEntry(Entry, frozen=True):
+class ObjectEntry(FileEntry, frozen=True):
     """A thing, and where it lies at the start.
 
     `on` is a table or `floor`; `at_m` counts from the table's centre, in the table's own axes
@@ -118,7 +118,7 @@ class Solid:
     height_m: float
 
 
-class WorldFile(Entry, frozen=True):
+class WorldFile(FileEntry, frozen=True):
     """A building, its furniture and the things in it. The outer walls run along its border."""
 
     world: Id
@@ -270,7 +270,7 @@ def _furniture(world: WorldFile) -> list[Solid]:
     ]
 
 
-class PlanOptions(Entry, frozen=True):
+class PlanOptions(FileEntry, frozen=True):
     """Which planner and which allocator; `None` leaves it to the planner's own settings."""
 
     strategy: str | None = None

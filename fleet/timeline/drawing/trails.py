@@ -6,8 +6,8 @@ from math import dist
 
 import rerun as rr
 
-from fleet.timeline.palette import Rgba
-from fleet.timeline.sink import Sink
+from fleet.timeline.drawing.palette import Rgba
+from fleet.timeline.drawing.sink import Sink
 from keyexpr_schema.payloads.motions import PointM
 
 STEP_M = 0.15

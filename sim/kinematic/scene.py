@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from keyexpr_schema.payloads.motions import PointM
 from keyexpr_schema.payloads.robots import PoseMRad
 from keyexpr_schema.payloads.simulation import Body, Frame, QuaternionWxyz, Scene, Shape, ShapeKind
-from sim.world_schema import WorldFile
+from sim.files.world_schema import WorldFile
 
 _UPRIGHT: QuaternionWxyz = (1.0, 0.0, 0.0, 0.0)
 _COLOURS = {

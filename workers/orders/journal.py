@@ -21,7 +21,7 @@ from keyexpr_schema.key import Payload
 from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact
 from workers.errors import JournalBusy, JournalUnreadable
-from workers.fencing import AttemptName, Entry, Ledger, Phase, attempt_name
+from workers.orders.fencing import Attempt, AttemptName, Ledger, Phase, attempt_name
 
 VERSION = 1
 _TABLES = """
@@ -125,30 +125,30 @@ class Journal:
     def queued(self, order: Order) -> None:
         """An order was accepted."""
         with self._transaction():
-            self._write(Entry(order=order, phase=Phase.QUEUED))
+            self._write(Attempt(order=order, phase=Phase.QUEUED))
 
     def renewed(self, order: Order) -> None:
         """A newer order for an attempt that is queued or running.
 
         A running attempt stays what it was when it started; only the fences go up.
         """
-        entry = self.ledger.entries[attempt_name(order)]
-        known = order if entry.phase is Phase.QUEUED else entry.order
+        attempt = self.ledger.attempts[attempt_name(order)]
+        known = order if attempt.phase is Phase.QUEUED else attempt.order
         with self._transaction():
             self._fence(order)
-            self._write(Entry(order=known, phase=entry.phase))
+            self._write(Attempt(order=known, phase=attempt.phase))
         self.ledger.saw(order)
 
     def started(self, order: Order, report: Report) -> None:
         """The attempt is about to move the robot. Returns when that is on the disk."""
         with self._transaction():
-            self._write(Entry(order=order, phase=Phase.STARTED))
+            self._write(Attempt(order=order, phase=Phase.STARTED))
             self._send(report)
 
     def ended(self, order: Order, report: Report, facts: tuple[Fact, ...] = ()) -> None:
         """The attempt has ended; its facts, then its report, wait to be sent."""
         with self._transaction():
-            self._write(Entry(order=order, phase=Phase.ENDED, report=report))
+            self._write(Attempt(order=order, phase=Phase.ENDED, report=report))
             for fact in facts:
                 self._send(fact)
             self._send(report)
@@ -229,8 +229,8 @@ class Journal:
             (("", order.epoch), (order.plan, order.revision)),
         )
 
-    def _write(self, entry: Entry) -> None:
-        order = entry.order
+    def _write(self, attempt: Attempt) -> None:
+        order = attempt.order
         self._fence(order)
         self._connection.execute(
             'INSERT INTO attempt (plan, task, attempt, phase, "order", report) '
@@ -238,12 +238,12 @@ class Journal:
             'phase=excluded.phase, "order"=excluded."order", report=excluded.report',
             (
                 *attempt_name(order),
-                entry.phase.value,
+                attempt.phase.value,
                 msgspec.json.encode(order),
-                None if entry.report is None else msgspec.json.encode(entry.report),
+                None if attempt.report is None else msgspec.json.encode(attempt.report),
             ),
         )
-        self.ledger.put(entry)
+        self.ledger.put(attempt)
 
     def _load(self, db: sqlite3.Connection) -> None:
         for name, highest in db.execute("SELECT name, highest FROM fence"):
@@ -254,7 +254,7 @@ class Journal:
         rows = db.execute('SELECT phase, "order", report FROM attempt ORDER BY number')
         for phase, order, report in rows:
             self.ledger.put(
-                Entry(
+                Attempt(
                     order=msgspec.json.decode(order, type=Order),
                     phase=Phase(phase),
                     report=None if report is None else msgspec.json.decode(report, type=Report),

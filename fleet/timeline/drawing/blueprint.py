@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint import encodings
 
-from fleet.timeline.sink import SIM_TIME
+from fleet.timeline.drawing.sink import SIM_TIME
 
 Rectangle = tuple[float, float, float, float]
 

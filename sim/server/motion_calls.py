@@ -15,7 +15,7 @@ REMEMBERED = 256
 """Ended calls that are still answered when they are asked again."""
 
 
-class Driver:
+class MotionCalls:
     """The calls of one robot, in front of a backend. Wall times are of the caller's clock."""
 
     def __init__(self, backend: Backend, robot: str) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import rerun as rr
 
-from fleet.timeline.sink import Sink
+from fleet.timeline.drawing.sink import Sink
 from keyexpr_schema.payloads.motions import PointM
 from keyexpr_schema.payloads.simulation import Shape, ShapeKind
 

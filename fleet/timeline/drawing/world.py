@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import rerun as rr
 
-from fleet.timeline.palette import Palette, Rgba
-from fleet.timeline.shapes import Bounds, log_shapes
-from fleet.timeline.sink import Sink, entity
-from fleet.timeline.text import drawable
-from fleet.timeline.trails import Trail
+from fleet.timeline.drawing.palette import Palette, Rgba
+from fleet.timeline.drawing.shapes import Bounds, log_shapes
+from fleet.timeline.drawing.sink import Sink, entity
+from fleet.timeline.drawing.text import drawable
+from fleet.timeline.drawing.trails import Trail
 from keyexpr_schema.payloads.motions import PointM
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
 from keyexpr_schema.payloads.simulation import Body, Frame, QuaternionWxyz, Scene, ShapeKind

@@ -6,7 +6,7 @@ from keyexpr_schema.payloads.tasks import Order, Report, ReportAddress, ReportSt
 from keyexpr_schema.payloads.world import Fact
 
 
-def report_on(
+def make_report(
     order: Order,
     incarnation: str,
     state: ReportState,

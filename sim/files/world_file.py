@@ -16,7 +16,7 @@ from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.ids import Id, check_id
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from sim.errors import BadFile
-from sim.world_schema import (
+from sim.files.world_schema import (
     FLOOR,
     LARGEST_RADIUS_M,
     Mission,
@@ -26,7 +26,7 @@ from sim.world_schema import (
     Solid,
     WorldFile,
 )
-from sim.yaml_file import Entry, read_yaml
+from sim.files.yaml_file import FileEntry, read_yaml
 
 __all__ = [
     "Mission",
@@ -39,29 +39,29 @@ __all__ = [
     "load_world",
 ]
 
-CONFIGS = Path(__file__).resolve().parent.parent / "configs"
+CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 """The configurations that come with the source tree."""
 
 
-class _Start(Entry, frozen=True):
+class _Start(FileEntry, frozen=True):
     at_m: PointXY
     yaw_deg: float = 0.0
 
 
-class _RobotEntry(Entry, frozen=True):
+class _RobotEntry(FileEntry, frozen=True):
     spec: str
     start: _Start
     robot: Id | None = None
     """A name of its own, so that a mission can have several of one specification."""
 
 
-class _Placement(Entry, frozen=True):
+class _Placement(FileEntry, frozen=True):
     on: str
     at_m: tuple[float, float]
     yaw_deg: float = 0.0
 
 
-class _MissionEntry(Entry, frozen=True):
+class _MissionEntry(FileEntry, frozen=True):
     mission: Id
     world: str
     robots: Annotated[tuple[_RobotEntry, ...], msgspec.Meta(min_length=1)]

@@ -10,8 +10,8 @@ from keyexpr_schema.errors import SchemaError, UndecodablePayload
 from keyexpr_schema.keyspace import FACT, REPORT
 from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.session import Session
-from workers.journal import Journal, Unsent
-from workers.reports import report_address
+from workers.orders.journal import Journal, Unsent
+from workers.orders.reports import report_address
 
 CONFIRM_S = 10.0
 PAUSE_S = 0.5

@@ -15,7 +15,7 @@ from sim.errors import BadFile
 S = TypeVar("S", bound=msgspec.Struct)
 
 
-class Entry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class FileEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Base of what stands in a configuration file: an unknown field is an error, not a wish."""
 
 

@@ -15,8 +15,8 @@ from keyexpr_schema.payloads.motions import MotionOutcome
 from keyexpr_schema.payloads.simulation import MotionCall, SimRobotAddress
 from keyexpr_schema.transport.session import Session
 from sim.backend import Backend
-from sim.driver import Driver
-from sim.publisher import Publisher
+from sim.server.motion_calls import MotionCalls
+from sim.server.publisher import Publisher
 
 CHUNK_S = 0.004
 """Wall time for which the world goes on before calls are looked at."""
@@ -53,7 +53,7 @@ class SimServer:
         self._session, self._backend = session, backend
         self._speed, self._grace_s, self._watchdog_s = speed, grace_s, watchdog_s
         self._idle_speed = idle_speed
-        self._drivers = {robot: Driver(backend, robot) for robot in backend.robots}
+        self._drivers = {robot: MotionCalls(backend, robot) for robot in backend.robots}
         self._publisher = Publisher(session, backend, speed)
         self._called = asyncio.Event()
         self._ready = asyncio.Event()

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.backend import Backend
 from sim.errors import SimError
-from sim.server import GRACE_S, WATCHDOG_S, SimServer
-from sim.single_instance import no_other_world
-from sim.world_file import load_mission
-from sim.world_schema import Mission
+from sim.files.world_file import load_mission
+from sim.files.world_schema import Mission
+from sim.server.sim_server import GRACE_S, WATCHDOG_S, SimServer
+from sim.server.single_instance import ensure_single_world
 
 if TYPE_CHECKING:
-    from sim.kinematic import Durations
+    from sim.kinematic.backend import MotionModel
 
 BACKENDS = ("mujoco", "kinematic")
 
@@ -29,7 +29,7 @@ def run(
     speed: float | None = 1.0,
     *,
     seed: int = 0,
-    durations: Durations | None = None,
+    motion_model: MotionModel | None = None,
     grace_s: float = GRACE_S,
     watchdog_s: float = WATCHDOG_S,
     idle_speed: float = 0.0,
@@ -37,7 +37,7 @@ def run(
     """Be the simulated world of `mission` until SIGTERM or SIGINT.
 
     Waits for a router. Prints one line to stdout once calls are answered. `speed` is simulated
-    seconds a second; `None` is as fast as it goes (see `SimServer`). `durations` is for the
+    seconds a second; `None` is as fast as it goes (see `SimServer`). `motion_model` is for the
     kinematic backend alone.
 
     Raises:
@@ -54,11 +54,11 @@ def run(
     config = SessionConfig(
         endpoints=endpoints, realm=realm, component="sim", connect_timeout_s=None
     )
-    world = make_backend(loaded, backend, seed=seed, speed=speed, durations=durations)
+    world = make_backend(loaded, backend, seed=seed, speed=speed, motion_model=motion_model)
 
     async def serve() -> None:
         async with open_session(config) as session:
-            await no_other_world(session)
+            await ensure_single_world(session)
             server = SimServer(session, world, speed, grace_s, watchdog_s, idle_speed)
             serving = asyncio.create_task(server.run())
             ready = asyncio.create_task(server.ready())
@@ -89,7 +89,7 @@ def make_backend(
     *,
     seed: int = 0,
     speed: float | None = None,
-    durations: Durations | None = None,
+    motion_model: MotionModel | None = None,
 ) -> Backend:
     """The world of `mission` by the name of its backend.
 
@@ -98,11 +98,11 @@ def make_backend(
     """
     robots = tuple((robot.spec, robot.start_m_rad) for robot in mission.robots)
     if backend == "kinematic":
-        from sim.kinematic import KinematicBackend
+        from sim.kinematic.backend import KinematicBackend
 
         # A world that jumps cannot keep up with a wall clock: there it goes in small steps.
         step_s = None if speed is None else 0.05
-        return KinematicBackend(mission.world, robots, durations, seed, step_s)
+        return KinematicBackend(mission.world, robots, motion_model, seed, step_s)
     from sim.mujoco_world import MujocoBackend
 
     return MujocoBackend(mission.world, robots, seed)

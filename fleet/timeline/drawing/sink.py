@@ -13,8 +13,8 @@ import numpy as np
 import rerun as rr
 
 from fleet.timeline.clock import Clock
+from fleet.timeline.drawing.text import drawable
 from fleet.timeline.errors import UnwritableRecording
-from fleet.timeline.text import drawable
 
 APPLICATION = "robotfleet"
 SIM_TIME = "sim_time"

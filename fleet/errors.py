@@ -15,7 +15,7 @@ class BadSkillFile(FleetError):
 
 
 class BadLlmConfig(FleetError):
-    """Configuration or prompts of the language model are wrong; says which field or file, and why."""
+    """Configuration or prompts of a language model are wrong; one sentence says where and why."""
 
 
 class NotUnderstood(FleetError):

@@ -52,7 +52,7 @@ class LlmConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     retry_wait_s: Seconds = 1.0
     """Before the first retry, doubled for each further one, unless the server says how long."""
     max_repairs: Count = 3
-    """Correction rounds after a rejected answer, in which the model hears what was wrong with it."""
+    """Correction rounds: after a rejected answer the model hears what was wrong with it."""
     max_tokens_per_plan: Positive = 100_000
     """In and out, over all rounds of a plan."""
     max_usd_per_plan: Usd | None = None

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from string import Template
 
-from fleet.llm.configuration import LlmConfig
 from fleet.errors import BadLlmConfig
+from fleet.llm.configuration import LlmConfig
 
 PROMPTS_DIR = Path(__file__).parent / "prompts"
 MAX_CHARS = 20_000

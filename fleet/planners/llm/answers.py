@@ -73,7 +73,9 @@ def plan_schema(
     for variant in variants[1:]:
         task = task | variant
     pin: Any = msgspec.defstruct(
-        "Pin", [("actor", _ActorName), ("robot", enumerated(world.team))], forbid_unknown_fields=True
+        "Pin",
+        [("actor", _ActorName), ("robot", enumerated(world.team))],
+        forbid_unknown_fields=True,
     )
     tasks = Annotated[list[task], msgspec.Meta(max_length=max_tasks)]
     kind = msgspec.defstruct(

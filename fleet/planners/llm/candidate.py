@@ -89,13 +89,11 @@ def conditions_of(goals: Sequence[Goal]) -> tuple[Condition, ...]:
     return tuple(condition for goal in goals for condition in goal.conditions)
 
 
-def merged(
-    candidates: Sequence[CandidatePlan], problem: PlanningProblem, keep_order: bool
-) -> Plan:
+def merged(candidates: Sequence[CandidatePlan], problem: PlanningProblem, keep_order: bool) -> Plan:
     """One plan of checked candidates, with names that are unique over the revisions of the plan.
 
-    Between candidates there is only the order that deordering leaves. Within a candidate the model's
-    own order is kept, too, if `keep_order`.
+    Between candidates there is only the order that deordering leaves; within a candidate the
+    model's own order is kept, too, if `keep_order`.
     """
     world = problem.world
     strands: list[Strand] = []

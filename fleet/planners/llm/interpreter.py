@@ -40,7 +40,7 @@ class GoalAnswer(Answer, frozen=True):
 
 @dataclass(frozen=True)
 class _Signature:
-    """What a relation takes: pairs of the subject's type and the value's type or the value itself."""
+    """What a relation takes: pairs of the subject's type, and the value's type or the value."""
 
     types: frozenset[tuple[str, str | bool]]
 
@@ -117,13 +117,15 @@ class LlmInterpreter:
         found: list[Violation] = []
         for subject in dict.fromkeys((row.subject, *row.any_of)):
             if (kind := _type_of(subject, vocabulary)) is None:
-                names = ", ".join([*vocabulary.objects, *vocabulary.places, *vocabulary.robots]) or "none"
+                names = (
+                    ", ".join([*vocabulary.objects, *vocabulary.places, *vocabulary.robots])
+                    or "none"
+                )
                 sentence = f"{subject} is not a known name; known are {names}"
                 found.append(Violation(code="unknown-name", sentence=sentence))
             elif not any(
-                kind == wanted
-                and (row.value is value or row.value == value or _fits(row.value, value, vocabulary))
-                for wanted, value in signature.types
+                kind == subject_type and _fits(row.value, value_type, vocabulary)
+                for subject_type, value_type in signature.types
             ):
                 sentence = (
                     f"{row.relation}({subject}) = {row.value} does not fit: {subject} is a {kind}, "
@@ -134,7 +136,9 @@ class LlmInterpreter:
 
 
 def _fits(value: str | bool, wanted: str | bool, vocabulary: Vocabulary) -> bool:
-    return isinstance(value, str) and wanted is not True and _type_of(value, vocabulary) == wanted
+    if wanted in ("object", "place", "robot"):
+        return isinstance(value, str) and _type_of(value, vocabulary) == wanted
+    return value == wanted
 
 
 def _type_of(name: str, vocabulary: Vocabulary) -> str | None:

@@ -32,7 +32,9 @@ def _skill_text(skill: SkillModel) -> str:
     if needs:
         sentences.append(f"Needs: {', '.join(needs)}.")
     sentences.append(f"Before: {', '.join(before) or 'nothing'}.")
-    sentences.append(f"After: {', '.join(_literal_text(*row) for row in skill.after) or 'nothing'}.")
+    sentences.append(
+        f"After: {', '.join(_literal_text(*row) for row in skill.after) or 'nothing'}."
+    )
     return " ".join(sentences)
 
 
@@ -115,7 +117,9 @@ def vocabulary_text(text: str, vocabulary: Vocabulary) -> str:
                 }
                 for name, thing in vocabulary.objects.items()
             ],
-            "robots": [{"robot": name, "label": spec.label} for name, spec in vocabulary.robots.items()],
+            "robots": [
+                {"robot": name, "label": spec.label} for name, spec in vocabulary.robots.items()
+            ],
             "sentence": text,
         }
     )

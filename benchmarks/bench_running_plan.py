@@ -21,7 +21,7 @@ from fleet.core import events
 from fleet.core.dispatch.delays import FACTOR, MARGIN_S
 from fleet.core.effects import MakePlan
 from fleet.core.events import PlanningSucceeded
-from fleet.core.state import OUTSTANDING, PlanBook, Policy, State
+from fleet.core.state import OUTSTANDING, PlanEntry, Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
 from fleet.service.planning_job import carry_out
@@ -54,13 +54,13 @@ def main() -> None:
         for _ in range(DONE_BEFORE):
             running.succeed()
         each_s = (time.perf_counter() - began_s) / (2 * DONE_BEFORE)
-        before = running.book.allocation
+        before = running.entry.allocation
         happens(running)
-        book, made = running.book, running.made
-        moved = sum(before.get(actor, robot) != robot for actor, robot in book.allocation.items())
-        changed = book.change or PlanChange()
+        entry, made = running.entry, running.made
+        moved = sum(before.get(actor, robot) != robot for actor, robot in entry.allocation.items())
+        changed = entry.change or PlanChange()
         changes = [str(n) for n in (changed.kept, changed.dropped, changed.added)]
-        least = next((n.split(" is ")[-1] for n in book.notes if "least found" in n), "")
+        least = next((n.split(" is ")[-1] for n in entry.notes if "least found" in n), "")
         table.add_row(
             (happens.__doc__ or "").split(".")[0],
             f"{made.planning_time_s:.2f} s",
@@ -112,7 +112,7 @@ class Running:
         self.tell(events.PlanRequested, request=PlanRequest(request="r", plan="p"))
 
     @property
-    def book(self) -> PlanBook:
+    def entry(self) -> PlanEntry:
         """What is kept of the plan."""
         return self.state.plans["p"]
 
@@ -136,7 +136,7 @@ class Running:
 
     def outstanding(self) -> list[TaskRecord]:
         """Tasks that robots are at."""
-        return [record for record in self.book.records.values() if record.state in OUTSTANDING]
+        return [record for record in self.entry.records.values() if record.state in OUTSTANDING]
 
     def succeed(self) -> None:
         """Some robot starts its task and ends it."""

@@ -30,6 +30,7 @@ from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotSta
 from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Report, ReportState
 from keyexpr_schema.payloads.world import Fact, FactAddress, ObjectAddress, PlaceAddress, Statement
 from keyexpr_schema.transport.watch import Change
+from sim.files.world_payloads import object_payloads
 from sim.kinematic.backend import KinematicBackend
 from workers.skill import SkillRegistry
 from workers.skills.household import HOUSEHOLD
@@ -115,9 +116,9 @@ class FleetRun:
             task.cancel()
         with suppress(asyncio.CancelledError):
             await asyncio.gather(*working)
-        for book in self.state.plans.values():
-            if book.reason:
-                self.counts.reasons.append(book.reason)
+        for entry in self.state.plans.values():
+            if entry.reason:
+                self.counts.reasons.append(entry.reason)
         return wrong
 
     def witness(self) -> Witness:
@@ -190,7 +191,7 @@ class FleetRun:
         for place in self._places.values():
             self._view.apply(Change(PLACE, PlaceAddress(place.place), place, ""))
             self._tell(events.PlacePut, place=place)
-        for thing in self.mission.world.objects():
+        for thing in object_payloads(self.mission.world):
             self._view.apply(Change(OBJECT, ObjectAddress(thing.object), thing, ""))
             self._tell(events.ObjectPut, object=thing)
         for spec, _ in self.mission.robots:
@@ -229,9 +230,9 @@ class FleetRun:
 
     def _done(self) -> bool:
         """Whether nothing more will happen by itself."""
-        books = self.state.plans.values()
-        return all(book.ended or book.state in ENDED_PLANS for book in books) and not any(
-            book.outstanding() for book in books
+        entries = self.state.plans.values()
+        return all(entry.ended or entry.state in ENDED_PLANS for entry in entries) and not any(
+            entry.outstanding() for entry in entries
         )
 
     def goals_ended(self) -> bool:

@@ -17,8 +17,8 @@ from fleet.core.dispatch.delays import SAME_CLOCK_S
 from fleet.core.dispatch.dispatcher import next_timer
 from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event
-from fleet.core.model.spoken_skills import deeds_of
-from fleet.core.state import Job, Policy, State
+from fleet.core.model.skill_phrases import phrases_of
+from fleet.core.state import PlanningJob, Policy, State
 from fleet.core.step import replay, step
 from fleet.errors import Superseded
 from fleet.service.composition import Composition
@@ -62,7 +62,7 @@ class PlannerService:
         self._policy = replace(
             policy or Policy(),
             interpreter=self._interpreter.configured,
-            deeds=deeds_of(parts.skills),
+            skill_phrases=phrases_of(parts.skills),
         )
         self._incarnation = uuid.uuid4().hex[:12]
         self._state = State()
@@ -280,7 +280,7 @@ class PlannerService:
         self._planning.add(task)
         task.add_done_callback(self._planning.discard)
 
-    async def _make_plan(self, job: Job) -> None:
+    async def _make_plan(self, job: PlanningJob) -> None:
         at = self._at()
         try:
             event: Event = await asyncio.to_thread(carry_out, job, self._state, self._parts, at)

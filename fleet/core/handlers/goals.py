@@ -102,17 +102,17 @@ def goal_deleted(state: State, event: events.GoalDeleted) -> State:
         goals=without(state.goals, event.goal),
         goal_states=without(state.goal_states, event.goal),
     )
-    for plan, book in state.plans.items():
-        if event.goal in book.plan.goals and not book.ended:
-            rest = without_goal(state, book.plan, event.goal)
-            book = replace(
-                book,
+    for plan, entry in state.plans.items():
+        if event.goal in entry.plan.goals and not entry.ended:
+            rest = without_goal(state, entry.plan, event.goal)
+            entry = replace(
+                entry,
                 plan=rest,
                 replan_reason=f"goal {event.goal} was deleted",
                 outside_reason=f"goal {event.goal} was deleted",
-                cancelling=book.cancelling or not rest.goals,
+                cancelling=entry.cancelling or not rest.goals,
             )
-            state = replace(state, plans=put(state.plans, plan, book))
+            state = replace(state, plans=put(state.plans, plan, entry))
     return state
 
 
@@ -385,7 +385,7 @@ def _words_changed(state: State) -> State:
 
 def active_plan_of(state: State, goal: str) -> str | None:
     """The plan that works on a goal and has not ended."""
-    for plan, book in state.plans.items():
-        if goal in book.plan.goals and not book.ended and book.state is not PlanState.REJECTED:
+    for plan, entry in state.plans.items():
+        if goal in entry.plan.goals and not entry.ended and entry.state is not PlanState.REJECTED:
             return plan
     return None

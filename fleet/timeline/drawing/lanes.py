@@ -80,7 +80,7 @@ class Lanes:
             self._transition(lane, time_s)
 
     def record(self, record: TaskRecord, now_s: float) -> None:
-        """Bring the lanes up to what the planner's books say of one task."""
+        """Bring the lanes up to what the planner's record says of one task."""
         task = (record.plan, record.task)
         before = self._last.get(task)
         if record.robot is None or record.started_s is None:

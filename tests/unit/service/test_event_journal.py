@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import sqlite3
+import zlib
 from pathlib import Path
 
 import pytest
 
 from fleet.core.events import decode_event
-from fleet.core.state import State
+from fleet.core.state import PlanEntry, PlanningJob, Policy, State
 from fleet.core.step import replay, step
 from fleet.service import event_journal
-from fleet.service.event_journal import EventJournal, JournalInUse
+from fleet.service.event_journal import SNAPSHOT_FORMAT, EventJournal, JournalInUse
 from tests.fleet_model import FleetModel
 from tests.household import SKILLS, bring, carrier, manipulator
+from tests.replay.journal_files import HERE, events_in
 
 
 def mission() -> FleetModel:
@@ -58,17 +61,33 @@ def test_a_snapshot_shortens_the_replay_and_changes_nothing(
         assert replay(rest, SKILLS, state) == model.state
 
 
-def test_a_snapshot_that_does_not_decode_is_left_aside(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(event_journal, "SNAPSHOT_EVERY", 7)
-    model = mission()
-    keep(tmp_path, model)
-    with EventJournal(tmp_path) as journal:
-        journal._db.execute("UPDATE snapshots SET state = ?", (b'{"plans": 7}',))
-        number, state = journal.snapshot()
-        assert number == 0
-        assert replay(journal.events(number), SKILLS, state) == model.state
+@pytest.mark.parametrize(
+    "snapshot",
+    [
+        (HERE / "two-cups.snapshot-1.json").read_bytes(),
+        b'{"format": 1, "state": {}}',
+        b'{"format": %d, "state": {"plans": 7}}' % SNAPSHOT_FORMAT,
+        b"rubbish",
+    ],
+    ids=["without-a-format", "older-format", "does-not-decode", "not-json"],
+)
+def test_a_snapshot_in_another_format_is_left_aside(tmp_path: Path, snapshot: bytes) -> None:
+    journal = events_in("two-cups")
+    with EventJournal(tmp_path) as kept:
+        for event in journal:
+            kept.append(event, State())
+    with sqlite3.connect(tmp_path / "events.db") as db:
+        db.execute("INSERT INTO snapshots VALUES (26, ?)", (snapshot,))
+    with EventJournal(tmp_path) as kept:
+        number, state = kept.snapshot()
+        assert (number, state) == (0, State())
+        assert replay(kept.events(number), SKILLS, state) == replay(journal, SKILLS)
+
+
+def test_the_format_counts_up_when_a_field_of_the_state_gets_another_name() -> None:
+    kinds = (State, PlanEntry, PlanningJob, Policy)
+    names = " ".join(name for kind in kinds for name in kind.__struct_encode_fields__)
+    assert {SNAPSHOT_FORMAT: zlib.crc32(names.encode())} == {2: 2414712561}, "count SNAPSHOT_FORMAT up"
 
 
 def test_two_planners_cannot_have_one_journal(tmp_path: Path) -> None:

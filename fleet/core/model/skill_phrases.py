@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from fleet.core.model.skills import SkillModel
-from fleet.language.vocabulary import Deed
+from fleet.language.vocabulary import SkillPhrase
 
 
-def deeds_of(skills: Mapping[str, SkillModel]) -> tuple[Deed, ...]:
+def phrases_of(skills: Mapping[str, SkillModel]) -> tuple[SkillPhrase, ...]:
     """The skills that make something true of one object or place, and of that alone.
 
     What they do to robots aside; a skill whose effects name a second thing, as `place` names where
@@ -24,5 +24,5 @@ def deeds_of(skills: Mapping[str, SkillModel]) -> tuple[Deed, ...]:
             sort = skill.parameters[about.pop()]
             wants = tuple((relation, value) for relation, _, value in rows if value is not None)
             if wants:
-                found.append(Deed(verb=name.replace("_", " "), sort=sort, wants=wants))
+                found.append(SkillPhrase(verb=name.replace("_", " "), sort=sort, wants=wants))
     return tuple(found)

@@ -136,7 +136,7 @@ TASK_RECORD = Key(
     "task_record", "plans/{plan}/tasks/{task}",
     tasks.TaskAddress, tasks.TaskRecord, delivery=STORED,
     writers=PLANNER, readers=PLANNER | PERSON | RECORDER,
-    about="What the planner knows of one task: state, robot, attempts, times, reasons.",
+    about="The planner's record of one task: state, robot, attempts, times, reasons.",
 )
 
 # --- requests ------------------------------------------------------------------------------------

@@ -156,5 +156,5 @@ def load_llm_config(path: Path | None = None) -> LlmConfig:
 def default_file() -> Path | None:
     """The configuration file that is read when none is named, if it exists."""
     below = Path("configs") / DEFAULT_FILE
-    beside = Path(__file__).parents[3] / "configs" / DEFAULT_FILE
+    beside = Path(__file__).parents[2] / "configs" / DEFAULT_FILE
     return next((file for file in (below, beside) if file.exists()), None)

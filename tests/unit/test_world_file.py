@@ -12,8 +12,8 @@ import pytest
 import yaml
 
 from sim.errors import BadFile
+from sim.files.world_file import CONFIGS, find_mission, load_mission, load_robot, load_world
 from sim.reach import out_of_reach
-from sim.world_file import CONFIGS, find_mission, load_mission, load_robot, load_world
 
 HOME = CONFIGS / "worlds" / "home.yaml"
 # `on` is a boolean to PyYAML's own loader, and a word to ours.

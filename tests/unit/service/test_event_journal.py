@@ -87,7 +87,9 @@ def test_a_snapshot_in_another_format_is_left_aside(tmp_path: Path, snapshot: by
 def test_the_format_counts_up_when_a_field_of_the_state_gets_another_name() -> None:
     kinds = (State, PlanEntry, PlanningJob, Policy)
     names = " ".join(name for kind in kinds for name in kind.__struct_encode_fields__)
-    assert {SNAPSHOT_FORMAT: zlib.crc32(names.encode())} == {2: 2414712561}, "count SNAPSHOT_FORMAT up"
+    assert {SNAPSHOT_FORMAT: zlib.crc32(names.encode())} == {2: 2414712561}, (
+        "count SNAPSHOT_FORMAT up"
+    )
 
 
 def test_two_planners_cannot_have_one_journal(tmp_path: Path) -> None:

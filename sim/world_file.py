@@ -12,7 +12,8 @@ from typing import Annotated
 
 import msgspec
 
-from keyexpr_schema.errors import InvalidId
+from keyexpr_schema.config_files import config_file
+from keyexpr_schema.errors import InvalidId, NoConfigFile
 from keyexpr_schema.ids import Id, check_id
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from sim.errors import BadFile
@@ -33,14 +34,10 @@ __all__ = [
     "MissionRobot",
     "PlanOptions",
     "WorldFile",
-    "find_mission",
     "load_mission",
     "load_robot",
     "load_world",
 ]
-
-CONFIGS = Path(__file__).resolve().parent.parent / "configs"
-"""The configurations that come with the source tree."""
 
 
 class _Start(Entry, frozen=True):
@@ -72,17 +69,17 @@ class _MissionEntry(Entry, frozen=True):
     plan: PlanOptions = PlanOptions()
 
 
-def load_world(path: str | Path) -> WorldFile:
-    """The world file at `path`, checked."""
-    path = Path(path)
+def load_world(name: str | Path, named_in: Path | None = None) -> WorldFile:
+    """The world file given by path or name (see `config_file`), checked."""
+    path = _file("worlds", name, named_in)
     world = read_yaml(path, WorldFile, "world file")
     _check_world(path, world)
     return world
 
 
-def load_robot(path: str | Path) -> RobotSpec:
-    """The robot file at `path`, checked."""
-    path = Path(path)
+def load_robot(name: str | Path) -> RobotSpec:
+    """The robot file given by path or name (see `config_file`), checked."""
+    path = _file("robots", name)
     spec = read_yaml(path, RobotSpec, "robot file")
     for name, value in spec.capabilities.items():
         if not (math.isfinite(value) and value >= 0.0):
@@ -94,41 +91,21 @@ def load_robot(path: str | Path) -> RobotSpec:
     return spec
 
 
-def find_mission(name: str | Path) -> Path:
-    """The file of a mission given by path, or by the name of a file in configs/missions.
-
-    Looked for in this order: the path itself, ./configs/missions, the source tree's own configs.
-    """
-    given = Path(name)
-    if given.suffix in (".yaml", ".yml") or len(given.parts) > 1:
-        if given.is_file():
-            return given
-        raise BadFile(f"the mission file {given} does not exist")
-    folders = (Path("configs") / "missions", CONFIGS / "missions")
-    for folder in folders:
-        if (folder / f"{given}.yaml").is_file():
-            return folder / f"{given}.yaml"
-    known = sorted({file.stem for folder in folders for file in folder.glob("*.yaml")})
-    raise BadFile(
-        f"there is no mission {str(given)!r}; there are {', '.join(known) or 'none'}, "
-        "or give the path of a mission file"
-    )
-
-
 def load_mission(name: str | Path) -> Mission:
-    """The mission given by path or name (see `find_mission`), with its world and robots."""
-    path = find_mission(name)
+    """The mission given by path or name (see `config_file`), with its world and robots."""
+    path = _file("missions", name)
     entry = read_yaml(path, _MissionEntry, "mission file")
-    world = _rearranged(path, load_world(path.parent / entry.world), entry.objects)
+    world = _rearranged(path, load_world(entry.world, path), entry.objects)
     robots: list[MissionRobot] = []
     for number, item in enumerate(entry.robots):
-        spec = load_robot(path.parent / item.spec)
+        file = _file("robots", item.spec, path)
+        spec = load_robot(file)
         if item.robot is not None:
             spec = msgspec.structs.replace(spec, robot=item.robot)
         start = (*item.start.at_m, math.radians(item.start.yaw_deg))
         where = f"{path}: robots[{number}] ({spec.robot})"
         _check_start(where, world, spec.robot, start, robots)
-        robots.append(MissionRobot(spec=spec, start_m_rad=start))
+        robots.append(MissionRobot(spec=spec, start_m_rad=start, folder=file.parent))
     return Mission(
         mission=entry.mission,
         world=world,
@@ -137,6 +114,13 @@ def load_mission(name: str | Path) -> Mission:
         goals=entry.goals,
         plan=entry.plan,
     )
+
+
+def _file(kind: str, name: str | Path, named_in: Path | None = None) -> Path:
+    try:
+        return config_file(kind, name, named_in)
+    except NoConfigFile as error:
+        raise BadFile(str(error)) from None
 
 
 def _rearranged(

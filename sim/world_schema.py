@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Literal
 
 import msgspec
@@ -279,10 +280,11 @@ class PlanOptions(Entry, frozen=True):
 
 
 class MissionRobot(msgspec.Struct, frozen=True, kw_only=True):
-    """A robot of a mission and where the simulation puts it."""
+    """A robot of a mission, where the simulation puts it, and the folder of its robot file."""
 
     spec: RobotSpec
     start_m_rad: PoseMRad
+    folder: Path
 
 
 class Mission(msgspec.Struct, frozen=True, kw_only=True):

@@ -126,7 +126,7 @@ TASK_RECORD = Key(
     "task_record", "plans/{plan}/tasks/{task}",
     tasks.TaskAddress, tasks.TaskRecord,
     "planner", "robotctl, recorder", Kept.STORED,
-    "The planner's books on one task: state, robot, attempts, times, reasons.",
+    "The planner's record of one task: state, robot, attempts, times, reasons.",
 )
 
 # --- requests ------------------------------------------------------------------------------------

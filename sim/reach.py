@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from sim.files.world_schema import Mission
 from sim.mujoco_world.description import load_description
 from sim.mujoco_world.driving import REACH_MARGIN_M
 from sim.navigation.clearance import Clearance
 from sim.navigation.lattice import Lattice
 from sim.navigation.spots import Spots
-from sim.world_schema import Mission
 
 
 def out_of_reach(mission: Mission) -> tuple[str, ...]:

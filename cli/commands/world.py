@@ -29,7 +29,7 @@ async def load(
 ) -> None:
     """Tell the fleet the places and objects of a world file (not where the objects are)."""
     from cli.telling import put_world
-    from sim.world_file import load_world
+    from sim.files.world_file import load_world
 
     told = load_world(file)
     async with call.session() as session:

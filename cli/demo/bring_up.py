@@ -20,7 +20,7 @@ from keyexpr_schema.transport.session import Session, SessionConfig, open_sessio
 
 if TYPE_CHECKING:
     from cli.demo.mission_run import DemoOptions
-    from sim.world_file import Mission
+    from sim.files.world_file import Mission
 
 READY_S = 60.0
 """How long a process may take until it shows that it is there; a busy machine starts slowly."""

@@ -49,7 +49,7 @@ def world_of_files(
         BadArgument: a fact is not RELATION SUBJECT VALUE.
         Unknown: a fact's subject is nothing that there is.
     """
-    from sim.world_file import load_robot, load_world
+    from sim.files.world_file import load_robot, load_world
 
     told = load_world(world)
     specs = [load_robot(file) for file in robots]

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from fleet.llm.client import ModelAnswer, ModelCaller
 from fleet.llm.configuration import LlmConfig, Structured
 from fleet.llm.prompts import Prompts
-from fleet.llm.wording import violations_text
+from fleet.llm.quoting import violations_text
 from keyexpr_schema.payloads.plans import Making, Violation
 
 log = logging.getLogger(__name__)

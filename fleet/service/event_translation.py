@@ -28,25 +28,25 @@ At = Mapping[str, Any]
 """`time_s` and `wall_time_s` of an event."""
 
 _PUT: dict[str, Callable[[Any, At], Event]] = {
-    GOAL_SPEC.name: lambda v, at: events.GoalTold(goal=v, **at),
-    FACT.name: lambda v, at: events.FactTold(fact=v, **at),
-    STATEMENT.name: lambda v, at: events.StatementTold(statement=v, **at),
-    PLACE.name: lambda v, at: events.PlaceTold(place=v, **at),
-    OBJECT.name: lambda v, at: events.ObjectTold(object=v, **at),
-    ROBOT_SPEC.name: lambda v, at: events.RobotTold(spec=v, **at),
-    REPORT.name: lambda v, at: events.ReportTold(report=v, **at),
-    PLAN_REQUEST.name: lambda v, at: events.PlanAsked(request=v, **at),
-    REPLAN_REQUEST.name: lambda v, at: events.ReplanAsked(request=v, **at),
-    CONTROL_REQUEST.name: lambda v, at: events.ControlAsked(request=v, **at),
+    GOAL_SPEC.name: lambda v, at: events.GoalPut(goal=v, **at),
+    FACT.name: lambda v, at: events.FactPut(fact=v, **at),
+    STATEMENT.name: lambda v, at: events.StatementPut(statement=v, **at),
+    PLACE.name: lambda v, at: events.PlacePut(place=v, **at),
+    OBJECT.name: lambda v, at: events.ObjectPut(object=v, **at),
+    ROBOT_SPEC.name: lambda v, at: events.RobotRegistered(spec=v, **at),
+    REPORT.name: lambda v, at: events.ReportReceived(report=v, **at),
+    PLAN_REQUEST.name: lambda v, at: events.PlanRequested(request=v, **at),
+    REPLAN_REQUEST.name: lambda v, at: events.ReplanRequested(request=v, **at),
+    CONTROL_REQUEST.name: lambda v, at: events.ControlRequested(request=v, **at),
     PLAN_SPEC.name: lambda v, at: events.PlanProposed(plan=v, **at),
 }
 _DELETED: dict[str, Callable[[Any, At], Event]] = {
-    GOAL_SPEC.name: lambda a, at: events.GoalForgotten(goal=a.goal, **at),
-    FACT.name: lambda a, at: events.FactForgotten(subject=a.subject, relation=a.relation, **at),
-    STATEMENT.name: lambda a, at: events.StatementForgotten(statement=a.statement, **at),
-    PLACE.name: lambda a, at: events.PlaceForgotten(place=a.place, **at),
-    OBJECT.name: lambda a, at: events.ObjectForgotten(object=a.object, **at),
-    ROBOT_SPEC.name: lambda a, at: events.RobotForgotten(robot=a.robot, **at),
+    GOAL_SPEC.name: lambda a, at: events.GoalDeleted(goal=a.goal, **at),
+    FACT.name: lambda a, at: events.FactDeleted(subject=a.subject, relation=a.relation, **at),
+    STATEMENT.name: lambda a, at: events.StatementDeleted(statement=a.statement, **at),
+    PLACE.name: lambda a, at: events.PlaceDeleted(place=a.place, **at),
+    OBJECT.name: lambda a, at: events.ObjectDeleted(object=a.object, **at),
+    ROBOT_SPEC.name: lambda a, at: events.RobotUnregistered(robot=a.robot, **at),
 }
 
 WATCHED: tuple[Key[Any, Any], ...] = (

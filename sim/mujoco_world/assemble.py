@@ -14,8 +14,8 @@ from typing import Any
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.errors import BadFile
+from sim.files.world_schema import ObjectKind, Solid, WorldFile
 from sim.mujoco_world.description import RobotModel
-from sim.world_schema import ObjectKind, Solid, WorldFile
 
 STEP_S = 0.005
 """Physics step. 5 ms carries a grasp by friction with the solver settings below."""

@@ -10,6 +10,7 @@ from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, M
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from sim.backend import Backend
+from sim.files.world_schema import WorldFile
 from sim.mujoco_world.assemble import STEP_S, compile_world
 from sim.mujoco_world.collisions import Collisions
 from sim.mujoco_world.description import load_description
@@ -22,7 +23,6 @@ from sim.mujoco_world.observer import Observer
 from sim.mujoco_world.robot_body import RobotBody
 from sim.mujoco_world.stage import Act, CannotDo, Ending, Stage, Steps
 from sim.navigation import Navigator
-from sim.world_schema import WorldFile
 
 STEPS = round(PERIOD_S / STEP_S)
 WATCH_EVERY = 2

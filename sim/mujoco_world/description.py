@@ -14,7 +14,7 @@ import msgspec
 
 from keyexpr_schema.config_files import config_folders
 from sim.errors import BadFile
-from sim.yaml_file import Entry, read_yaml
+from sim.files.yaml_file import FileEntry, read_yaml
 
 MODELS = Path(__file__).resolve().parent.parent / "models"
 """The models that come with this package."""
@@ -22,7 +22,7 @@ MODELS = Path(__file__).resolve().parent.parent / "models"
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 
 
-class PlanarDrive(Entry, frozen=True, tag_field="kind", tag="planar"):
+class PlanarDrive(FileEntry, frozen=True, tag_field="kind", tag="planar"):
     """Moves in any direction: three joints (x, y, yaw in the world frame) with velocity servos."""
 
     joints: tuple[str, str, str]
@@ -31,7 +31,7 @@ class PlanarDrive(Entry, frozen=True, tag_field="kind", tag="planar"):
     yaw_rate_rad_s: Positive = 1.2
 
 
-class DifferentialDrive(Entry, frozen=True, tag_field="kind", tag="differential"):
+class DifferentialDrive(FileEntry, frozen=True, tag_field="kind", tag="differential"):
     """Two driven wheels under a free body. Joints: the free one, left wheel, right wheel."""
 
     joints: tuple[str, str, str]
@@ -42,14 +42,14 @@ class DifferentialDrive(Entry, frozen=True, tag_field="kind", tag="differential"
     yaw_rate_rad_s: Positive = 1.2
 
 
-class CameraEntry(Entry, frozen=True):
+class CameraEntry(FileEntry, frozen=True):
     """A camera at `site`, looking along the base's x axis."""
 
     site: str
     fov_deg: Positive = 70.0
 
 
-class ArmEntry(Entry, frozen=True):
+class ArmEntry(FileEntry, frozen=True):
     """An arm that reaches down: the hand's x axis (of `grip_site`) points at the floor.
 
     `stow` and `seeds` are joint values in the order of `joints`; `speeds` in m/s or rad/s.
@@ -65,7 +65,7 @@ class ArmEntry(Entry, frozen=True):
     reach_m: tuple[Positive, Positive]
 
 
-class GripperEntry(Entry, frozen=True):
+class GripperEntry(FileEntry, frozen=True):
     """Two fingers that move as one; a position servo whose zero is closed.
 
     `touch` are touch sensors (N) on the finger pads, `pads` the geoms that hold.
@@ -80,14 +80,14 @@ class GripperEntry(Entry, frozen=True):
     finger_depth_m: Positive
 
 
-class BasketEntry(Entry, frozen=True):
+class BasketEntry(FileEntry, frozen=True):
     """`site` is a box: the volume in which the base of a carried object lies."""
 
     site: str
     body: str
 
 
-class Description(Entry, frozen=True):
+class Description(FileEntry, frozen=True):
     """A robot model, for its controllers."""
 
     base: PlanarDrive | DifferentialDrive

@@ -7,6 +7,7 @@ from collections.abc import Generator
 
 from keyexpr_schema.payloads.motions import Motion, PointM
 from keyexpr_schema.payloads.robots import PoseMRad
+from sim.files.world_schema import Solid
 from sim.mujoco_world.drives import wrap
 from sim.mujoco_world.driving import distance_m
 from sim.mujoco_world.handling import (
@@ -20,7 +21,6 @@ from sim.mujoco_world.handling import (
 )
 from sim.mujoco_world.robot_body import RobotBody
 from sim.mujoco_world.stage import Act, CannotDo, Ending, Stage, Step, Steps, face, stow
-from sim.world_schema import Solid
 
 BASKET_OPENING_M = 0.012
 """In a basket the fingers open only this much, so as not to push against its walls."""

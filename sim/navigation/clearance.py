@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.world_schema import WorldFile
+from sim.files.world_schema import WorldFile
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fleet.core.checker.plan_checker import check_plan
-from fleet.llm.wording import fenced
+from fleet.llm.quoting import fenced
 from fleet.planners.base import PlanningProblem
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema, read_answer
 from fleet.planners.llm.draft import Draft, draft_of, merged, plan_of

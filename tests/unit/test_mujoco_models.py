@@ -10,9 +10,9 @@ import pytest
 
 from keyexpr_schema.payloads.robots import RobotSpec
 from sim.errors import BadFile
+from sim.files.world_file import load_mission, load_robot, load_world
 from sim.mujoco_world import MODELS, MujocoBackend, load_description
-from sim.process import make_backend
-from sim.world_file import load_mission, load_robot, load_world
+from sim.server.process import make_backend
 
 HOME = load_world("home")
 HSR = load_robot("hsr")

@@ -12,8 +12,8 @@ import pytest
 import yaml
 
 from sim.errors import BadFile
+from sim.files.world_file import load_mission, load_robot, load_world
 from sim.reach import out_of_reach
-from sim.world_file import load_mission, load_robot, load_world
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 HOME = CONFIGS / "worlds" / "home.yaml"

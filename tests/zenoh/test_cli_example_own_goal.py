@@ -10,7 +10,7 @@ from cli.demo.bring_up import router_up
 from cli.demo.fleet import Fleet, free_endpoint
 from cli.telling import put_world
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from sim.world_file import load_world
+from sim.files.world_file import load_world
 
 ROOT = Path(__file__).parents[2]
 

@@ -20,8 +20,8 @@ from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Order, OrderAddress, Re
 from keyexpr_schema.payloads.world import Fact, FactAddress, ObjectAddress, PlaceAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.backend import Backend
-from sim.world_file import Mission, load_mission
-from workers.journal import Journal
+from sim.files.world_file import Mission, load_mission
+from workers.orders.journal import Journal
 from workers.runtime import Worker
 from workers.skill import Skill, SkillRegistry
 from workers.skills.household import HOUSEHOLD

@@ -10,7 +10,7 @@ import msgspec
 
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
-from fleet.llm.wording import useful_skills
+from fleet.planners.llm.prompt_text import useful_skills
 from keyexpr_schema.ids import ACTOR_PREFIX, Id
 from keyexpr_schema.payloads.goals import Goal
 

@@ -12,8 +12,9 @@ from fleet.llm.client import ModelCaller
 from fleet.llm.configuration import LlmConfig
 from fleet.llm.conversation import Conversation, GivenUp, Ledger, Rejected
 from fleet.llm.prompts import load_prompts
-from fleet.llm.wording import cleaned, vocabulary_text
+from fleet.llm.quoting import cleaned
 from fleet.planners.llm.answers import Answer, read_answer, schema_of
+from fleet.planners.llm.prompt_text import vocabulary_text
 from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Violation

@@ -14,11 +14,11 @@ from fleet.llm.client import ModelCaller
 from fleet.llm.configuration import LlmConfig
 from fleet.llm.conversation import Conversation, GivenUp, Ledger, Rejected
 from fleet.llm.prompts import load_prompts
-from fleet.llm.wording import problem_text, skills_text, useful_skills
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema, read_answer
 from fleet.planners.llm.draft import Draft, conditions_of, draft_of, merged, plan_of, world_after
 from fleet.planners.llm.interpreter import LlmInterpreter
+from fleet.planners.llm.prompt_text import problem_text, skills_text, useful_skills
 from fleet.planners.llm.verify import why_not, without_useless
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Making, Plan

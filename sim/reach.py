@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.files.world_schema import Mission
+from sim.files.mission_file import Mission
 from sim.mujoco_world.description import load_description
 from sim.mujoco_world.driving import REACH_MARGIN_M
 from sim.navigation.clearance import Clearance

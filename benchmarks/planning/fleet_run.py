@@ -30,6 +30,7 @@ from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotSta
 from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Report, ReportState
 from keyexpr_schema.payloads.world import Fact, FactAddress, ObjectAddress, PlaceAddress, Statement
 from keyexpr_schema.transport.watch import Change
+from sim.files.world_payloads import object_payloads
 from sim.kinematic.backend import KinematicBackend
 from workers.skill import SkillRegistry
 from workers.skills.household import HOUSEHOLD
@@ -190,7 +191,7 @@ class FleetRun:
         for place in self._places.values():
             self._view.apply(Change(PLACE, PlaceAddress(place.place), place, ""))
             self._tell(events.PlacePut, place=place)
-        for thing in self.mission.world.objects():
+        for thing in object_payloads(self.mission.world):
             self._view.apply(Change(OBJECT, ObjectAddress(thing.object), thing, ""))
             self._tell(events.ObjectPut, object=thing)
         for spec, _ in self.mission.robots:

@@ -7,7 +7,7 @@ from collections.abc import Generator
 
 from keyexpr_schema.payloads.motions import Motion, PointM
 from keyexpr_schema.payloads.robots import PoseMRad
-from sim.files.world_schema import Solid
+from sim.files.solids import Solid, solids
 from sim.mujoco_world.drives import wrap
 from sim.mujoco_world.driving import distance_m
 from sim.mujoco_world.handling import (
@@ -129,7 +129,7 @@ def _in_the_way(
     for step in range(11):
         share = step / 10
         x, y = (a + share * (b - a) for a, b in zip(start, goal, strict=True))
-        for solid in stage.world.solids():
+        for solid in solids(stage.world):
             if _distance_m(solid, x, y) < room:
                 return solid.name
         for other in stage.robots.values():

@@ -10,7 +10,8 @@ import pytest
 
 from keyexpr_schema.payloads.robots import RobotSpec
 from sim.errors import BadFile
-from sim.files.world_file import load_mission, load_robot, load_world
+from sim.files.mission_file import load_mission, load_robot
+from sim.files.world_file import load_world
 from sim.mujoco_world import MODELS, MujocoBackend, load_description
 from sim.server.process import make_backend
 

@@ -20,7 +20,7 @@ from keyexpr_schema.payloads.tasks import OrderAddress, Report, ReportAddress, R
 from keyexpr_schema.payloads.world import NOTHING, Fact, FactAddress
 from keyexpr_schema.transport.session import SessionConfig
 from sim.backend import Backend
-from sim.files.world_file import Mission
+from sim.files.mission_file import Mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
 from workers.context import SkillContext
 from workers.skill import skill

@@ -19,7 +19,7 @@ from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract
 from fleet.core.events import Event
 from fleet.core.state import Policy, State
 from fleet.core.step import step
-from fleet.planners.llm import LlmInterpreter
+from fleet.planners import LlmInterpreter
 from fleet.service.composition import Composition
 from fleet.service.planning_job import carry_out
 from keyexpr_schema.keyspace import FACT, OBJECT, ORDER, PLACE, ROBOT_SPEC, ROBOT_STATE

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import msgspec
 import yaml
 
-from fleet.llm.errors import BadLlmConfig
+from fleet.errors import BadLlmConfig
 from keyexpr_schema.config_files import config_file
 
 Seconds = Annotated[float, msgspec.Meta(gt=0)]
@@ -51,7 +51,7 @@ class LlmConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     retry_wait_s: Seconds = 1.0
     """Before the first retry, doubled for each further one, unless the server says how long."""
     max_repairs: Count = 3
-    """More rounds after a rejected answer, in which the model hears what was wrong with it."""
+    """Correction rounds: after a rejected answer the model hears what was wrong with it."""
     max_tokens_per_plan: Positive = 100_000
     """In and out, over all rounds of a plan."""
     max_usd_per_plan: Usd | None = None
@@ -139,8 +139,8 @@ def load_llm_config(path: Path | None = None) -> LlmConfig:
     try:
         config = msgspec.convert(data["llm"], LlmConfig)
     except msgspec.ValidationError as error:
-        told = str(error).replace("`$.", "`llm.").replace(" - at `$`", "")
-        raise BadLlmConfig(f"{path}: {told}") from None
+        reason = str(error).replace("`$.", "`llm.").replace(" - at `$`", "")
+        raise BadLlmConfig(f"{path}: {reason}") from None
     if config.rules_dir is None:
         return config
     return msgspec.structs.replace(config, rules_dir=str(path.parent / config.rules_dir))

@@ -13,8 +13,10 @@ from typing import Any
 import msgspec
 import pytest
 
-from fleet.llm.prompts import FOLDER, load_prompts
-from fleet.planners.llm import BadLlmConfig, LlmConfig, ModelCaller, load_llm_config
+from fleet.errors import BadLlmConfig
+from fleet.llm.client import ModelClient
+from fleet.llm.configuration import LlmConfig, load_llm_config
+from fleet.llm.prompts import PROMPTS_DIR, load_prompts
 from fleet.planners.llm.answers import StepAnswer, TaskAnswer
 from keyexpr_schema.payloads.plans import Task
 from tests.llm_server import LlmServer, Reply
@@ -24,14 +26,14 @@ KEY = "sk-very-secret"
 
 
 @pytest.fixture(scope="module")
-def caller() -> Iterator[ModelCaller]:
+def client() -> Iterator[ModelClient]:
     """Its processes have a key in their environment, and are started once."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROBOTFLEET_TEST_KEY", KEY)
-        caller = ModelCaller()
-        caller.warm()
-        yield caller
-        caller.close()
+        client = ModelClient()
+        client.warm()
+        yield client
+        client.close()
 
 
 def request(server: LlmServer, key_env: str | None = None) -> dict[str, Any]:
@@ -120,7 +122,7 @@ def test_the_example_rules_fit() -> None:
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
-        ("sistem.txt", "", "replaces no prompt; those are big-dag.txt"),
+        ("sistem.txt", "", "replaces no prompt; those are allocate.txt"),
         ("repair.txt", "$problem", "placeholders are $details, $house_rules, $violations"),
         ("system.txt", "costs $ 5", "write $$ for a dollar sign"),
         ("system.txt", "x" * 20_001, "20000 are allowed"),
@@ -149,7 +151,7 @@ def test_values_in_a_prompt_are_not_expanded() -> None:
 
 def test_every_prompt_has_only_placeholders_that_are_filled() -> None:
     filled = {"skills", "problem", "form", "relations", "violations", "details", "house_rules"}
-    for path in FOLDER.glob("*/*.txt"):
+    for path in PROMPTS_DIR.glob("*/*.txt"):
         assert set(Template(path.read_text(encoding="utf-8")).get_identifiers()) <= filled, path
 
 
@@ -161,11 +163,11 @@ def test_answers_have_the_types_of_tasks() -> None:
             assert field.type == types[field.name]
 
 
-def test_calls_go_on_side_by_side_and_litellm_stays_outside(caller: ModelCaller) -> None:
+def test_calls_go_on_side_by_side_and_litellm_stays_outside(client: ModelClient) -> None:
     kinds: queue.Queue[str] = queue.Queue()
     with LlmServer(Reply(silent=True), Reply("hello")) as server:
         threads = [
-            threading.Thread(target=lambda: kinds.put(caller.call(request(server), 600).kind))
+            threading.Thread(target=lambda: kinds.put(client.call(request(server), 600).kind))
             for _ in range(2)
         ]
         for thread in threads:
@@ -177,26 +179,26 @@ def test_calls_go_on_side_by_side_and_litellm_stays_outside(caller: ModelCaller)
     assert "litellm" not in sys.modules
 
 
-def test_keys_go_to_the_server_and_not_into_messages(caller: ModelCaller) -> None:
+def test_keys_go_to_the_server_and_not_into_messages(client: ModelClient) -> None:
     echo = f'{{"error": {{"message": "bad key {KEY}"}}}}'.encode()
     with LlmServer(Reply(status=401, raw=echo)) as server:
-        answer = caller.call(request(server, "ROBOTFLEET_TEST_KEY"), 30.0)
+        answer = client.call(request(server, "ROBOTFLEET_TEST_KEY"), 30.0)
         assert server.keys == [f"Bearer {KEY}"]
     assert answer.kind == "key"
     assert "bad key ***" in answer.error
 
 
-def test_close_ends_a_call_that_is_under_way(caller: ModelCaller) -> None:
+def test_close_ends_a_call_that_is_under_way(client: ModelClient) -> None:
     """The last one here, since no call follows a close."""
     kinds: list[str] = []
     with LlmServer(Reply(silent=True)) as server:
         thread = threading.Thread(
-            target=lambda: kinds.append(caller.call(request(server), 600).kind)
+            target=lambda: kinds.append(client.call(request(server), 600).kind)
         )
         thread.start()
         assert server.asked.wait(60)
-        caller.close()
+        client.close()
         thread.join(10)
         assert kinds == ["failed"]
-        assert caller.call(request(server), 600).kind == "closed"
+        assert client.call(request(server), 600).kind == "closed"
         assert len(server.requests) == 1

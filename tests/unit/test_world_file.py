@@ -167,9 +167,7 @@ def test_a_mission_by_name_and_by_path_is_the_same() -> None:
 
 
 def test_an_unknown_mission_lists_those_there_are() -> None:
-    with pytest.raises(
-        BadFile, match=r"no mission 'three-cups'; .*two-cups.* \(looked in"
-    ):
+    with pytest.raises(BadFile, match=r"no mission 'three-cups'; .*two-cups.* \(looked in"):
         load_mission("three-cups")
 
 

@@ -6,6 +6,7 @@ import asyncio
 import logging
 
 from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.motions import Motion, MotionKind, Senses
 from keyexpr_schema.payloads.tasks import Order, ReportState
 from keyexpr_schema.payloads.world import Fact
@@ -58,10 +59,10 @@ async def observe_robot(ctx: SkillContext) -> None:
     """Learn what the robot knows of itself: where it is, what is in its hand and its basket."""
     senses = await first_senses(ctx.body)
     if senses.place is not None:
-        ctx.observe("at", ctx.robot, senses.place)
+        ctx.observe(AT, ctx.robot, senses.place)
     await ctx.holding()
     for thing in senses.basket:
-        ctx.observe("at", thing, ctx.robot)
+        ctx.observe(AT, thing, ctx.robot)
 
 
 def was_interrupted(ledger: Ledger) -> bool:
@@ -88,9 +89,9 @@ async def observe_after_crash(ctx: SkillContext, order: Order) -> tuple[Fact, ..
     senses = await first_senses(ctx.body)
     for name, where in seen.items():
         if where is not None and name != senses.holding:
-            ctx.observe("at", name, where)
+            ctx.observe(AT, name, where)
     if thing is not None and thing != senses.holding and seen.get(thing) is None:
-        believed = ctx.world.value_of("at", thing)
+        believed = ctx.world.value_of(AT, thing)
         if believed == ctx.robot or believed == senses.place:
-            ctx.observe("at", thing, None)
+            ctx.observe(AT, thing, None)
     return ctx.observed

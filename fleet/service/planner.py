@@ -59,7 +59,7 @@ class PlannerService:
         self._session = session
         self._journal = journal
         self._parts = parts
-        self._interpreter = parts.llm.interpreter(parts.skills)
+        self._interpreter = parts.interpreter
         self._policy = replace(
             policy or Policy(),
             interpreter=self._interpreter.configured,

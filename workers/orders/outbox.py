@@ -61,7 +61,7 @@ class Outbox:
     async def _send(self, word: Unsent) -> None:
         payload = word.payload
         if isinstance(payload, Fact):
-            address = FactAddress(payload.subject, payload.relation)
+            address = FactAddress.of(payload.key)
             if await self._outdated(address, payload):
                 return
             await self._session.confirm(FACT, address, payload, timeout_s=CONFIRM_S)

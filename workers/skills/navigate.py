@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.motions import MotionKind
 from workers.context import SkillContext
 from workers.errors import SkillFailed
@@ -18,11 +19,11 @@ async def navigate(ctx: SkillContext, to: str) -> None:
     x_m, y_m, _ = senses.pose_m_rad
     place = ctx.world.places[to]
     if senses.place == to and inner_distance_m(place.region_m, x_m, y_m) >= DOORWAY_M:
-        ctx.observe("at", ctx.robot, to)
+        ctx.observe(AT, ctx.robot, to)
         return
     senses = (await ctx.do(MotionKind.GO_TO, place=to)).senses
     if senses.place is not None:
-        ctx.observe("at", ctx.robot, senses.place)
+        ctx.observe(AT, ctx.robot, senses.place)
     if senses.place != to:
         raise SkillFailed(
             f"{ctx.robot} drove off to {to} but stands in {senses.place or 'no place'}"

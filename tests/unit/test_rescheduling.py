@@ -9,6 +9,7 @@ from fleet.core.dispatch.delays import FACTOR, MARGIN_S, next_lateness
 from fleet.core.dispatch.dispatcher import next_timer
 from fleet.core.state import PlanEntry, Policy
 from keyexpr_schema.facts import HOLDING, FactKey
+from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState, Task
 from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
@@ -292,7 +293,7 @@ def test_plans_that_keep_robots_from_each_other_do_not_wait_for_ever() -> None:
         """The first of pickup and carrier to drive is followed by the other."""
 
         def drive(task: str, actor: str, to: str, *after: str) -> Task:
-            args = {"robot": f"?{actor}", "to": to}
+            args = {"robot": actor_arg(actor), "to": to}
             return Task(task=task, skill="navigate", args=args, actor=actor, after=after)
 
         cup = {"robot": "?pickup", "object": thing, "place": "kitchen"}

@@ -14,7 +14,9 @@ from benchmarks.planning.truth import Truth, parse_truth
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.world import Place
 from sim.errors import BadFile
-from sim.files.world_file import load_robot, load_world
+from sim.files.mission_file import load_robot
+from sim.files.world_file import load_world
+from sim.files.world_payloads import place_payloads
 from sim.files.world_schema import WorldFile
 from sim.files.yaml_file import FileEntry, read_yaml
 
@@ -144,7 +146,7 @@ def _setting(
         for robot, entry in found.robots.items()
     }
     world = load_world(path.parent / found.world)
-    return world, world.places(), robots
+    return world, place_payloads(world), robots
 
 
 def _mission(entry: MissionEntry, kind: str, path: Path) -> Mission:

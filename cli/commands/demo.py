@@ -50,7 +50,7 @@ async def demo(
     from cli.demo.mission_run import DemoOptions
     from cli.errors import check_known
     from cli.show.live import Ticker
-    from sim.files.world_file import load_mission
+    from sim.files.mission_file import load_mission
     from sim.reach import out_of_reach
 
     check_known("backend", backend, BACKENDS, "")

@@ -15,10 +15,9 @@ from keyexpr_schema.payloads.world import Fact
 
 def believe(state: State, fact: Fact) -> State:
     """Believe a fact, whatever was known of its variable."""
-    name = f"{fact.subject}/{fact.relation}"
-    if state.facts.get(name) == fact:
+    if state.facts.get(fact.key) == fact:
         return state
-    return replace(state, facts=put(state.facts, name, fact))
+    return replace(state, facts=put(state.facts, fact.key, fact))
 
 
 def believe_if_newer(state: State, fact: Fact) -> State:

@@ -33,6 +33,7 @@ from keyexpr_schema.keyspace import (
     DURATIONS,
     GOAL_STATUS,
     ORDER,
+    PLAN_SPEC,
     PLAN_STATUS,
     PLANNER_ALIVE,
     PLANNER_STATUS,
@@ -59,7 +60,7 @@ class PlannerService:
         self._session = session
         self._journal = journal
         self._parts = parts
-        self._interpreter = parts.llm.interpreter(parts.skills)
+        self._interpreter = parts.interpreter
         self._policy = replace(
             policy or Policy(),
             interpreter=self._interpreter.configured,
@@ -207,7 +208,13 @@ class PlannerService:
             for effect in effects_of(self._state)
             if isinstance(effect, Publish)
         }
-        ours: tuple[Key[Any, Any], ...] = (ORDER, TASK_RECORD, PLAN_STATUS, GOAL_STATUS)
+        ours: tuple[Key[Any, Any], ...] = (
+            ORDER,
+            TASK_RECORD,
+            PLAN_SPEC,
+            PLAN_STATUS,
+            GOAL_STATUS,
+        )
         return [
             Retract(key, address)
             for key in ours

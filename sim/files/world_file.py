@@ -1,164 +1,30 @@
-"""Loads world, robot and mission files and checks that what they say can be.
+"""Loads a world file and checks that what it says can be.
 
-Every public function raises `BadFile` with one sentence that names the file, the place in it, what
-is wrong and what would be right.
+What is wrong is a `BadFile` with one sentence that names the file, the place in it, what is wrong
+and what would be right.
 """
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
-
-import msgspec
 
 from keyexpr_schema.errors import InvalidId
-from keyexpr_schema.ids import Id, check_id
-from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
+from keyexpr_schema.ids import check_id
 from sim.errors import BadFile
 from sim.files.world_schema import (
     FLOOR,
-    LARGEST_RADIUS_M,
-    Mission,
-    MissionRobot,
-    PlanOptions,
-    PointXY,
-    Solid,
     WorldFile,
 )
-from sim.files.yaml_file import FileEntry, read_yaml
-
-__all__ = [
-    "Mission",
-    "MissionRobot",
-    "PlanOptions",
-    "WorldFile",
-    "find_mission",
-    "load_mission",
-    "load_robot",
-    "load_world",
-]
-
-CONFIGS = Path(__file__).resolve().parents[2] / "configs"
-"""The configurations that come with the source tree."""
+from sim.files.yaml_file import find_file, read_yaml
 
 
-class _Start(FileEntry, frozen=True):
-    at_m: PointXY
-    yaw_deg: float = 0.0
-
-
-class _RobotEntry(FileEntry, frozen=True):
-    spec: str
-    start: _Start
-    robot: Id | None = None
-    """A name of its own, so that a mission can have several of one specification."""
-
-
-class _Placement(FileEntry, frozen=True):
-    on: str
-    at_m: tuple[float, float]
-    yaw_deg: float = 0.0
-
-
-class _MissionEntry(FileEntry, frozen=True):
-    mission: Id
-    world: str
-    robots: Annotated[tuple[_RobotEntry, ...], msgspec.Meta(min_length=1)]
-    objects: dict[Id, _Placement | None] = {}
-    """Where things lie in this mission and not where the world file says; `null`: not there."""
-    statements: tuple[str, ...] = ()
-    goals: tuple[str, ...] = ()
-    plan: PlanOptions = PlanOptions()
-
-
-def load_world(path: str | Path) -> WorldFile:
-    """The world file at `path`, checked."""
-    path = Path(path)
+def load_world(file: str | Path) -> WorldFile:
+    """The world file given by path or name (see `config_file`), checked."""
+    path = find_file("worlds", file)
     world = read_yaml(path, WorldFile, "world file")
     _check_world(path, world)
     return world
-
-
-def load_robot(path: str | Path) -> RobotSpec:
-    """The robot file at `path`, checked."""
-    path = Path(path)
-    spec = read_yaml(path, RobotSpec, "robot file")
-    for name, value in spec.capabilities.items():
-        if not (math.isfinite(value) and value >= 0.0):
-            raise BadFile(f"{path}: capabilities.{name}: {value} is not a number from 0 up")
-    if spec.capabilities.get("drive", 0.0) <= 0.0:
-        raise BadFile(
-            f"{path}: capabilities: it lacks `drive`, the robot's top speed in m/s (such as 0.6)"
-        )
-    return spec
-
-
-def find_mission(name: str | Path) -> Path:
-    """The file of a mission given by path, or by the name of a file in configs/missions.
-
-    Looked for in this order: the path itself, ./configs/missions, the source tree's own configs.
-    """
-    given = Path(name)
-    if given.suffix in (".yaml", ".yml") or len(given.parts) > 1:
-        if given.is_file():
-            return given
-        raise BadFile(f"the mission file {given} does not exist")
-    folders = (Path("configs") / "missions", CONFIGS / "missions")
-    for folder in folders:
-        if (folder / f"{given}.yaml").is_file():
-            return folder / f"{given}.yaml"
-    known = sorted({file.stem for folder in folders for file in folder.glob("*.yaml")})
-    raise BadFile(
-        f"there is no mission {str(given)!r}; there are {', '.join(known) or 'none'}, "
-        "or give the path of a mission file"
-    )
-
-
-def load_mission(name: str | Path) -> Mission:
-    """The mission given by path or name (see `find_mission`), with its world and robots."""
-    path = find_mission(name)
-    entry = read_yaml(path, _MissionEntry, "mission file")
-    world = _rearranged(path, load_world(path.parent / entry.world), entry.objects)
-    robots: list[MissionRobot] = []
-    for number, item in enumerate(entry.robots):
-        spec = load_robot(path.parent / item.spec)
-        if item.robot is not None:
-            spec = msgspec.structs.replace(spec, robot=item.robot)
-        start = (*item.start.at_m, math.radians(item.start.yaw_deg))
-        where = f"{path}: robots[{number}] ({spec.robot})"
-        _check_start(where, world, spec.robot, start, robots)
-        robots.append(MissionRobot(spec=spec, start_m_rad=start))
-    return Mission(
-        mission=entry.mission,
-        world=world,
-        robots=tuple(robots),
-        statements=entry.statements,
-        goals=entry.goals,
-        plan=entry.plan,
-    )
-
-
-def _rearranged(
-    path: Path, world: WorldFile, placements: dict[str, _Placement | None]
-) -> WorldFile:
-    """The world with a mission's objects put elsewhere or taken away."""
-    entries = dict(world.object_entries)
-    for name, placement in placements.items():
-        if name not in entries:
-            raise BadFile(
-                f"{path}: objects.{name}: the world has no such object; "
-                f"it has {', '.join(world.object_entries) or 'none'}"
-            )
-        if placement is None:
-            del entries[name]
-        else:
-            entries[name] = msgspec.structs.replace(
-                entries[name], on=placement.on, at_m=placement.at_m, yaw_deg=placement.yaw_deg
-            )
-    rearranged = msgspec.structs.replace(world, object_entries=entries)
-    _check_objects(path, rearranged)
-    return rearranged
 
 
 def _check_world(path: Path, world: WorldFile) -> None:
@@ -201,10 +67,15 @@ def _check_world(path: Path, world: WorldFile) -> None:
         for field in needed[kind.shape]:
             if getattr(kind, field) is None:
                 raise wrong(f"object_kinds.{name}", f"a {kind.shape} needs `{field}`")
-    _check_objects(path, world)
+    check_objects(path, world)
 
 
-def _check_objects(path: Path, world: WorldFile) -> None:
+def check_objects(path: Path, world: WorldFile) -> None:
+    """Check where the objects of `world` lie, as the file at `path` says it.
+
+    Raises:
+        BadFile: one lies where it cannot.
+    """
     tables = [name for name, item in world.furniture.items() if item.kind == "table"]
     for name, entry in world.object_entries.items():
         _check_name(path, f"objects.{name}", name)
@@ -252,42 +123,3 @@ def _check_name(path: Path, where: str, name: str) -> None:
         check_id(name)
     except InvalidId as error:
         raise BadFile(f"{path}: {where}: {error}") from None
-
-
-def _check_start(
-    where: str, world: WorldFile, robot: str, start: PoseMRad, others: list[MissionRobot]
-) -> None:
-    x, y, _ = start
-    if robot in world.place_entries or robot in world.object_entries:
-        raise BadFile(f"{where}: a place or an object has the name {robot!r}; use another")
-    if not (0 <= x <= world.size_m[0] and 0 <= y <= world.size_m[1]):
-        raise BadFile(
-            f"{where}: start.at_m: [{x}, {y}] is outside the building "
-            f"(x 0 to {world.size_m[0]}, y 0 to {world.size_m[1]})"
-        )
-    for solid in world.solids():
-        if _distance(solid, x, y) < LARGEST_RADIUS_M:
-            raise BadFile(
-                f"{where}: start.at_m: [{x}, {y}] is less than {LARGEST_RADIUS_M} m from "
-                f"{solid.name}; a robot needs that much room"
-            )
-    for other in others:
-        if other.spec.robot == robot:
-            raise BadFile(
-                f"{where}: there are two robots {robot!r}; give one another name with `robot: …`"
-            )
-        gap = math.dist(start[:2], other.start_m_rad[:2])
-        if gap < 2 * LARGEST_RADIUS_M:
-            raise BadFile(
-                f"{where}: start.at_m: it overlaps {other.spec.robot}, {gap:.2f} m away; "
-                f"keep {2 * LARGEST_RADIUS_M} m between two robots"
-            )
-
-
-def _distance(solid: Solid, x: float, y: float) -> float:
-    """From a point to the box, m; 0 inside."""
-    c, s = math.cos(solid.yaw_rad), math.sin(solid.yaw_rad)
-    dx, dy = x - solid.center_m[0], y - solid.center_m[1]
-    along = max(abs(c * dx + s * dy) - solid.half_m[0], 0.0)
-    across = max(abs(c * dy - s * dx) - solid.half_m[1], 0.0)
-    return math.hypot(along, across)

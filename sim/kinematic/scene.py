@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from keyexpr_schema.payloads.motions import PointM
 from keyexpr_schema.payloads.robots import PoseMRad
 from keyexpr_schema.payloads.simulation import Body, Frame, QuaternionWxyz, Scene, Shape, ShapeKind
+from sim.files.solids import solids
 from sim.files.world_schema import WorldFile
 
 _UPRIGHT: QuaternionWxyz = (1.0, 0.0, 0.0, 0.0)
@@ -24,7 +25,7 @@ def draw_scene(world: WorldFile, robots: tuple[str, ...]) -> Scene:
     """The shapes of walls, furniture, robots and objects."""
     bodies: list[Body] = []
     fixed: dict[str, tuple[PointM, QuaternionWxyz]] = {}
-    for solid in world.solids():
+    for solid in solids(world):
         size = (solid.half_m[0], solid.half_m[1], solid.height_m / 2)
         bodies.append(_body(solid.name, None, ShapeKind.BOX, size, _COLOURS[solid.kind]))
         fixed[solid.name] = ((*solid.center_m, 0.0), _turned(solid.yaw_rad))

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.backend import Backend
 from sim.errors import SimError
-from sim.files.world_file import load_mission
-from sim.files.world_schema import Mission
+from sim.files.mission_file import Mission, load_mission
 from sim.server.sim_server import GRACE_S, WATCHDOG_S, SimServer
 from sim.server.single_instance import ensure_single_world
 
@@ -105,7 +104,8 @@ def make_backend(
         return KinematicBackend(mission.world, robots, motion_model, seed, step_s)
     from sim.mujoco_world import MujocoBackend
 
-    return MujocoBackend(mission.world, robots, seed)
+    folders = {robot.spec.robot: robot.folder for robot in mission.robots}
+    return MujocoBackend(mission.world, robots, seed, folders)
 
 
 def _count(number: int, thing: str) -> str:

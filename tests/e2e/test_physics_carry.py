@@ -10,7 +10,7 @@ import pytest
 
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, PointM
 from keyexpr_schema.payloads.simulation import Truth
-from sim.files.world_file import load_mission
+from sim.files.mission_file import load_mission
 from sim.mujoco_world import MujocoBackend
 
 MISSION = load_mission("two-cups")

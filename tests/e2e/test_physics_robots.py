@@ -9,7 +9,7 @@ import pytest
 
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState
 from keyexpr_schema.payloads.robots import PoseMRad
-from sim.files.world_file import load_mission
+from sim.files.mission_file import load_mission
 from sim.mujoco_world import MujocoBackend
 
 MISSION = load_mission("two-cups")

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.errors import SimError
-from sim.files.world_file import load_mission
+from sim.files.mission_file import load_mission
 from sim.navigation import Leg, Navigator
 from sim.navigation.clearance import Clearance
 

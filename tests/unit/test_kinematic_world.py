@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState
-from sim.files.world_file import load_mission
+from sim.files.mission_file import load_mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
 
 MISSION = load_mission("two-cups")

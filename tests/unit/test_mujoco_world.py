@@ -8,7 +8,7 @@ import pytest
 
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionState
 from keyexpr_schema.payloads.simulation import ShapeKind
-from sim.files.world_file import load_mission
+from sim.files.mission_file import load_mission
 from sim.mujoco_world import MujocoBackend
 
 MISSION = load_mission("two-cups")

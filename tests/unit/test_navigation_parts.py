@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sim.errors import NoPath, NoStance
-from sim.files.world_file import load_mission
+from sim.files.mission_file import load_mission
 from sim.files.world_schema import WorldFile
 from sim.navigation import Navigator
 from sim.navigation.clearance import Clearance, segment_gap

@@ -19,7 +19,7 @@ from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, M
 from keyexpr_schema.payloads.simulation import MotionCall, SimAddress, SimRobotAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.embodiment import SimEmbodiment
-from sim.files.world_file import load_mission
+from sim.files.mission_file import load_mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
 from sim.server.sim_server import SimServer
 from workers.embodiment import Embodiment

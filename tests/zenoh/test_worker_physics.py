@@ -11,7 +11,7 @@ from worker_world import Fleet, running_fleet
 from keyexpr_schema.payloads.tasks import Report, ReportState
 from keyexpr_schema.transport.session import SessionConfig
 from sim.backend import Backend
-from sim.files.world_file import Mission
+from sim.files.mission_file import Mission
 from sim.mujoco_world import MujocoBackend
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry
 from fleet.core.state import State
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import ENDED_GOALS
 from keyexpr_schema.payloads.tasks import TaskState
 
@@ -41,7 +42,7 @@ def is_free(state: State, robot: str, plan: str, reservations: bool = True) -> b
 def _carries_for(state: State, robot: str, entry: PlanEntry) -> bool:
     """Whether a robot has something with it that an open goal of the plan is about."""
     return any(
-        (fact := state.fact("at", subject)) is not None and fact.value == robot
+        (fact := state.fact(AT, subject)) is not None and fact.value == robot
         for goal in entry.plan.goals
         if goal in state.goal_states and state.goal_states[goal].state not in ENDED_GOALS
         for condition in state.goal_states[goal].conditions

@@ -10,6 +10,7 @@ from fleet.core.model.skills import Action
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
 from fleet.core.state import State
 from fleet.core.updates import give_up, set_entry, set_record
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 
@@ -65,7 +66,7 @@ def _way_s(state: State, action: Action, skills: Skills) -> float | None:
     """The way to the task at its robot's top speed, s; `None` if nobody knows from where."""
     if action.skill.travel_to is None:
         return 0.0
-    here = state.fact("at", action.actor)
+    here = state.fact(AT, action.actor)
     if here is None or here.value not in state.places:
         return None
     return state.world(skills).way_s(action.actor, here.value, action.args[action.skill.travel_to])

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from fleet.core.model.preconditions import Skills, action_of
-from fleet.core.model.skills import Action, Variable
+from fleet.core.model.skills import Action
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
 from fleet.core.state import State
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact
@@ -18,7 +19,7 @@ def contradiction(entry: PlanEntry, fact: Fact, skills: Skills) -> str | None:
 
     What a robot says of the work it is doing is part of that work.
     """
-    known = Variable(fact.relation, fact.subject)
+    known = fact.key
     unfinished = {
         record.task: (record, action)
         for record in entry.current()
@@ -56,7 +57,7 @@ def why_replan(state: State, entry: PlanEntry, skills: Skills) -> str | None:
     """What has come up that the plan does not provide for."""
     world = state.world(skills)
     for thing in entry.plan.seeks:
-        where = world.value("at", thing)
+        where = world.value(AT, thing)
         if where is not None:
             return f"{thing} was found: it is at {where}"
     current = list(entry.current())

@@ -12,11 +12,9 @@ from fleet.core.state import State, put, without
 from fleet.core.updates import believe, set_goal, without_goal
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, read_goal
+from keyexpr_schema.facts import AT, NOTHING, SEARCHED, Value
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
-from keyexpr_schema.payloads.world import NOTHING, Fact, Value
-
-SEARCHED = "searched"
-"""Relation that says of a place that somebody looked around in it."""
+from keyexpr_schema.payloads.world import Fact
 
 
 def goal_put(state: State, event: events.GoalPut, skills: Skills) -> State:
@@ -95,7 +93,7 @@ def next_stage(state: State, goal: str) -> State:
     kept = tuple(
         condition
         for condition in status.conditions
-        if condition.relation == "at"
+        if condition.relation == AT
         and about.isdisjoint(condition.subjects)
         and not state.robots.keys() & set(condition.subjects)
     )

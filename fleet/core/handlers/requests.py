@@ -11,7 +11,7 @@ from fleet.core.model.preconditions import Skills
 from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanScope
 from fleet.core.state import State, put, without
 from fleet.core.updates import active_plan_of, answer, mark_goals, set_entry
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState, Task
 from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest
@@ -242,7 +242,7 @@ def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
     task = Task(
         task=f"t{number}",
         skill=ask.skill,
-        args={"robot": f"{ACTOR_PREFIX}x{number}", **ask.args},
+        args={"robot": actor_arg(f"x{number}"), **ask.args},
         actor=f"x{number}",
         after=ask.after,
     )

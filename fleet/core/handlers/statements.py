@@ -49,13 +49,13 @@ def _read_statement(state: State, name: str) -> State:
         return _set_status(state, StatementStatus(statement=name, reason=str(error)))
     facts = tuple(
         Fact(
-            subject=subject,
-            relation=relation,
+            subject=key.subject,
+            relation=key.relation,
             value=value,
             source=f"{PLANNER_SOURCE}:{name}",
             time_s=state.time_s,
         )
-        for relation, subject, value in read
+        for key, value in read
     )
     for fact in facts:
         state = believe(state, fact)

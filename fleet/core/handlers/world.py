@@ -11,6 +11,7 @@ from fleet.core.model.preconditions import Skills
 from fleet.core.plan_entry import ReplanScope
 from fleet.core.state import State, put, without
 from fleet.core.updates import believe, set_entry
+from keyexpr_schema.facts import FactKey
 from keyexpr_schema.payloads.plans import PlanState
 
 
@@ -31,8 +32,8 @@ def fact_put(state: State, event: events.FactPut, skills: Skills) -> State:
 
 def fact_deleted(state: State, event: events.FactDeleted, skills: Skills) -> State:
     """No longer believe anything of that variable."""
-    name = f"{event.subject}/{event.relation}"
-    return replace(state, facts=without(state.facts, name)) if name in state.facts else state
+    key = FactKey(event.relation, event.subject)
+    return replace(state, facts=without(state.facts, key)) if key in state.facts else state
 
 
 def place_put(state: State, event: events.PlacePut, skills: Skills) -> State:

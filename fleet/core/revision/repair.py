@@ -7,8 +7,8 @@ from collections.abc import Iterable, Set
 from msgspec.structs import replace
 
 from fleet.core.checker.plan_checker import CheckedPlan
-from fleet.core.handlers.goals import SEARCHED
 from fleet.core.schedule.actor_constraints import able_robots
+from keyexpr_schema.facts import SEARCHED
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan
 

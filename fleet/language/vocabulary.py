@@ -10,16 +10,19 @@ import msgspec
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Object, Place, Value
 
+Claim = tuple[str, str, Value]
+"""Relation, subject and value of a fact that a sentence says or presupposes; `None` is unknown."""
+
 
 class SkillPhrase(msgspec.Struct, frozen=True, kw_only=True):
     """A skill that can be asked for by name: "vacuum the hallway".
 
-    `sort` is what it is done to, `object` or `place`; `wants` are the relations and values that
+    `type` is that of what it is done to, `object` or `place`; `wants` are the relations and values that
     hold of it then.
     """
 
     verb: str
-    sort: str
+    type: str = msgspec.field(name="sort")
     wants: tuple[tuple[str, Value], ...]
 
 

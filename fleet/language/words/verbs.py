@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
 from enum import Enum
 
-from fleet.language.cursor import Cursor
-from fleet.language.lexicon import Sort
-from fleet.language.morphology import gerund, participles, third_person
-from fleet.language.tokens import tokens_of
-from fleet.language.wordlists import MODALS, STANDING
-
-Phrase = tuple[str, ...]
+from fleet.language.words.morphology import gerund, participles, third_person
+from fleet.language.words.tokens import Phrase, tokens_of
 
 
-class Doing(Enum):
+class VerbSense(Enum):
     """What a verb asks for."""
 
     MOVE = "move"
@@ -28,16 +22,16 @@ class Doing(Enum):
     PATROL = "patrol"  # SEARCH, or going from place to place if a robot is named
 
 
-_VERBS: dict[Doing, tuple[str, tuple[str, ...]]] = {
-    Doing.MOVE: (
+_VERBS: dict[VerbSense, tuple[str, tuple[str, ...]]] = {
+    VerbSense.MOVE: (
         "bring take deliver carry move transport return get fetch haul transfer relocate shift "
         "put place set lay stow store leave collect gather retrieve drop deposit load send drive",
         ("put down", "set down", "lay down", "drop off"),
     ),
-    Doing.FETCH: ("take get fetch collect gather retrieve", ()),
-    Doing.GO: ("go navigate head travel proceed come drive move return", ()),
-    Doing.FIND: ("find locate seek spot detect", ("look for", "search for", "hunt for")),
-    Doing.SEARCH: (
+    VerbSense.FETCH: ("take get fetch collect gather retrieve", ()),
+    VerbSense.GO: ("go navigate head travel proceed come drive move return", ()),
+    VerbSense.FIND: ("find locate seek spot detect", ("look for", "search for", "hunt for")),
+    VerbSense.SEARCH: (
         "search inspect check explore patrol survey scan scout examine",
         (
             "look around",
@@ -64,13 +58,13 @@ _VERBS: dict[Doing, tuple[str, tuple[str, ...]]] = {
             "patrol through",
         ),
     ),
-    Doing.PATROL: ("patrol", ("patrol through",)),
-    Doing.PICK: (
+    VerbSense.PATROL: ("patrol", ("patrol through",)),
+    VerbSense.PICK: (
         "grab grasp lift hold pick",
         ("pick up", "lift up", "take hold of", "get hold of", "grab hold of"),
     ),
-    Doing.GIVE: ("give hand pass", ("hand over", "give over", "pass over")),
-    Doing.TIDY: (
+    VerbSense.GIVE: ("give hand pass", ("hand over", "give over", "pass over")),
+    VerbSense.TIDY: (
         "tidy return",
         (
             "tidy up",
@@ -86,9 +80,9 @@ _VERBS: dict[Doing, tuple[str, tuple[str, ...]]] = {
 }
 
 
-def _forms_of(make: str) -> dict[Phrase, frozenset[Doing]]:
-    found: dict[Phrase, frozenset[Doing]] = {}
-    for doing, (single, several) in _VERBS.items():
+def _forms_of(make: str) -> dict[Phrase, frozenset[VerbSense]]:
+    found: dict[Phrase, frozenset[VerbSense]] = {}
+    for senses, (single, several) in _VERBS.items():
         for verb in (*single.split(), *several):
             head, _, rest = verb.partition(" ")
             forms = {
@@ -98,7 +92,7 @@ def _forms_of(make: str) -> dict[Phrase, frozenset[Doing]]:
             }[make]
             for form in forms:
                 phrase = tuple(token.word for token in tokens_of(f"{form} {rest}"))
-                found[phrase] = found.get(phrase, frozenset()) | {doing}
+                found[phrase] = found.get(phrase, frozenset()) | {senses}
     return found
 
 
@@ -111,46 +105,6 @@ PARTICIPLES = _forms_of("participle")
 PARTICLES = frozenset({"back", "away", "up", "over", "down", "off"})
 """What may stand behind the thing that a verb is about: "pick it up", "put it back"."""
 EXAMPLE = 'say it like "bring the first cup to the hallway" or "send a robot to the kitchen"'
-_BEHIND_SUBJECTS = STANDING | {",", "and", "or", "to", "has", "have", "belongs"}
-_ALL_SORTS: tuple[Sort, ...] = ("object", "robot", "place", "surface")
-
-
-def longest(cursor: Cursor, phrases: Container[Phrase]) -> Phrase | None:
-    """The longest of the phrases that comes next; nothing is gone past."""
-    for length in range(4, 0, -1):
-        phrase = tuple(cursor.word(i) for i in range(length))
-        if phrase in phrases:
-            return phrase
-    return None
-
-
-def verb_next(cursor: Cursor) -> bool:
-    """Whether a verb comes next that asks for something, and not a name that begins like one."""
-    verb = longest(cursor, IMPERATIVES)
-    if verb is None:
-        return False
-    end, named = cursor.lexicon.exact(cursor.tokens, cursor.at, _ALL_SORTS)
-    if not named:
-        return True
-    as_long = end == cursor.at + len(verb)
-    if as_long and any(e.sort == "robot" for e in named):
-        return not _subject_ends(cursor, len(verb))
-    return end <= cursor.at + len(verb)
-
-
-def _subject_ends(cursor: Cursor, ahead: int) -> bool:
-    """Whether what stands so many words ahead can follow who does it: "Scout should …"."""
-    start = cursor.at
-    cursor.at += ahead
-    found = (
-        cursor.word() in _BEHIND_SUBJECTS
-        or cursor.next_of(MODALS) is not None
-        or longest(cursor, FINITE) is not None
-    )
-    cursor.at = start
-    return found
-
-
 BASE_VERBS = frozenset(
     verb for single, several in _VERBS.values() for verb in (*single.split(), *several)
 )

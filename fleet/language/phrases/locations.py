@@ -6,24 +6,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fleet.errors import NotUnderstood
-from fleet.language.cursor import Cursor
-from fleet.language.lexicon import Sort
-from fleet.language.mentions import Noun, Quantity
-from fleet.language.nouns import Nouns
+from fleet.language.phrases.cursor import Cursor
+from fleet.language.phrases.mentions import NounPhrase, Quantity
+from fleet.language.phrases.noun_phrases import NounPhrases
 from fleet.language.refusals import one_of
 from fleet.language.vocabulary import Vocabulary
-from fleet.language.wordlists import BASKETS, DEFINITE, INDEFINITE
+from fleet.language.words.lexicon import EntityType
+from fleet.language.words.wordlists import BASKETS, DEFINITE, INDEFINITE
 
-PLACES: tuple[Sort, ...] = ("place", "surface")
-SPOTS: tuple[Sort, ...] = ("place", "robot", "surface")
+PLACES: tuple[EntityType, ...] = ("place", "surface")
+SPOTS: tuple[EntityType, ...] = ("place", "robot", "surface")
 
 
 @dataclass(frozen=True)
-class Part:
+class Locative:
     """One prepositional phrase: `to`, `in` or `from`, and what stands behind it."""
 
     preposition: str
-    noun: Noun
+    noun: NounPhrase
 
 
 @dataclass(frozen=True)
@@ -31,25 +31,25 @@ class Where:
     """What the prepositional phrases of one clause say: places or robots, by id.
 
     `source_surface` and `target_surface` are the surfaces in those places, where one is named.
-    `each`: instead of one target, all of several ("to every room"); `said` are their words.
+    `each`: instead of one target, all of several ("to every room"); `text` are their words.
     """
 
     source: str | None = None
     target: str | None = None
-    target_sort: Sort = "place"
+    target_type: EntityType = "place"
     source_surface: str | None = None
     target_surface: str | None = None
     each: tuple[str, ...] = ()
-    said: str = ""
+    text: str = ""
 
 
 class Locations:
     """Reads prepositional phrases of place."""
 
-    def __init__(self, cursor: Cursor, nouns: Nouns, words: Vocabulary) -> None:
-        self.cursor, self.nouns, self.words = cursor, nouns, words
+    def __init__(self, cursor: Cursor, nouns: NounPhrases, vocabulary: Vocabulary) -> None:
+        self.cursor, self.nouns, self.vocabulary = cursor, nouns, vocabulary
 
-    def part(self, preposition: str) -> Part:
+    def locative(self, preposition: str) -> Locative:
         """What stands behind a preposition that was just read.
 
         Raises:
@@ -57,9 +57,9 @@ class Locations:
         """
         cursor, start = self.cursor, self.cursor.at
         if (basket := self._basket(start)) is not None:
-            return Part(preposition, basket)
+            return Locative(preposition, basket)
         noun = self.nouns.noun("a place", SPOTS)
-        if noun.sort == "robot":
+        if noun.type == "robot":
             possessed = cursor.take("'s") or cursor.take("'")
             if cursor.take_word(BASKETS):
                 noun = noun.among(self._with_baskets()) if noun.generic else noun
@@ -67,15 +67,17 @@ class Locations:
                     raise NotUnderstood("no robot with a basket is known")
             elif possessed:
                 raise cursor.refusal(
-                    f"{cursor.said(start)!r} is followed by what is not understood; "
+                    f"{cursor.quote(start)!r} is followed by what is not understood; "
                     "a robot has a basket"
                 )
-        return Part(preposition, noun)
+        return Locative(preposition, noun)
 
     def _with_baskets(self) -> list[str]:
-        return sorted(n for n, spec in self.words.robots.items() if "basket" in spec.capabilities)
+        return sorted(
+            n for n, spec in self.vocabulary.robots.items() if "basket" in spec.capabilities
+        )
 
-    def _basket(self, start: int) -> Noun | None:
+    def _basket(self, start: int) -> NounPhrase | None:
         """`the basket`, `its basket`, `the basket of the robot`."""
         cursor = self.cursor
         cursor.take_word(DEFINITE | INDEFINITE)
@@ -86,13 +88,13 @@ class Locations:
         if cursor.take("of"):
             return self.nouns.noun("a robot", ("robot",))
         owners = self._with_baskets()
-        found = tuple(e for e in cursor.lexicon.entities if e.sort == "robot" and e.id in owners)
+        found = tuple(e for e in cursor.lexicon.entities if e.type == "robot" and e.id in owners)
         if len(found) != 1:
             reason = f"could be that of {one_of(owners)}" if found else "is no robot's"
-            raise NotUnderstood(f"{cursor.said(start)!r} {reason}: say whose")
-        return Noun(found, cursor.said(start), start, Quantity.THE, exact=True)
+            raise NotUnderstood(f"{cursor.quote(start)!r} {reason}: say whose")
+        return NounPhrase(found, cursor.quote(start), start, Quantity.THE, exact=True)
 
-    def where(self, parts: Sequence[Part]) -> Where:
+    def where(self, locatives: Sequence[Locative]) -> Where:
         """Source and target of a clause that moves something, or says where something is.
 
         What stands behind "to" is the target; without it, what stands behind the last "in". Other
@@ -101,14 +103,13 @@ class Locations:
         Raises:
             NotUnderstood: a phrase could be several places, or the phrases do not go together.
         """
-        targets = [part for part in parts if part.preposition == "to"]
-        first_to = next((i for i, part in enumerate(parts) if part.preposition == "to"), len(parts))
-        inside = [part for part in parts if part.preposition == "in"]
-        sources = [part for part in parts if part.preposition == "from"]
+        targets = [p for p in locatives if p.preposition == "to"]
+        inside = [p for p in locatives if p.preposition == "in"]
+        sources = [p for p in locatives if p.preposition == "from"]
         if targets:
-            before = [part for i, part in enumerate(parts) if part in inside and i < first_to]
-            sources = [*before, *sources]
-            targets = [part for part in parts if part not in sources]
+            first_to = locatives.index(targets[0])
+            sources = [*(p for p in locatives[:first_to] if p in inside), *sources]
+            targets = [p for p in locatives if p not in sources]
         else:
             targets = inside
             while len(targets) > 1 and not _shared(targets):
@@ -116,46 +117,46 @@ class Locations:
                 targets = targets[1:]
         source, _ = self._one(sources) if sources else (None, "place")
         if len(targets) == 1 and targets[0].noun.quantity is Quantity.ALL:
-            each = targets[0].noun.settle()
-            if each.sort == "place" and len(each.subjects) > 1:
-                return Where(source, each=each.subjects, said=targets[0].noun.text)
-        target, sort = self._one(targets) if targets else (None, "place")
+            each = targets[0].noun.resolve()
+            if each.type == "place" and len(each.subjects) > 1:
+                return Where(source, each=each.subjects, text=targets[0].noun.text)
+        target, target_type = self._one(targets) if targets else (None, "place")
         if source is not None and source == target:
             raise NotUnderstood(f"the sentence says both from and to {source}: say where to")
-        kind: Sort = "robot" if sort == "robot" else "place"
+        kind: EntityType = "robot" if target_type == "robot" else "place"
         return Where(source, target, kind, _surface(sources, source), _surface(targets, target))
 
-    def _one(self, parts: Sequence[Part]) -> tuple[str, Sort]:
+    def _one(self, locatives: Sequence[Locative]) -> tuple[str, EntityType]:
         """The one place or robot that all the phrases mean."""
-        shared = _shared(parts)
+        shared = _shared(locatives)
         if not shared:
-            names = " and ".join(repr(part.noun.text) for part in parts)
+            names = " and ".join(repr(locative.noun.text) for locative in locatives)
             raise NotUnderstood(
                 f'{names} are two places; if one is to come after the other, say "then"'
             )
-        for part in parts:
-            mention = part.noun.among(shared).settle()
+        for locative in locatives:
+            mention = locative.noun.among(shared).resolve()
             if mention.open or len(mention.subjects) != 1:
                 raise NotUnderstood(
-                    f"{part.noun.text!r} could be {one_of(mention.subjects)}: say which"
+                    f"{locative.noun.text!r} could be {one_of(mention.subjects)}: say which"
                 )
-        return mention.subjects[0], mention.sort
+        return mention.subjects[0], mention.type
 
 
-def _surface(parts: Sequence[Part], place: str | None) -> str | None:
+def _surface(locatives: Sequence[Locative], place: str | None) -> str | None:
     """The one surface of the place that the phrases name, if they name one."""
     found = {
         entity.id
-        for part in parts
-        for entity in part.noun.found
-        if entity.sort == "surface" and entity.stands_for == place
+        for locative in locatives
+        for entity in locative.noun.found
+        if entity.type == "surface" and entity.stands_for == place
     }
     return found.pop() if len(found) == 1 else None
 
 
-def _shared(parts: Sequence[Part]) -> frozenset[str]:
+def _shared(locatives: Sequence[Locative]) -> frozenset[str]:
     """Who could be meant by every one of the phrases."""
-    found = frozenset(parts[0].noun.names)
-    for part in parts[1:]:
-        found &= frozenset(part.noun.names)
+    found = frozenset(locatives[0].noun.names)
+    for locative in locatives[1:]:
+        found &= frozenset(locative.noun.names)
     return found

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.mentions import Mention
+from fleet.language.phrases.mentions import Mention
 from fleet.language.refusals import one_of
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.world import Value
@@ -42,7 +42,7 @@ class Wish:
 
 
 @dataclass
-class Draft:
+class GoalDraft:
     """The stages of a goal while its sentence is read."""
 
     stages: list[list[Wish]] = field(default_factory=lambda: [[]])
@@ -92,9 +92,11 @@ class Draft:
             NotUnderstood: two wishes of one stage cannot both come true.
         """
         _check_carried([wish for stage in self.stages for wish in stage])
-        stages = [part for stage in self.stages for part in _apart(_on_the_way(stage))]
+        stages = [
+            part for stage in self.stages for part in _sequenced(_without_implied_travel(stage))
+        ]
         return tuple(
-            tuple(dict.fromkeys(wish.condition() for wish in _settled(stage)))
+            tuple(dict.fromkeys(wish.condition() for wish in _consistent(stage)))
             for stage in stages
             if stage
         )
@@ -130,7 +132,7 @@ def _brings(wish: Wish, held: Wish) -> bool:
     return wish.relation == "at" and _same(wish, held)
 
 
-def _on_the_way(stage: Sequence[Wish]) -> list[Wish]:
+def _without_implied_travel(stage: Sequence[Wish]) -> list[Wish]:
     """Without going somewhere with what is in hand and put down there later in the stage."""
     kept = []
     for i, wish in enumerate(stage):
@@ -145,7 +147,7 @@ def _on_the_way(stage: Sequence[Wish]) -> list[Wish]:
     return kept
 
 
-def _apart(stage: Sequence[Wish]) -> list[list[Wish]]:
+def _sequenced(stage: Sequence[Wish]) -> list[list[Wish]]:
     """ "Go to the kitchen and pick up the cup" means one after the other."""
     parts: list[list[Wish]] = [[]]
     for wish in stage:
@@ -159,13 +161,13 @@ def _apart(stage: Sequence[Wish]) -> list[list[Wish]]:
     return parts
 
 
-def _settled(stage: Sequence[Wish]) -> list[Wish]:
+def _consistent(stage: Sequence[Wish]) -> list[Wish]:
     kept = [
         wish
         for i, wish in enumerate(stage)
         if not any(_implies(other, wish, later=j > i) for j, other in enumerate(stage) if i != j)
     ]
-    kept = [_left_for(wish, kept) for wish in kept]
+    kept = [_narrowed(wish, kept) for wish in kept]
     fixed: dict[tuple[str, str], Wish] = {}
     for wish in kept:
         if not wish.open:
@@ -193,7 +195,7 @@ def _implies(wish: Wish, other: Wish, later: bool) -> bool:
     return same and other.relation == "held" and wish.relation == "at" and later
 
 
-def _left_for(wish: Wish, others: Sequence[Wish]) -> Wish:
+def _narrowed(wish: Wish, others: Sequence[Wish]) -> Wish:
     """An open wish without those that another one names: "the first cup and another cup"."""
     if not wish.open or wish.relation != "at":
         return wish
@@ -232,16 +234,16 @@ def _check_open(kept: Sequence[Wish], fixed: dict[tuple[str, str], Wish]) -> Non
     ]
     holder: dict[str, Wish] = {}
 
-    def place(wish: Wish, tried: set[str]) -> bool:
+    def assign(wish: Wish, tried: set[str]) -> bool:
         for name in wish.subjects:
             if name in taken or name in tried:
                 continue
             tried.add(name)
-            if name not in holder or place(holder[name], tried):
+            if name not in holder or assign(holder[name], tried):
                 holder[name] = wish
                 return True
         return False
 
     for wish in open_wishes:
-        if not place(wish, set()):
+        if not assign(wish, set()):
             raise NotUnderstood(f"it wants more of {one_of(wish.subjects)} than there are; {_THEN}")

@@ -5,22 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fleet.errors import NotUnderstood
-from fleet.language.locations import PLACES
-from fleet.language.mentions import Mention
-from fleet.language.sentences import Sentences
-from fleet.language.subjects import THINGS, Fact, Subject
-from fleet.language.tokens import SENTENCE_ENDS, words_of
-from fleet.language.verbs import EXAMPLE, IMPERATIVES, longest, verb_next
-from fleet.language.vocabulary import SkillPhrase, Vocabulary
-from fleet.language.wordlists import (
+from fleet.language.goals.sentences import Sentences
+from fleet.language.phrases.locations import PLACES
+from fleet.language.phrases.mentions import Mention
+from fleet.language.phrases.subjects import THINGS, Subject
+from fleet.language.vocabulary import Claim, SkillPhrase, Vocabulary
+from fleet.language.words.tokens import SENTENCE_ENDS, words_of
+from fleet.language.words.verbs import EXAMPLE, IMPERATIVES
+from fleet.language.words.wordlists import (
     ASKING_WHERE,
+    CAUSATIVES,
     CLOSERS,
     ENOUGH,
     ENSURING,
     NEXT,
     OPENERS,
     REMARKS,
-    TELLING,
     WANTING,
 )
 from keyexpr_schema.payloads.goals import Condition
@@ -40,33 +40,24 @@ class Reading:
 
     text: str
     stages: tuple[tuple[Condition, ...], ...]
-    presumed: tuple[Fact, ...] = ()
+    presumed: tuple[Claim, ...] = ()
     remarks: tuple[str, ...] = ()
 
 
-def read_goal(text: str, words: Vocabulary) -> Reading:
+def read_goal(text: str, vocabulary: Vocabulary) -> Reading:
     """What a text asks for, by grammar and the names that exist.
 
     Raises:
         NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
     """
-    return _Goals(text, words).read()
+    return _GoalParser(text, vocabulary).read()
 
 
-def goal_conditions(text: str, words: Vocabulary) -> tuple[Condition, ...]:
-    """The conditions of the first stage of a goal.
-
-    Raises:
-        NotUnderstood: as `read_goal`.
-    """
-    return read_goal(text, words).stages[0]
-
-
-class _Goals(Sentences):
+class _GoalParser(Sentences):
     """Joins clauses, and tells them apart."""
 
-    def __init__(self, text: str, words: Vocabulary) -> None:
-        super().__init__(text, words)
+    def __init__(self, text: str, vocabulary: Vocabulary) -> None:
+        super().__init__(text, vocabulary)
         self.remarks: list[str] = []
 
     def read(self) -> Reading:
@@ -109,19 +100,19 @@ class _Goals(Sentences):
             if cursor.word() == "," and self._command_after(1):
                 break
             if cursor.lexicon.starts_name(cursor.tokens, cursor.at) or str(cursor.refusal("")):
-                shown = cursor.said(start, cursor.phrase()[1])
+                shown = cursor.quote(start, cursor.phrase()[1])
                 raise NotUnderstood(
                     f"{shown!r} is no goal, and may matter: leave it out, or tell it as a fact"
                 )
             cursor.at += 1
-        self.remarks.append(cursor.said(start))
+        self.remarks.append(cursor.quote(start))
         return True
 
     def _command_after(self, words: int) -> bool:
         cursor, start = self.cursor, self.cursor.at
         cursor.at += words
         cursor.take_of(OPENERS)
-        found = verb_next(cursor)
+        found = cursor.verb_next()
         cursor.at = start
         return found
 
@@ -132,7 +123,7 @@ class _Goals(Sentences):
             if cursor.take_word(SENTENCE_ENDS):
                 must = False
                 self.elliptic = ""
-                self.told = []
+                self.addressees = []
             elif cursor.take_of(NEXT):
                 self.draft.next_stage()
                 must = True
@@ -154,15 +145,15 @@ class _Goals(Sentences):
             return False
         cursor.at += 1
         polite = bool(cursor.take_of(OPENERS))
-        found = polite or verb_next(cursor)
+        found = polite or cursor.verb_next()
         cursor.at = start
         return found
 
     def _clause(self) -> None:
         cursor = self.cursor
         if self.elliptic and self.moved and cursor.word() in _PREPOSED | {"home"}:
-            parts, home = self.parts()
-            self.to_target(self._same(), self.where(parts), home)
+            locatives, home = self.locatives()
+            self.to_target(self._same(), self.where(locatives), home)
         elif cursor.take_of(ASKING_WHERE):
             self.find()
             cursor.take_word(("is", "are"))
@@ -175,42 +166,46 @@ class _Goals(Sentences):
                 self.declarative(states=True)
         elif wanting := cursor.take_of(WANTING):
             self.declarative(wanted=wanting is not None)
-        elif cursor.next_of(TELLING) and not verb_next(cursor):
-            cursor.take_of(TELLING)
-            self.declarative(told=True)
+        elif cursor.next_of(CAUSATIVES) and not cursor.verb_next():
+            cursor.take_of(CAUSATIVES)
+            self.declarative(bare_infinitive=True)
         elif cursor.word() in ("clear", "empty") and self._table_next():
             self.clear()
         elif (phrase := self._skill_phrase()) is not None:
             self._done_to(phrase)
-        elif verb_next(cursor):
+        elif cursor.verb_next():
             self.imperative()
         elif cursor.word() in ("can", "could", "would", "will", "should", "may"):
             cursor.at += 1
-            self.declarative(told=True)
+            self.declarative(bare_infinitive=True)
         elif self._enough():
             pass
-        elif self.nouns.starts((*THINGS, *PLACES)) or cursor.word() in ("it", "they", "them"):
+        elif self.nouns.starts((*THINGS, *PLACES)) or cursor.word() in (
+            "it",
+            "they",
+            "them",
+        ):
             self.declarative()
         else:
             raise self.no_clause()
 
     def _skill_phrase(self) -> SkillPhrase | None:
         """The skill whose name comes next, unless a verb of ours is as long; past it."""
-        names = {words_of(phrase.verb): phrase for phrase in self.words.skill_phrases}
-        verb = longest(self.cursor, names)
-        if verb is None or len(longest(self.cursor, IMPERATIVES) or ()) >= len(verb):
+        names = {words_of(phrase.verb): phrase for phrase in self.vocabulary.skill_phrases}
+        verb = self.cursor.longest(names)
+        if verb is None or len(self.cursor.longest(IMPERATIVES) or ()) >= len(verb):
             return None
         self.cursor.at += len(verb)
         return names[verb]
 
     def _done_to(self, phrase: SkillPhrase) -> None:
         """`vacuum the hallway and the kitchen`, after the verb."""
-        if phrase.sort == "place":
+        if phrase.type == "place":
             names = self.places()
             mentions = [Mention((name,), "place", self.cursor.at) for name in names]
         else:
             found = self.subjects.read("an object", ("object",))
-            mentions = [self.subjects.settle(subject) for subject in found]
+            mentions = [self.subjects.resolve(subject) for subject in found]
             self.subjects.remember(mentions)
         for mention in mentions:
             for relation, value in phrase.wants:
@@ -231,31 +226,31 @@ class _Goals(Sentences):
         cursor, start = self.cursor, self.cursor.at
         try:
             noun = self.subjects.read("an object", ("object",), several=False)[0]
-            parts, home = self.parts()
+            locatives, home = self.locatives()
         except NotUnderstood:
             cursor.at = start
             return False
         if not cursor.take_of(ENOUGH):
             cursor.at = start
             return False
-        will_do = self.subjects.settle(self.subjects.movable(noun)).subjects
+        will_do = self.subjects.resolve(self.subjects.movable(noun)).subjects
         asked = [m for m in self.subjects.recent if m.open and set(m.subjects) & set(will_do)]
         if len(asked) != 1:
             raise NotUnderstood(
-                f"{cursor.said(start)!r}: nothing was asked for before that it could do for"
+                f"{cursor.quote(start)!r}: nothing was asked for before that it could do for"
             )
         meant = self.draft.narrow(asked[0], will_do)
         self.subjects.remember([meant])
-        if parts or home:
-            self.to_target([meant], self.where(parts), home)
+        if locatives or home:
+            self.to_target([meant], self.where(locatives), home)
         return True
 
     def _same(self) -> list[Subject]:
-        """Those that were moved last, as they were settled then."""
+        """Those that were moved last, as they were resolved then."""
         return list(self.subjects.recent[:1]) or self.moved
 
     def _left_over(self) -> NotUnderstood:
         cursor = self.cursor
-        shown = cursor.said(*cursor.phrase())
-        before = cursor.said(self.began, cursor.at)
+        shown = cursor.quote(*cursor.phrase())
+        before = cursor.quote(self.began, cursor.at)
         return cursor.refusal(f"{shown!r} is not understood after {before!r}")

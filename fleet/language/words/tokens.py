@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+Phrase = tuple[str, ...]
+"""Words that stand together, in the form of `Token.word`."""
+
 
 def words_in(text: str) -> tuple[str, ...]:
     """The words of a list that is written as a text."""

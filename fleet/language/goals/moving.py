@@ -6,18 +6,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.cursor import Cursor
-from fleet.language.lexicon import Lexicon, Sort
-from fleet.language.locations import SPOTS, Locations, Part, Where
-from fleet.language.mentions import Mention, Noun
-from fleet.language.morphology import gerund
-from fleet.language.nouns import Nouns
+from fleet.language.goals.stages import GoalDraft
+from fleet.language.phrases.cursor import Cursor
+from fleet.language.phrases.locations import SPOTS, Locations, Locative, Where
+from fleet.language.phrases.mentions import Mention, NounPhrase
+from fleet.language.phrases.noun_phrases import NounPhrases
+from fleet.language.phrases.subjects import THINGS, Subject, Subjects
 from fleet.language.refusals import listed, one_of
-from fleet.language.stages import Draft
-from fleet.language.subjects import THINGS, Subject, Subjects
-from fleet.language.verbs import PARTICLES
 from fleet.language.vocabulary import Vocabulary
-from fleet.language.wordlists import HOME, RELATIVE
+from fleet.language.words.lexicon import EntityType, Lexicon
+from fleet.language.words.morphology import gerund
+from fleet.language.words.verbs import PARTICLES
+from fleet.language.words.wordlists import HOME, RELATIVE
 
 HOME_HINT = 'give it one with the field "home" of the object'
 
@@ -33,13 +33,13 @@ _OFFERING = frozenset(
 class Moving:
     """Turns clauses about where things and robots shall be into wishes."""
 
-    def __init__(self, text: str, words: Vocabulary, what: str = "a goal") -> None:
-        self.words = words
-        self.cursor = Cursor(text, Lexicon(words), what)
-        self.nouns = Nouns(self.cursor)
-        self.subjects = Subjects(self.cursor, self.nouns, words)
-        self.locations = Locations(self.cursor, self.nouns, words)
-        self.draft = Draft()
+    def __init__(self, text: str, vocabulary: Vocabulary, what: str = "a goal") -> None:
+        self.vocabulary = vocabulary
+        self.cursor = Cursor(text, Lexicon(vocabulary), what)
+        self.nouns = NounPhrases(self.cursor)
+        self.subjects = Subjects(self.cursor, self.nouns, vocabulary)
+        self.locations = Locations(self.cursor, self.nouns, vocabulary)
+        self.draft = GoalDraft()
         self.moved: list[Subject] = []  # what "and then to the kitchen" is about
         self.last_place: str | None = None
         self.verb = ""
@@ -58,16 +58,16 @@ class Moving:
         to_robot = (
             self.verb in _OFFERING
             and len(moved) == 1
-            and isinstance(first, Noun)
-            and first.sort == "robot"
+            and isinstance(first, NounPhrase)
+            and first.type == "robot"
         )
         if to_robot and not cursor.at_border() and self.nouns.starts(("object",)):
-            assert isinstance(first, Noun)
+            assert isinstance(first, NounPhrase)
             moved = self.subjects.read("an object", ("object",))
             return self.to_target(moved, Where(None, *self._receiver(first)), False)
-        parts, home = self.parts()
-        where = self.where(parts, each=not give)
-        if give and where.target is not None and where.target_sort != "robot":
+        locatives, home = self.locatives()
+        where = self.where(locatives, each=not give)
+        if give and where.target is not None and where.target_type != "robot":
             raise NotUnderstood(
                 f"{where.target!r} is no robot that something could be given to; known are "
                 f"{listed(cursor.lexicon.known(('robot',)))}"
@@ -81,7 +81,7 @@ class Moving:
         return self.cursor.word() in ("and", "then")
 
     def _fetched(self, moved: Sequence[Subject], where: Where) -> None:
-        if any(subject.sort == "robot" for subject in moved):
+        if any(subject.type == "robot" for subject in moved):
             raise self._no_target()
         mentions = [self._from(self.subjects.movable(s), where) for s in moved]
         for mention in mentions:
@@ -90,42 +90,42 @@ class Moving:
 
     def _from(self, subject: Subject, where: Where) -> Mention:
         """Who is meant, told apart by where they are."""
-        return self.subjects.settle(subject, where.source, where.source_surface)
+        return self.subjects.resolve(subject, where.source, where.source_surface)
 
-    def _receiver(self, noun: Noun) -> tuple[str, Sort]:
-        mention = noun.settle()
+    def _receiver(self, noun: NounPhrase) -> tuple[str, EntityType]:
+        mention = noun.resolve()
         if mention.open or len(mention.subjects) != 1:
             raise NotUnderstood(f"{noun.text!r} does not say which robot: name it")
         return mention.subjects[0], "robot"
 
-    def parts(self) -> tuple[list[Part], bool]:
+    def locatives(self) -> tuple[list[Locative], bool]:
         """The prepositional phrases and particles that come next; whether they say "home"."""
         cursor, home, belongs = self.cursor, False, False
-        parts: list[Part] = []
+        locatives: list[Locative] = []
         while True:
             before = cursor.at
             if self._home():
                 home = belongs = True
             elif cursor.take("there") or cursor.take("back", "there") or cursor.take("to", "there"):
-                parts.append(self._there(before))
+                locatives.append(self._there(before))
             elif cursor.take_of(RELATIVE) and cursor.preposition() is None:
                 cursor.at = before
                 break
             elif cursor.at > before:
-                parts.append(self.locations.part("in"))
+                locatives.append(self.locations.locative("in"))
             elif (preposition := cursor.preposition()) is not None:
-                parts.append(self.locations.part(preposition))
+                locatives.append(self.locations.locative(preposition))
             elif cursor.word() in PARTICLES:
                 home = home or cursor.word() in ("back", "away")
                 cursor.at += 1
             else:
                 break
-        placed = any(part.preposition != "from" for part in parts)
+        placed = any(locative.preposition != "from" for locative in locatives)
         if placed and belongs:
             raise NotUnderstood(
-                f'{cursor.said(self.began)!r} names a place and says "home": say one of them'
+                f'{cursor.quote(self.began)!r} names a place and says "home": say one of them'
             )
-        return parts, home and not placed
+        return locatives, home and not placed
 
     def _home(self) -> bool:
         """Whether "home" comes next, and nothing known is called so."""
@@ -139,31 +139,31 @@ class Moving:
         cursor.at += len(phrase)
         return True
 
-    def _there(self, start: int) -> Part:
+    def _there(self, start: int) -> Locative:
         if self.last_place is None:
             raise NotUnderstood('"there" refers to no place before it: name the place')
         found = tuple(e for e in self.cursor.lexicon.entities if e.id == self.last_place)
-        found = tuple(e for e in found if e.sort == "place")
-        return Part("to", Noun(found, self.cursor.said(start), start, exact=True))
+        found = tuple(e for e in found if e.type == "place")
+        return Locative("to", NounPhrase(found, self.cursor.quote(start), start, exact=True))
 
-    def where(self, parts: Sequence[Part], each: bool = False) -> Where:
+    def where(self, locatives: Sequence[Locative], each: bool = False) -> Where:
         """Source and target of prepositional phrases; the target is what "there" means next.
 
         Raises:
             NotUnderstood: they say "every room", and not `each` of several can be meant.
         """
-        where = self.locations.where(parts)
+        where = self.locations.where(locatives)
         if where.each and not each:
             raise self._which_of(where)
-        if where.target is not None and where.target_sort == "place":
+        if where.target is not None and where.target_type == "place":
             self.last_place = where.target
-        elif where.source in self.words.places:
+        elif where.source in self.vocabulary.places:
             self.last_place = where.source
         return where
 
     @staticmethod
     def _which_of(where: Where) -> NotUnderstood:
-        return NotUnderstood(f"{where.said!r} could be {one_of(where.each)}: say which")
+        return NotUnderstood(f"{where.text!r} could be {one_of(where.each)}: say which")
 
     def _to_each(self, moved: Sequence[Subject], where: Where) -> None:
         """Wish that another one is in each of several places: "a cup in every room".
@@ -177,7 +177,7 @@ class Moving:
             raise self._which_of(where)
         if len(mentions[0].subjects) < len(where.each):
             raise NotUnderstood(
-                f"{where.said!r} are {len(where.each)}, and there are only "
+                f"{where.text!r} are {len(where.each)}, and there are only "
                 f"{len(mentions[0].subjects)} for them: {one_of(mentions[0].subjects)}"
             )
         for number, place in enumerate(where.each, 1):
@@ -199,13 +199,13 @@ class Moving:
                 self.home(mention)
             elif where.target is None:
                 raise self._no_target()
-            elif where.target_sort == "robot" and mention.sort == "robot":
+            elif where.target_type == "robot" and mention.type == "robot":
                 raise NotUnderstood("a robot goes to a place, not to a robot: name the place")
             else:
-                on_robot = where.target_sort == "robot"
+                on_robot = where.target_type == "robot"
                 self.draft.add("at", mention, where.target, on_robot=on_robot)
         self.subjects.remember(mentions)
-        if where.target is not None and where.target_sort == "robot":
+        if where.target is not None and where.target_type == "robot":
             receiver = Mention((where.target,), "robot", self.cursor.at)
             self.subjects.recent = [*self.subjects.recent, receiver]
         return None
@@ -213,13 +213,13 @@ class Moving:
     def _no_target(self) -> NotUnderstood:
         cursor = self.cursor
         if not cursor.at_border() and cursor.word() != "and":
-            shown, before = cursor.said(*cursor.phrase()), cursor.said(self.began)
+            shown, before = cursor.quote(*cursor.phrase()), cursor.quote(self.began)
             return cursor.refusal(
                 f"{shown!r} is not understood after {before!r}: say where to; known are "
                 f"{listed(cursor.lexicon.known(('place',)))}"
             )
         return NotUnderstood(
-            f"{cursor.said(self.began)!r} does not say where to: name a place; known are "
+            f"{cursor.quote(self.began)!r} does not say where to: name a place; known are "
             f"{listed(cursor.lexicon.known(('place',)))}"
         )
 
@@ -229,8 +229,12 @@ class Moving:
         Raises:
             NotUnderstood: it belongs nowhere in particular.
         """
-        homes = {n: self.words.objects[n].home for n in mention.subjects if n in self.words.objects}
-        homeless = [n for n in mention.subjects if homes.get(n) not in self.words.places]
+        homes = {
+            n: self.vocabulary.objects[n].home
+            for n in mention.subjects
+            if n in self.vocabulary.objects
+        }
+        homeless = [n for n in mention.subjects if homes.get(n) not in self.vocabulary.places]
         if homeless or (mention.open and len(set(homes.values())) > 1):
             name = homeless[0] if homeless else mention.subjects[0]
             raise NotUnderstood(f"it is not known where {name} belongs: {HOME_HINT}")
@@ -243,11 +247,11 @@ class Moving:
     # --- going -----------------------------------------------------------------------------------
     def go(self, who: Sequence[Subject] | None) -> None:
         """`go to PLACE`; any robot goes if nobody is named."""
-        parts, home = self.parts()
+        locatives, home = self.locatives()
         if home:
             raise NotUnderstood("a robot has no home: name the place where it shall go")
-        where = self.where(parts)
-        if where.target is None or where.target_sort != "place":
+        where = self.where(locatives)
+        if where.target is None or where.target_type != "place":
             raise self.cursor.unknown("a place", ("place",))
         if who is not None:
             return self.to_target(who, where, False)

@@ -6,26 +6,24 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.cursor import Cursor
-from fleet.language.lexicon import Sort
-from fleet.language.mentions import Mention, Noun, Quantity
-from fleet.language.nouns import Nouns
+from fleet.language.phrases.cursor import Cursor
+from fleet.language.phrases.mentions import Mention, NounPhrase, Quantity
+from fleet.language.phrases.noun_phrases import NounPhrases
 from fleet.language.refusals import one_of
-from fleet.language.verbs import verb_next
-from fleet.language.vocabulary import Vocabulary
-from fleet.language.wordlists import PLURAL_PRONOUNS, PREPOSITIONS, SINGULAR_PRONOUNS
+from fleet.language.vocabulary import Claim, Vocabulary
+from fleet.language.words.lexicon import EntityType
+from fleet.language.words.wordlists import PLURAL_PRONOUNS, PREPOSITIONS, SINGULAR_PRONOUNS
 
-THINGS: tuple[Sort, ...] = ("object", "robot")
-Subject = Noun | Mention
+THINGS: tuple[EntityType, ...] = ("object", "robot")
+Subject = NounPhrase | Mention
 _AFTER_PRONOUNS = PREPOSITIONS | frozenset({"and", "then", "back", "away", "up", "home", "should"})
-Fact = tuple[str, str, str]
 
 
 def _determined(subject: Subject, before: Subject) -> Subject:
     """The same, with the determiner of the one before if it has none: "all cups and books"."""
     if (
-        isinstance(subject, Noun)
-        and isinstance(before, Noun)
+        isinstance(subject, NounPhrase)
+        and isinstance(before, NounPhrase)
         and subject.plural
         and subject.quantity is Quantity.BARE
         and subject.count is None
@@ -39,32 +37,32 @@ def _determined(subject: Subject, before: Subject) -> Subject:
 class Subjects:
     """Reads lists of noun phrases, and settles who is meant by them."""
 
-    def __init__(self, cursor: Cursor, nouns: Nouns, words: Vocabulary) -> None:
-        self.cursor, self.nouns, self.words = cursor, nouns, words
+    def __init__(self, cursor: Cursor, nouns: NounPhrases, vocabulary: Vocabulary) -> None:
+        self.cursor, self.nouns, self.vocabulary = cursor, nouns, vocabulary
         self.recent: list[Mention] = []  # whom "it" and "them" may mean
-        self.presumed: list[Fact] = []
+        self.presumed: list[Claim] = []
 
-    def read(self, what: str, sorts: Sequence[Sort], several: bool = True) -> list[Subject]:
+    def read(self, what: str, types: Sequence[EntityType], several: bool = True) -> list[Subject]:
         """One noun phrase or pronoun, or several with commas and "and" between them.
 
         Raises:
             NotUnderstood: the first is nothing known. A later one that is not ends the list.
         """
-        found: list[Subject] = [self._one(what, sorts)]
+        found: list[Subject] = [self._one(what, types)]
         while several:
             start = self.cursor.at
             if self.cursor.take("or"):
-                found[-1] = self._either(found[-1], self._one(what, sorts))
+                found[-1] = self._either(found[-1], self._one(what, types))
                 continue
             joined = self.cursor.take(",", "and") or self.cursor.take("and")
             joined = joined or self.cursor.take(",")
-            if not joined or verb_next(self.cursor) or not self._starts(sorts):
+            if not joined or self.cursor.verb_next() or not self._starts(types):
                 self.cursor.at = start
                 break
-            found.append(_determined(self._one(what, sorts), found[-1]))
+            found.append(_determined(self._one(what, types), found[-1]))
         return found
 
-    def settle(
+    def resolve(
         self, subject: Subject, source: str | None = None, surface: str | None = None
     ) -> Mention:
         """Who is meant; with `source`, by those who are believed to be there (on a `surface`).
@@ -75,7 +73,7 @@ class Subjects:
         if isinstance(subject, Mention):
             mention = subject
         elif source is None:
-            mention = subject.settle()
+            mention = subject.resolve()
         else:
             mention = self._at_source(subject, source, surface)
         if source is not None and not mention.open:
@@ -85,10 +83,10 @@ class Subjects:
     def remember(self, mentions: Sequence[Mention]) -> None:
         """These are whom a pronoun means from now on."""
         for mention in mentions:
-            self.nouns.spoken(mention)
+            self.nouns.mentioned(mention)
         if len(mentions) > 1 and not any(m.open for m in mentions):
             names = tuple(dict.fromkeys(s for m in mentions for s in m.subjects))
-            self.recent = [Mention(names, mentions[0].sort, mentions[0].key)]
+            self.recent = [Mention(names, mentions[0].type, mentions[0].key)]
         else:
             self.recent = list(mentions)
 
@@ -98,9 +96,9 @@ class Subjects:
         Raises:
             NotUnderstood: what is named cannot be moved.
         """
-        if isinstance(subject, Mention) or subject.sort != "object":
+        if isinstance(subject, Mention) or subject.type != "object":
             return subject
-        fixed = [n for n in subject.names if not self.words.objects[n].movable]
+        fixed = [n for n in subject.names if not self.vocabulary.objects[n].movable]
         if not fixed:
             return subject
         left = subject.among(set(subject.names) - set(fixed))
@@ -114,7 +112,7 @@ class Subjects:
         Raises:
             NotUnderstood: no robot that could be meant can drive.
         """
-        if isinstance(subject, Mention) or subject.sort != "robot" or subject.exact:
+        if isinstance(subject, Mention) or subject.type != "robot" or subject.exact:
             return subject
         if subject.quantity is not Quantity.ANY and subject.plural:
             return subject
@@ -125,7 +123,7 @@ class Subjects:
 
     def able_to_drive(self) -> list[str]:
         """Robots with the skill to go somewhere."""
-        return sorted(n for n, spec in self.words.robots.items() if "navigate" in spec.skills)
+        return sorted(n for n, spec in self.vocabulary.robots.items() if "navigate" in spec.skills)
 
     def some_robot(self) -> Mention:
         """Any robot that can drive, where nobody is named.
@@ -163,49 +161,49 @@ class Subjects:
             return meant[0]
         names = sorted({s for m in self.recent for s in m.subjects})
         reason = f"could be {one_of(names)}" if names else "refers to nothing before it"
-        raise NotUnderstood(f"{cursor.said(start)!r} {reason}: name what you mean")
+        raise NotUnderstood(f"{cursor.quote(start)!r} {reason}: name what you mean")
 
     def _alone(self, ahead: int) -> bool:
         """Whether no noun can begin so many words ahead."""
         word = self.cursor.word(ahead)
         return not word or not word[0].isalnum() or word in _AFTER_PRONOUNS
 
-    def _one(self, what: str, sorts: Sequence[Sort]) -> Subject:
+    def _one(self, what: str, types: Sequence[EntityType]) -> Subject:
         mention = self.pronoun()
-        return mention if mention is not None else self.nouns.noun(what, sorts)
+        return mention if mention is not None else self.nouns.noun(what, types)
 
-    def _starts(self, sorts: Sequence[Sort]) -> bool:
+    def _starts(self, types: Sequence[EntityType]) -> bool:
         word = self.cursor.word()
         pronoun = word in ("it", "them") and bool(self.recent)
-        return pronoun or self.nouns.starts(sorts)
+        return pronoun or self.nouns.starts(types)
 
-    def _either(self, first: Subject, second: Subject) -> Noun:
+    def _either(self, first: Subject, second: Subject) -> NounPhrase:
         """ "Cup 1 or cup 2" """
-        if not isinstance(first, Noun) or not isinstance(second, Noun):
+        if not isinstance(first, NounPhrase) or not isinstance(second, NounPhrase):
             raise NotUnderstood('"or" is understood between names only: name both')
-        if first.sort != second.sort or not (first.settle().single and second.settle().single):
+        if first.type != second.type or not (first.resolve().single and second.resolve().single):
             raise NotUnderstood(f"{first.text!r} or {second.text!r} leaves too much open")
         both = (
-            first.among(first.settle().subjects).found
-            + second.among(second.settle().subjects).found
+            first.among(first.resolve().subjects).found
+            + second.among(second.resolve().subjects).found
         )
-        return Noun(both, f"{first.text} or {second.text}", first.key, Quantity.ANY)
+        return NounPhrase(both, f"{first.text} or {second.text}", first.key, Quantity.ANY)
 
-    def _at_source(self, noun: Noun, source: str, surface: str | None) -> Mention:
+    def _at_source(self, noun: NounPhrase, source: str, surface: str | None) -> Mention:
         """Who is meant by "all cups" when it is said that they come from a place."""
         try:
-            mention = noun.settle()
+            mention = noun.resolve()
             if not mention.selective:
                 return mention
         except NotUnderstood as error:
             reason: str | None = str(error)
         else:
             reason = None
-        there = [name for name in noun.names if self.words.whereabouts.get(name) == source]
+        there = [name for name in noun.names if self.vocabulary.whereabouts.get(name) == source]
         if surface is not None:
             there = self._on(surface, there, all_of_them=reason is None and not mention.open)
         if there:
-            return replace(noun.among(there).settle(), key=noun.key)
+            return replace(noun.among(there).resolve(), key=noun.key)
         where = f"on {surface}" if surface is not None else f"in {source}"
         raise NotUnderstood(
             reason or f"it is not known which of {one_of(noun.names)} are {where}: name them"
@@ -217,10 +215,10 @@ class Subjects:
         Raises:
             NotUnderstood: all of them are meant, and of some it is not known what they lie on.
         """
-        unsure = [name for name in there if name not in self.words.rests]
+        unsure = [name for name in there if name not in self.vocabulary.rests]
         if unsure and all_of_them:
             raise NotUnderstood(
                 f"it is not known whether {one_of(unsure)} lies on {surface}: name the things, or "
                 "have the place searched first"
             )
-        return [name for name in there if self.words.rests.get(name) == surface] or unsure
+        return [name for name in there if self.vocabulary.rests.get(name) == surface] or unsure

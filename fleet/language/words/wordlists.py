@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from fleet.language.tokens import tokens_of, words_in
-
-Phrase = tuple[str, ...]
+from fleet.language.words.tokens import Phrase, tokens_of, words_in
 
 
 def phrases(texts: str) -> tuple[Phrase, ...]:
@@ -79,7 +77,7 @@ ENSURING = phrases(
     "take care that|make certain that|it should be that|i want that|the goal is that|"
     "it must be true that|the goal is for|guarantee that|making sure that"
 )
-TELLING = phrases("let|have|tell|ask|order|command|instruct|make")
+CAUSATIVES = phrases("let|have|tell|ask|order|command|instruct|make")
 ENOUGH = phrases(
     "would do|will do|would suffice|would be fine|is fine|would be enough|is enough|would be ok|"
     "is ok|would be okay|is okay|would be good|would be great|would be nice|would be perfect|"
@@ -91,7 +89,7 @@ MODALS = phrases(
     "should|must|shall|has to|have to|needs to|need to|ought to|is to|are to|can|could|would|will|"
     "is supposed to|are supposed to"
 )
-STANDING = frozenset(
+COPULAR_VERBS = frozenset(
     words_in("is are be 's stands stand lies lie sits sit rests rest stays stay being standing")
 )
 LOCATED = phrases(
@@ -111,7 +109,7 @@ GRAMMAR_WORDS = (
     | UNIVERSAL
     | SINGULAR_PRONOUNS
     | PLURAL_PRONOUNS
-    | STANDING
+    | COPULAR_VERBS
     | frozenset(words_in("and or then of not no there here has have been"))
     | frozenset(word for preps in (TO, IN, FROM) for prep in preps for word in prep)
 )

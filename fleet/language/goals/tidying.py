@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.locations import PLACES
-from fleet.language.mentions import Mention
-from fleet.language.moving import HOME_HINT, Moving
+from fleet.language.goals.moving import HOME_HINT, Moving
+from fleet.language.phrases.locations import PLACES
+from fleet.language.phrases.mentions import Mention
 from fleet.language.refusals import one_of
-from fleet.language.verbs import EXAMPLE
-from fleet.language.wordlists import WHOLE_HOUSE
+from fleet.language.words.verbs import EXAMPLE
+from fleet.language.words.wordlists import WHOLE_HOUSE
 
 
 class Tidying(Moving):
@@ -29,8 +29,8 @@ class Tidying(Moving):
             return self.move(tidy=True)
         homes = {
             o.object: o.home
-            for o in self.words.objects.values()
-            if o.movable and o.home and o.home in self.words.places
+            for o in self.vocabulary.objects.values()
+            if o.movable and o.home and o.home in self.vocabulary.places
         }
         names = tuple(homes)
         if preposed or not (cursor.at_border() or cursor.word() == "and"):
@@ -44,12 +44,12 @@ class Tidying(Moving):
     def clear(self) -> None:
         """`clear TABLE`, after the verb: what lies on it goes where it belongs."""
         cursor = self.cursor
-        homes = {o.object: o.home for o in self.words.objects.values() if o.movable and o.home}
+        homes = {o.object: o.home for o in self.vocabulary.objects.values() if o.movable and o.home}
         mentions = self.place_mentions() or []
-        if not mentions or any(mention.sort != "surface" for mention in mentions):
-            places = [name for m in mentions for name in m.subjects] or list(self.words.places)
+        if not mentions or any(mention.type != "surface" for mention in mentions):
+            places = [name for m in mentions for name in m.subjects] or list(self.vocabulary.places)
             raise NotUnderstood(
-                f"{cursor.said(self.began)!r}: name the things and where to bring them, or say "
+                f"{cursor.quote(self.began)!r}: name the things and where to bring them, or say "
                 f'"tidy up {one_of(places)}"'
             )
         self._to_their_homes([n for m in mentions for n in self._lying_on(m, homes)], homes)
@@ -65,10 +65,10 @@ class Tidying(Moving):
         mentions = self.place_mentions()
         if mentions is None:
             return tuple(homes)
-        places = dict.fromkeys(n for m in mentions if m.sort == "place" for n in m.subjects)
-        if len(places) > 1 and set(places) == set(self.words.places):
+        places = dict.fromkeys(n for m in mentions if m.type == "place" for n in m.subjects)
+        if len(places) > 1 and set(places) == set(self.vocabulary.places):
             return tuple(homes)
-        on_tables = [n for m in mentions if m.sort == "surface" for n in self._lying_on(m, homes)]
+        on_tables = [n for m in mentions if m.type == "surface" for n in self._lying_on(m, homes)]
         in_rooms = self._misplaced(homes, tuple(places)) if places else ()
         return tuple(dict.fromkeys((*in_rooms, *on_tables)))
 
@@ -78,7 +78,7 @@ class Tidying(Moving):
         Raises:
             NotUnderstood: there is nothing of that kind in one of them.
         """
-        at = self.words.whereabouts
+        at = self.vocabulary.whereabouts
         names = tuple(n for n, home in homes.items() if at.get(n) in where and at[n] != home)
         if tidy := [place for place in where if place not in {at[name] for name in names}]:
             raise NotUnderstood(
@@ -93,16 +93,16 @@ class Tidying(Moving):
         Raises:
             NotUnderstood: there is nothing, or not all of it is known, or some cannot go anywhere.
         """
-        (place,), surface, words = table.subjects, one_of(table.surfaces), self.words
-        there = [n for n, where in words.whereabouts.items() if where == place]
-        there = [n for n in there if n in words.objects and words.objects[n].movable]
+        (place,), surface, vocabulary = table.subjects, one_of(table.surfaces), self.vocabulary
+        there = [n for n, where in vocabulary.whereabouts.items() if where == place]
+        there = [n for n in there if n in vocabulary.objects and vocabulary.objects[n].movable]
         searched = f"have {place} searched first"
-        if unsure := [name for name in there if name not in words.rests]:
+        if unsure := [name for name in there if name not in vocabulary.rests]:
             raise NotUnderstood(
                 f"it is not known whether {one_of(unsure)} lies on {surface}: {searched}, or name "
                 "the things and where to bring them"
             )
-        names = [name for name in there if words.rests[name] in table.surfaces]
+        names = [name for name in there if vocabulary.rests[name] in table.surfaces]
         if not names:
             raise NotUnderstood(f"nothing is believed to lie on {surface}: {searched}")
         if stuck := [name for name in names if homes.get(name, place) == place]:
@@ -116,19 +116,19 @@ class Tidying(Moving):
         """The places that come next: one, several, or all of them."""
         named = self.place_mentions()
         if named is None:
-            return tuple(self.words.places)
+            return tuple(self.vocabulary.places)
         return tuple(dict.fromkeys(name for m in named for name in m.subjects))
 
     def place_mentions(self) -> list[Mention] | None:
         """The places that come next, and places of surfaces; `None` for the whole house."""
         cursor = self.cursor
         named = cursor.lexicon.exact(cursor.tokens, cursor.at, PLACES)[1]
-        if not named and self.words.places and cursor.take_of(WHOLE_HOUSE):
+        if not named and self.vocabulary.places and cursor.take_of(WHOLE_HOUSE):
             return None
         mentions = []
         for subject in self.subjects.read("a place", PLACES):
-            mention = self.subjects.settle(subject)
-            if mention.open or mention.sort not in PLACES:
+            mention = self.subjects.resolve(subject)
+            if mention.open or mention.type not in PLACES:
                 raise NotUnderstood(f"it does not say which place: {EXAMPLE}")
             mentions.append(replace(mention, surfaces=subject.surfaces))
         return mentions

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
-from fleet.language.locations import PLACES
-from fleet.language.mentions import Mention
-from fleet.language.subjects import Subject
-from fleet.language.tidying import Tidying
-from fleet.language.wordlists import ANYWHERE, WHOLE_HOUSE
+from fleet.language.goals.tidying import Tidying
+from fleet.language.phrases.locations import PLACES
+from fleet.language.phrases.mentions import Mention
+from fleet.language.phrases.subjects import Subject
+from fleet.language.words.wordlists import ANYWHERE, WHOLE_HOUSE
 
 _ROBOTS_TELL = "robots say themselves where they are; see their states"
 
@@ -22,11 +22,11 @@ class Clauses(Tidying):
         """`find NP`, perhaps with where to look."""
         cursor, start = self.cursor, self.cursor.at
         if self.nouns.starts(("robot",)) and not self.nouns.starts(("object",)):
-            raise NotUnderstood(f"{cursor.said(*cursor.phrase())!r}: {_ROBOTS_TELL}")
+            raise NotUnderstood(f"{cursor.quote(*cursor.phrase())!r}: {_ROBOTS_TELL}")
         found = self.subjects.read("an object", ("object",))
-        if any(isinstance(s, Mention) and s.sort == "robot" for s in found):
+        if any(isinstance(s, Mention) and s.type == "robot" for s in found):
             raise NotUnderstood(_ROBOTS_TELL)
-        mentions = [self.subjects.settle(subject) for subject in found]
+        mentions = [self.subjects.resolve(subject) for subject in found]
         if not cursor.take_of(ANYWHERE) and (places := self._where_to_look(start)):
             self.searched(places, start)
         for mention in mentions:
@@ -37,13 +37,13 @@ class Clauses(Tidying):
         """`in PLACE`, `in PLACE and PLACE`, `everywhere`; nothing if nothing of it comes next."""
         cursor, here = self.cursor, self.cursor.at
         cursor.take_word(("in", "throughout"))
-        if self.words.places and cursor.take_of(WHOLE_HOUSE):
-            return tuple(self.words.places)
+        if self.vocabulary.places and cursor.take_of(WHOLE_HOUSE):
+            return tuple(self.vocabulary.places)
         cursor.at = here
-        parts, _ = self.parts()
-        where = self.where(parts, each=True)
-        if where.target_sort == "robot" or any(p.preposition == "to" for p in parts):
-            raise NotUnderstood(f"{cursor.said(start)!r}: things are looked for in places")
+        locatives, _ = self.locatives()
+        where = self.where(locatives, each=True)
+        if where.target_type == "robot" or any(p.preposition == "to" for p in locatives):
+            raise NotUnderstood(f"{cursor.quote(start)!r}: things are looked for in places")
         if where.each:
             return where.each
         found = [place] if (place := where.target or where.source) else []
@@ -62,15 +62,15 @@ class Clauses(Tidying):
         """`pick up NP`, perhaps with where it is."""
         cursor = self.cursor
         picked = [self.subjects.movable(s) for s in self.subjects.read("an object", ("object",))]
-        if any(isinstance(s, Mention) and s.sort == "robot" for s in picked):
+        if any(isinstance(s, Mention) and s.type == "robot" for s in picked):
             raise NotUnderstood("a robot cannot be picked up: name an object")
         cursor.take("up")
         start = cursor.at
-        parts, home = self.parts()
-        where = self.where(parts)
-        if home or any(part.preposition == "to" for part in parts):
-            raise NotUnderstood(f'{cursor.said(start)!r}: to move a thing, say "bring"')
-        mentions = [self.subjects.settle(s, where.target or where.source) for s in picked]
+        locatives, home = self.locatives()
+        where = self.where(locatives)
+        if home or any(locative.preposition == "to" for locative in locatives):
+            raise NotUnderstood(f'{cursor.quote(start)!r}: to move a thing, say "bring"')
+        mentions = [self.subjects.resolve(s, where.target or where.source) for s in picked]
         for mention in mentions:
             self.draft.add("held", mention, True)
         self.subjects.remember(mentions)
@@ -88,10 +88,10 @@ class Clauses(Tidying):
         Raises:
             NotUnderstood: several robots, who could share the places or go to each of them.
         """
-        mentions = [self.subjects.settle(self.subjects.drivers(subject)) for subject in who]
+        mentions = [self.subjects.resolve(self.subjects.drivers(subject)) for subject in who]
         if len(mentions) != 1 or not mentions[0].single:
             raise NotUnderstood(
-                f"{self.cursor.said(self.began)!r} does not say which robot goes where: say it of "
+                f"{self.cursor.quote(self.began)!r} does not say which robot goes where: say it of "
                 "one robot at a time, or leave the robots out"
             )
         for i, place in enumerate(self._route()):
@@ -118,7 +118,7 @@ class Clauses(Tidying):
             return (self.last_place,)
         named = self.place_mentions()
         if named is None:
-            return tuple(self.words.places)
+            return tuple(self.vocabulary.places)
         return tuple(name for mention in named for name in mention.subjects)
 
     def searched(self, places: Sequence[str], key: int) -> None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
-from fleet.language.claims import Claims
-from fleet.language.locations import PLACES, SPOTS
-from fleet.language.statement_words import (
+from fleet.language.phrases.locations import PLACES, SPOTS
+from fleet.language.phrases.subjects import THINGS, Subject
+from fleet.language.statements.claims import Claims
+from fleet.language.vocabulary import Claim, Vocabulary
+from fleet.language.words.statement_words import (
     CARRYING,
     HOLDING,
     HOUSES,
@@ -17,34 +19,29 @@ from fleet.language.statement_words import (
     PUT,
     SAID_CLOSERS,
     SAID_OPENERS,
-    SEARCHED,
+    SEARCH_PARTICIPLES,
     UNKNOWN,
     WHEREABOUTS,
 )
-from fleet.language.subjects import THINGS, Subject
-from fleet.language.tokens import SENTENCE_ENDS
-from fleet.language.verbs import verb_next
-from fleet.language.vocabulary import Vocabulary
-from fleet.language.wordlists import ANYWHERE, LOCATED, STANDING, phrases
-from keyexpr_schema.payloads.world import Value
+from fleet.language.words.tokens import SENTENCE_ENDS
+from fleet.language.words.wordlists import ANYWHERE, COPULAR_VERBS, LOCATED, phrases
 
-FactRow = tuple[str, str, Value]
 _EXAMPLE = 'say it like "the first cup is in the kitchen" or "nobody knows where the book is"'
 
 
-def statement_facts(text: str, words: Vocabulary) -> tuple[FactRow, ...]:
+def statement_facts(text: str, vocabulary: Vocabulary) -> tuple[Claim, ...]:
     """The facts in a statement, as (relation, subject, value); the value `None` is *unknown*.
 
     Raises:
         NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
     """
-    return _Statements(text, words).read()
+    return _StatementParser(text, vocabulary).read()
 
 
-class _Statements(Claims):
+class _StatementParser(Claims):
     """Joins statements, and tells them apart."""
 
-    def read(self) -> tuple[FactRow, ...]:
+    def read(self) -> tuple[Claim, ...]:
         cursor = self.cursor
         if not any(token.word[0].isalnum() for token in cursor.tokens):
             raise NotUnderstood("the sentence is empty: say what holds")
@@ -90,7 +87,7 @@ class _Statements(Claims):
                 return self.lost(things)
             raise self._unread()
         if cursor.take_of(NOBODY):
-            if (cursor.take("has") or cursor.take("have")) and cursor.take_of(SEARCHED):
+            if (cursor.take("has") or cursor.take("have")) and cursor.take_of(SEARCH_PARTICIPLES):
                 return self.looked_around(self.places(), False)
             cursor.at = start
             raise self._unread()
@@ -99,9 +96,11 @@ class _Statements(Claims):
                 raise self._unread()
             return self._at(self._things())
         if cursor.take_of(PEOPLE):
-            if cursor.take("have") | bool(cursor.take("already")) and cursor.take_of(SEARCHED):
+            if cursor.take("have") | bool(cursor.take("already")) and cursor.take_of(
+                SEARCH_PARTICIPLES
+            ):
                 return self.looked_around(self.places(), True)
-            if cursor.take_of(SEARCHED):
+            if cursor.take_of(SEARCH_PARTICIPLES):
                 return self.looked_around(self.places(), True)
             if cursor.take_of(PUT):
                 return self._at(self._things())
@@ -112,7 +111,7 @@ class _Statements(Claims):
         if self.nouns.starts(THINGS) or cursor.word() in ("it", "they"):
             return self._of_things()
         if self.nouns.starts(PLACES) or cursor.next_of(phrases("the house|everywhere")):
-            return self._ofplaces()
+            return self._of_places()
         raise self._unread()
 
     def _things(self) -> list[Subject]:
@@ -121,13 +120,13 @@ class _Statements(Claims):
     def _inverted(self, preposition: str) -> None:
         """`In the kitchen there are two cups`."""
         cursor = self.cursor
-        parts = [self.locations.part(preposition)]
+        locatives = [self.locations.locative(preposition)]
         cursor.take(",")
         cursor.take("there")
         if not cursor.take_word(("is", "are", "stands", "lies", "stand", "lie", "'s")):
             raise self._unread()
         things = self._things()
-        where = self.where(parts)
+        where = self.where(locatives)
         self.put(things, where.target, where.target_surface)
 
     def _of_things(self) -> None:
@@ -143,7 +142,7 @@ class _Statements(Claims):
                 return self.lost(things)
             raise self._unread()
         standing = cursor.tokens[cursor.at - 1].word == "'s"
-        if all(s.sort == "robot" for s in things):
+        if all(s.type == "robot" for s in things):
             holding = cursor.take_of(HOLDING)
             if holding or cursor.take_of(CARRYING):
                 if cursor.take("nothing"):
@@ -167,7 +166,7 @@ class _Statements(Claims):
         elif not (
             standing
             or found
-            or cursor.take_word(STANDING)
+            or cursor.take_word(COPULAR_VERBS)
             or cursor.take("has", "gone", "missing")
             or cursor.word() in ("in", "on", "at", "inside")
         ):
@@ -181,15 +180,15 @@ class _Statements(Claims):
         cursor = self.cursor
         while cursor.take_of(LOCATED):
             pass
-        parts, home = self.parts()
-        if home or not parts:
+        locatives, home = self.locatives()
+        if home or not locatives:
             raise self._unread()
-        where = self.where(parts)
+        where = self.where(locatives)
         if where.source is not None or where.target is None:
-            raise NotUnderstood(f"{cursor.said(self.began)!r} does not say one place: {_EXAMPLE}")
+            raise NotUnderstood(f"{cursor.quote(self.began)!r} does not say one place: {_EXAMPLE}")
         self.put(things, where.target, where.target_surface)
 
-    def _ofplaces(self) -> None:
+    def _of_places(self) -> None:
         """`The kitchen has been searched`, `the kitchen contains two cups`."""
         cursor = self.cursor
         places = self.places()
@@ -210,7 +209,7 @@ class _Statements(Claims):
         cursor.take("already")
         if cursor.take("unsearched"):
             return self.looked_around(places, negated)
-        if not cursor.take_of(SEARCHED):
+        if not cursor.take_of(SEARCH_PARTICIPLES):
             raise self._unread()
         if cursor.take("yet") and not negated:
             raise self._unread()
@@ -225,10 +224,10 @@ class _Statements(Claims):
                 f"{cursor.line!r} says what is not so, which tells nobody where "
                 'things are: say where it is, or "nobody knows where … is"'
             )
-        if cursor.at == self.began and verb_next(cursor):
+        if cursor.at == self.began and cursor.verb_next():
             shown = cursor.line
             return NotUnderstood(f"{shown!r} is a goal and not a fact: {_EXAMPLE}")
         if cursor.at == self.began and not (self.nouns.starts((*THINGS, *SPOTS))):
             return cursor.unknown("an object, robot or place", ("object", "robot", "place"))
-        shown = cursor.said(*cursor.phrase()) or cursor.said(self.began)
+        shown = cursor.quote(*cursor.phrase()) or cursor.quote(self.began)
         return cursor.refusal(f"{shown!r} is not understood as a fact: {_EXAMPLE}")

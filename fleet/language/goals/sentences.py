@@ -5,24 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
-from fleet.language.clauses import Clauses
-from fleet.language.locations import PLACES
-from fleet.language.mentions import Noun
+from fleet.language.goals.clauses import Clauses
+from fleet.language.phrases.locations import PLACES
+from fleet.language.phrases.mentions import NounPhrase
+from fleet.language.phrases.subjects import THINGS, Subject
 from fleet.language.refusals import suggestion
-from fleet.language.subjects import THINGS, Subject
-from fleet.language.tokens import words_in
-from fleet.language.verbs import (
+from fleet.language.vocabulary import Vocabulary
+from fleet.language.words.tokens import words_in
+from fleet.language.words.verbs import (
     BASE_VERBS,
     EXAMPLE,
     FINITE,
     IMPERATIVES,
     PARTICIPLES,
-    Doing,
-    longest,
-    verb_next,
+    VerbSense,
 )
-from fleet.language.vocabulary import Vocabulary
-from fleet.language.wordlists import CLOSERS, HOME, LOCATED, MODALS, OPENERS, STANDING
+from fleet.language.words.wordlists import CLOSERS, COPULAR_VERBS, HOME, LOCATED, MODALS, OPENERS
 
 _QUESTIONS = frozenset(words_in("is are was were does did has what who why how which whose"))
 
@@ -30,9 +28,9 @@ _QUESTIONS = frozenset(words_in("is are was were does did has what who why how w
 class Sentences(Clauses):
     """Clauses with who shall do it, or what shall be so."""
 
-    def __init__(self, text: str, words: Vocabulary) -> None:
-        super().__init__(text, words)
-        self.told: list[Subject] = []  # whom the sentence speaks to: "HSR, go … and …"
+    def __init__(self, text: str, vocabulary: Vocabulary) -> None:
+        super().__init__(text, vocabulary)
+        self.addressees: list[Subject] = []  # whom the sentence speaks to: "HSR, go … and …"
         self.elliptic = ""  # "move": "and the book to the kitchen" may follow; "be": "… is in …"
 
     def polite(self) -> bool:
@@ -42,7 +40,7 @@ class Sentences(Clauses):
         if opener is None:
             return False
         end = cursor.lexicon.exact(cursor.tokens, start, (*THINGS, "place", "surface"))[0]
-        if end > start or verb_next(cursor):
+        if end > start or cursor.verb_next():
             return False
         cursor.at += len(opener)
         return True
@@ -51,33 +49,33 @@ class Sentences(Clauses):
     def imperative(self) -> None:
         """`bring …`, `go to …`: a verb comes next."""
         cursor = self.cursor
-        verb = longest(cursor, IMPERATIVES)
+        verb = cursor.longest(IMPERATIVES)
         assert verb is not None
         cursor.at += len(verb)
-        self.verb, doing = verb[0], IMPERATIVES[verb]
-        if Doing.GO in doing and verb_next(cursor) and not cursor.next_of(HOME):
+        self.verb, senses = verb[0], IMPERATIVES[verb]
+        if VerbSense.GO in senses and cursor.verb_next() and not cursor.next_of(HOME):
             return self.imperative()  # "go get", "come find"
-        return self.do(doing, self.told or None)
+        return self.do(senses, self.addressees or None)
 
-    def do(self, doing: frozenset[Doing], who: Sequence[Subject] | None) -> None:
+    def do(self, senses: frozenset[VerbSense], who: Sequence[Subject] | None) -> None:
         """What follows a verb; `who` is named before it, if anybody is."""
-        self.elliptic = "move" if doing & {Doing.MOVE, Doing.GO, Doing.GIVE} else ""
-        if Doing.GO in doing and (Doing.MOVE not in doing or self._whereto_next()):
+        self.elliptic = "move" if senses & {VerbSense.MOVE, VerbSense.GO, VerbSense.GIVE} else ""
+        if VerbSense.GO in senses and (VerbSense.MOVE not in senses or self._whereto_next()):
             return self.go(who)
-        if Doing.PATROL in doing and any(not self._any_robot(s) for s in who or ()):
+        if VerbSense.PATROL in senses and any(not self._any_robot(s) for s in who or ()):
             self._check_robots(who or ())
             return self.patrol(who or ())
         if who is not None:
             self._check_who(who)
-        if Doing.MOVE in doing:
-            return self.move(fetch=Doing.FETCH in doing, tidy=Doing.TIDY in doing)
-        if Doing.GIVE in doing:
+        if VerbSense.MOVE in senses:
+            return self.move(fetch=VerbSense.FETCH in senses, tidy=VerbSense.TIDY in senses)
+        if VerbSense.GIVE in senses:
             return self.move(give=True)
-        if Doing.TIDY in doing:
+        if VerbSense.TIDY in senses:
             return self.tidy()
-        if Doing.FIND in doing:
+        if VerbSense.FIND in senses:
             return self.find()
-        if Doing.PICK in doing:
+        if VerbSense.PICK in senses:
             return self.pick()
         return self.search()
 
@@ -89,17 +87,17 @@ class Sentences(Clauses):
 
     @staticmethod
     def _any_robot(subject: Subject) -> bool:
-        return isinstance(subject, Noun) and subject.generic and subject.count is None
+        return isinstance(subject, NounPhrase) and subject.generic and subject.count is None
 
     def _check_robots(self, who: Sequence[Subject]) -> None:
-        if any(subject.sort != "robot" for subject in who):
-            raise NotUnderstood(f"{self.cursor.said(self.began)!r}: only robots do something")
+        if any(subject.type != "robot" for subject in who):
+            raise NotUnderstood(f"{self.cursor.quote(self.began)!r}: only robots do something")
 
     def _check_who(self, who: Sequence[Subject]) -> None:
         self._check_robots(who)
         for subject in who:
-            names = subject.names if isinstance(subject, Noun) else subject.subjects
-            if not self._any_robot(subject) and len(self.words.robots) > 1:
+            names = subject.names if isinstance(subject, NounPhrase) else subject.subjects
+            if not self._any_robot(subject) and len(self.vocabulary.robots) > 1:
                 raise NotUnderstood(
                     f"{' and '.join(names)} cannot be told to do it: a goal says what must hold, "
                     "and the allocator finds who does it; leave the name out"
@@ -117,25 +115,25 @@ class Sentences(Clauses):
         self._to_be(things)
 
     def declarative(
-        self, *, states: bool = False, wanted: bool = False, told: bool = False
+        self, *, states: bool = False, wanted: bool = False, bare_infinitive: bool = False
     ) -> None:
         """`NP should be …`, `NP, go to …`, and `NP to …` after another clause.
 
-        `states`: "make sure that" came before; `wanted`: "I need"; `told`: "let", "tell".
+        `states`: "make sure that" came before; `wanted`: "I need"; `bare_infinitive`: "let".
         """
         cursor, start = self.cursor, self.cursor.at
-        self.told = []
-        sorts = THINGS if self.nouns.starts(THINGS) or cursor.word() in ("it", "them") else PLACES
-        who = self.subjects.read("an object or a robot" if sorts == THINGS else "a place", sorts)
-        robots = all(s.sort == "robot" for s in who)
+        self.addressees = []
+        types = THINGS if self.nouns.starts(THINGS) or cursor.word() in ("it", "them") else PLACES
+        who = self.subjects.read("an object or a robot" if types == THINGS else "a place", types)
+        robots = all(s.type == "robot" for s in who)
         comma = robots and self.cursor.take(",")
         while comma and self.polite():
             pass
-        modal = bool(cursor.take_of(MODALS)) or told
-        infinitive = (wanted or told or states) and cursor.take("to")
+        modal = bool(cursor.take_of(MODALS)) or bare_infinitive
+        infinitive = (wanted or bare_infinitive or states) and cursor.take("to")
         if (infinitive or wanted) and cursor.take("be"):
             modal = True
-        elif cursor.take_word(STANDING):
+        elif cursor.take_word(COPULAR_VERBS):
             if not (modal or states or self.elliptic == "be"):
                 raise NotUnderstood(
                     f"{self.cursor.line!r} states a fact; a goal says what should be: "
@@ -146,9 +144,9 @@ class Sentences(Clauses):
             modal = True
         elif cursor.take_word(("belongs", "belong")):
             return self._belongs(who)
-        elif robots and (verb := longest(cursor, FINITE)):
+        elif robots and (verb := cursor.longest(FINITE)):
             cursor.at += len(verb)
-            self.told = [s for s in who if not (isinstance(s, Noun) and s.generic)]
+            self.addressees = [s for s in who if not (isinstance(s, NounPhrase) and s.generic)]
             return self.do(FINITE[verb], who)
         elif not (wanted or self.elliptic) or comma or modal:
             raise self.no_clause(start)
@@ -159,54 +157,56 @@ class Sentences(Clauses):
         cursor = self.cursor
         self.elliptic = "be"
         done = self._done()
-        if done & {Doing.FIND, Doing.PICK, Doing.SEARCH} and not done & {Doing.MOVE}:
+        if done & {VerbSense.FIND, VerbSense.PICK, VerbSense.SEARCH} and not done & {
+            VerbSense.MOVE
+        }:
             self.elliptic = ""
             relation = next(
                 name
-                for doing, name in (
-                    (Doing.FIND, "located"),
-                    (Doing.PICK, "held"),
-                    (Doing.SEARCH, "searched"),
+                for senses, name in (
+                    (VerbSense.FIND, "located"),
+                    (VerbSense.PICK, "held"),
+                    (VerbSense.SEARCH, "searched"),
                 )
-                if doing in done
+                if senses in done
             )
             return self._has_been(who, relation)
-        if any(s.sort in PLACES for s in who):
-            shown = cursor.said(self.began)
+        if any(s.type in PLACES for s in who):
+            shown = cursor.quote(self.began)
             raise NotUnderstood(
                 f"{shown!r} is one place too many for one thing; if one is to come after the "
                 'other, say "then"'
                 if self.moved
                 else f"{shown!r} is a place, and places stay where they are: {EXAMPLE}"
             )
-        parts, home = self.parts()
-        return self.to_target(who, self.where(parts, each=True), home or Doing.TIDY in done)
+        locatives, home = self.locatives()
+        return self.to_target(who, self.where(locatives, each=True), home or VerbSense.TIDY in done)
 
     def _belongs(self, who: Sequence[Subject]) -> None:
         """`NP belongs in PLACE`, after the verb."""
         cursor = self.cursor
         self.elliptic = "be"
-        if any(s.sort in PLACES for s in who):
-            raise NotUnderstood(f"{cursor.said(self.began)!r}: places stay where they are")
-        parts, home = self.parts()
-        where = self.where(parts)
-        if where.target_sort == "robot" or where.source is not None:
+        if any(s.type in PLACES for s in who):
+            raise NotUnderstood(f"{cursor.quote(self.began)!r}: places stay where they are")
+        locatives, home = self.locatives()
+        where = self.where(locatives)
+        if where.target_type == "robot" or where.source is not None:
             raise NotUnderstood(
-                f"{cursor.said(self.began)!r} does not say in which place it belongs: {EXAMPLE}"
+                f"{cursor.quote(self.began)!r} does not say in which place it belongs: {EXAMPLE}"
             )
         return self.to_target(who, where, home)
 
-    def _done(self) -> frozenset[Doing]:
+    def _done(self) -> frozenset[VerbSense]:
         """The participle that comes next, past words such as "located" and "now"."""
         cursor = self.cursor
         while True:
-            verb = longest(cursor, PARTICIPLES)
+            verb = cursor.longest(PARTICIPLES)
             start = cursor.at
             if verb is not None:
                 cursor.at += len(verb)
-                doing = PARTICIPLES[verb]
-                if not doing & {Doing.FIND} or self._ends():
-                    return doing
+                senses = PARTICIPLES[verb]
+                if not senses & {VerbSense.FIND} or self._ends():
+                    return senses
                 cursor.at = start
             if not cursor.take_of(LOCATED):
                 return frozenset()
@@ -215,12 +215,12 @@ class Sentences(Clauses):
         return self.cursor.at_border() or self.cursor.word() == "and"
 
     def _has_been(self, who: Sequence[Subject], relation: str) -> None:
-        mentions = [self.subjects.settle(self.subjects.movable(s)) for s in who]
+        mentions = [self.subjects.resolve(self.subjects.movable(s)) for s in who]
         wanted = PLACES if relation == "searched" else ("object",)
         for mention in mentions:
-            if mention.sort not in wanted:
+            if mention.type not in wanted:
                 raise NotUnderstood(
-                    f"{self.cursor.said(self.began)!r}: {relation} is said of "
+                    f"{self.cursor.quote(self.began)!r}: {relation} is said of "
                     f"{'places' if relation == 'searched' else 'objects'} only"
                 )
             self.draft.add(relation, mention, True)
@@ -239,7 +239,7 @@ class Sentences(Clauses):
         if cursor.word() == "another" or cursor.word(1) == "other":
             self.nouns.noun("an object", THINGS)  # says itself what is wrong with it
             cursor.at = first
-        shown = cursor.said(*cursor.phrase())
+        shown = cursor.quote(*cursor.phrase())
         if shown and shown.split()[0].casefold() in _QUESTIONS:
             return NotUnderstood(
                 f"{self.cursor.line!r} is a question; a goal says what should hold: {EXAMPLE}"

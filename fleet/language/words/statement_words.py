@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fleet.language.wordlists import phrases
+from fleet.language.words.wordlists import phrases
 
 SAID_OPENERS = phrases(
     "please note that|note that|please note|note|please remember that|remember that|remember|fyi|"
@@ -28,7 +28,9 @@ UNKNOWN = phrases(
     "nowhere to be found|in an unknown place|in some unknown place|at an unknown place|"
     "unknown to us|gone|gone missing"
 )
-SEARCHED = phrases("searched|inspected|checked|explored|patrolled|surveyed|scanned|examined")
+SEARCH_PARTICIPLES = phrases(
+    "searched|inspected|checked|explored|patrolled|surveyed|scanned|examined"
+)
 PEOPLE = phrases("i|we|somebody|someone|people")
 NOBODY = phrases("nobody|no one|no robot")
 PUT = phrases(

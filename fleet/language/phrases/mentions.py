@@ -1,4 +1,4 @@
-"""Noun phrases as they were read, and who is meant by them."""
+"""NounPhrase phrases as they were read, and who is meant by them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from fleet.errors import NotUnderstood
-from fleet.language.lexicon import Entity, Sort
 from fleet.language.refusals import one_of
+from fleet.language.words.lexicon import Entity, EntityType
 
 
 class Quantity(Enum):
@@ -30,7 +30,7 @@ class Mention:
     """
 
     subjects: tuple[str, ...]
-    sort: Sort
+    type: EntityType
     key: int
     open: bool = False
     selective: bool = False
@@ -43,8 +43,8 @@ class Mention:
 
 
 @dataclass(frozen=True)
-class Noun:
-    """A noun phrase before it is settled who is meant; `ordinal` 0 is the last one.
+class NounPhrase:
+    """A noun phrase before it is resolved who is meant; `ordinal` 0 is the last one.
 
     `exact`: the words name each of `found`. `generic`: the words say no more than "thing".
     """
@@ -60,9 +60,9 @@ class Noun:
     ordinal: int | None = None
 
     @property
-    def sort(self) -> Sort:
-        """Of what sort they are."""
-        return self.found[0].sort
+    def type(self) -> EntityType:
+        """The type of those that could be meant."""
+        return self.found[0].type
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -72,24 +72,24 @@ class Noun:
     @property
     def surfaces(self) -> tuple[str, ...]:
         """The surfaces that could be meant."""
-        return tuple(e.id for e in self.found if e.sort == "surface")
+        return tuple(e.id for e in self.found if e.type == "surface")
 
-    def among(self, subjects: Collection[str]) -> Noun:
+    def among(self, subjects: Collection[str]) -> NounPhrase:
         """The same phrase, said of some of those that it could be."""
         return replace(self, found=tuple(e for e in self.found if e.stands_for in subjects))
 
-    def settle(self) -> Mention:
+    def resolve(self) -> Mention:
         """Who is meant.
 
         Raises:
             NotUnderstood: it does not say which of several, or counts more than there are.
         """
         names, listing = self.names, ", ".join(self.names)
-        if len({e.sort for e in self.found}) > 1 and self.exact:
-            both = one_of(f"the {e.sort} {e.id}" for e in self.found)
+        if len({e.type for e in self.found}) > 1 and self.exact:
+            both = one_of(f"the {e.type} {e.id}" for e in self.found)
             raise NotUnderstood(f"{self.text!r} could be {both}: give one of them another name")
         if self.ordinal is not None:
-            return Mention(self._by_ordinal(), self.sort, self.key)
+            return Mention(self._by_ordinal(), self.type, self.key)
         if self.count is not None and self.count != len(names):
             verb = "is" if len(names) == 1 else "are"
             reason = (
@@ -100,19 +100,19 @@ class Noun:
             raise NotUnderstood(f"{self.text!r}: {reason}; known are {listing}")
         if self.quantity is Quantity.ALL or self.count is not None:
             selective = len(names) > 1 and not self.exact and self.count is None
-            return Mention(names, self.sort, self.key, selective=selective)
+            return Mention(names, self.type, self.key, selective=selective)
         if self.plural and self.quantity in (Quantity.ANY, Quantity.BARE):
             raise NotUnderstood(
                 f"{self.text!r} does not say how many: say all of them or which ones; "
                 f"known are {listing}"
             )
         if len(names) == 1:
-            return Mention(names, self.sort, self.key)
+            return Mention(names, self.type, self.key)
         if self.quantity is Quantity.ANY:
-            return Mention(names, self.sort, self.key, open=True, selective=True)
+            return Mention(names, self.type, self.key, open=True, selective=True)
         if self.plural:
-            return Mention(names, self.sort, self.key, selective=True)
-        what = "place" if self.sort == "surface" else self.sort
+            return Mention(names, self.type, self.key, selective=True)
+        what = "place" if self.type == "surface" else self.type
         raise NotUnderstood(f"{self.text!r} could be {one_of(names)}: say which {what}")
 
     def _by_ordinal(self) -> tuple[str, ...]:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 
 from fleet.errors import NotUnderstood
-from fleet.language.lexicon import Lexicon, Sort
 from fleet.language.refusals import listed, reason_for, suggestion
-from fleet.language.tokens import ORDINALS, SENTENCE_ENDS, Token, tokens_of, words_of
-from fleet.language.wordlists import FROM, IN, TO, Phrase
+from fleet.language.words.lexicon import ENTITY_TYPES, EntityType, Lexicon
+from fleet.language.words.tokens import ORDINALS, SENTENCE_ENDS, Phrase, Token, tokens_of, words_of
+from fleet.language.words.verbs import FINITE, IMPERATIVES
+from fleet.language.words.wordlists import COPULAR_VERBS, FROM, IN, MODALS, TO
 
 _PUNCTUATION = SENTENCE_ENDS | {","}
 _BORDERS = _PUNCTUATION | {"and", "then", "to", "into", "onto", "from", "in", "on", "at"}
 _BORDERS |= {"is", "are", "should", "has", "have"}
+_BEHIND_SUBJECTS = COPULAR_VERBS | {",", "and", "or", "to", "has", "have", "belongs"}
 
 
 class Cursor:
@@ -61,6 +63,39 @@ class Cursor:
         self.at += len(phrase or ())
         return phrase
 
+    def longest(self, phrases: Container[Phrase]) -> Phrase | None:
+        """The longest of the phrases that comes next; nothing is gone past."""
+        for length in range(4, 0, -1):
+            phrase = tuple(self.word(i) for i in range(length))
+            if phrase in phrases:
+                return phrase
+        return None
+
+    def verb_next(self) -> bool:
+        """Whether a verb that asks for something comes next, and no name that begins like one."""
+        verb = self.longest(IMPERATIVES)
+        if verb is None:
+            return False
+        end, named = self.lexicon.exact(self.tokens, self.at, ENTITY_TYPES)
+        if not named:
+            return True
+        as_long = end == self.at + len(verb)
+        if as_long and any(e.type == "robot" for e in named):
+            return not self._subject_ends(len(verb))
+        return end <= self.at + len(verb)
+
+    def _subject_ends(self, ahead: int) -> bool:
+        """Whether what stands so many words ahead can follow who does it: "Scout should …"."""
+        start = self.at
+        self.at += ahead
+        found = (
+            self.word() in _BEHIND_SUBJECTS
+            or self.next_of(MODALS) is not None
+            or self.longest(FINITE) is not None
+        )
+        self.at = start
+        return found
+
     def take_word(self, words: Iterable[str]) -> str | None:
         """Go past the next word if it is one of these, and return it."""
         word = self.word()
@@ -74,13 +109,13 @@ class Cursor:
         return self.ended or self.word() in _PUNCTUATION
 
     def preposition(self) -> str | None:
-        """Go past a preposition of place: `to`, `in` or `from`, whichever sort it is."""
-        for sort, phrases in (("from", FROM), ("to", TO), ("in", IN)):
+        """Go past a preposition of place: `to`, `in` or `from`, whichever role it has."""
+        for role, phrases in (("from", FROM), ("to", TO), ("in", IN)):
             if self.take_of(phrases):
-                return sort
+                return role
         return None
 
-    def said(self, start: int, end: int | None = None) -> str:
+    def quote(self, start: int, end: int | None = None) -> str:
         """The text of some tokens, as it was written."""
         chosen: Sequence[Token] = self.tokens[start : self.at if end is None else end]
         return " ".join(self.text[chosen[0].start : chosen[-1].end].split()) if chosen else ""
@@ -103,15 +138,15 @@ class Cursor:
         special = reason_for(words, self.what)
         return NotUnderstood(special or otherwise)
 
-    def unknown(self, what: str, sorts: Sequence[Sort]) -> NotUnderstood:
-        """The words that come next name nothing known of these sorts."""
-        known = listed(self.lexicon.known(sorts))
+    def unknown(self, what: str, types: Sequence[EntityType]) -> NotUnderstood:
+        """The words that come next name nothing known of these types."""
+        known = listed(self.lexicon.known(types))
         if self.ended:
             return NotUnderstood(f"{self.line!r} ends where {what} is missing; known are {known}")
         start, end = self.phrase()
-        shown = self.said(start, end)
+        shown = self.quote(start, end)
         hint = ""
-        names = self.lexicon.names_in(sorts) | set(ORDINALS)
+        names = self.lexicon.names_in(types) | set(ORDINALS)
         # What is known was hardly mistyped: a word that is not comes first.
         single = sorted(shown.split(), key=lambda word: word.casefold() in names)
         for part in (shown, " ".join(words_of(shown)), *single):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
-from fleet.language.clauses import Clauses
+from fleet.language.goals.clauses import Clauses
+from fleet.language.phrases.subjects import Subject
 from fleet.language.refusals import one_of
-from fleet.language.subjects import Subject
 from fleet.language.vocabulary import Vocabulary
 from keyexpr_schema.payloads.world import NOTHING, Value
 
@@ -15,8 +15,8 @@ from keyexpr_schema.payloads.world import NOTHING, Value
 class Claims(Clauses):
     """Collects facts; a later one may not contradict an earlier one."""
 
-    def __init__(self, text: str, words: Vocabulary) -> None:
-        super().__init__(text, words, "a fact")
+    def __init__(self, text: str, vocabulary: Vocabulary) -> None:
+        super().__init__(text, vocabulary, "a fact")
         self.facts: dict[tuple[str, str], Value] = {}
 
     def fact(self, relation: str, subject: str, value: Value) -> None:
@@ -38,24 +38,24 @@ class Claims(Clauses):
         """These are at the target, on a surface there if one is named."""
         if self.cursor.word() == "or":
             raise self.cursor.refusal("")
-        mentions = [self.subjects.settle(thing) for thing in things]
+        mentions = [self.subjects.resolve(thing) for thing in things]
         for mention in mentions:
             if mention.open:
                 raise NotUnderstood(
-                    f"{self.cursor.said(self.began)!r} does not say which of "
+                    f"{self.cursor.quote(self.began)!r} does not say which of "
                     f"{one_of(mention.subjects)}: name it"
                 )
-            if mention.sort == "robot" and target not in self.words.places:
+            if mention.type == "robot" and target not in self.vocabulary.places:
                 raise NotUnderstood("a robot is at a place, not on a robot: name the place")
             for name in mention.subjects:
                 self.fact("at", name, target)
-                if surface is not None and mention.sort == "object":
+                if surface is not None and mention.type == "object":
                     self.fact("on", name, surface)
         self.subjects.remember(mentions)
 
     def lost(self, things: Sequence[Subject]) -> None:
         """Nobody knows where these are."""
-        mentions = [self.subjects.settle(thing) for thing in things]
+        mentions = [self.subjects.resolve(thing) for thing in things]
         for mention in mentions:
             if mention.open:
                 raise NotUnderstood(f"it does not say which of {one_of(mention.subjects)}: name it")
@@ -67,12 +67,12 @@ class Claims(Clauses):
         self, robots: Sequence[Subject], held: Sequence[Subject] | None, in_hand: bool = True
     ) -> None:
         """What a robot has in its hand (`None`: nothing) or on it."""
-        names = [name for robot in robots for name in self.subjects.settle(robot).subjects]
-        objects = [n for thing in held or () for n in self.subjects.settle(thing).subjects]
-        opened = any(self.subjects.settle(s).open for s in (*robots, *(held or ())))
+        names = [name for robot in robots for name in self.subjects.resolve(robot).subjects]
+        objects = [n for thing in held or () for n in self.subjects.resolve(thing).subjects]
+        opened = any(self.subjects.resolve(s).open for s in (*robots, *(held or ())))
         if opened or (held is not None and (len(names) != 1 or (in_hand and len(objects) != 1))):
             raise NotUnderstood(
-                f"{self.cursor.said(self.began)!r}: one hand holds one thing; say who holds what"
+                f"{self.cursor.quote(self.began)!r}: one hand holds one thing; say who holds what"
             )
         for name in names:
             if in_hand:
@@ -84,7 +84,7 @@ class Claims(Clauses):
         """Somebody looked around in these places, or nobody did."""
         if not value and len(places) > 1:
             raise NotUnderstood(
-                f"{self.cursor.said(self.began)!r} could mean all or some of them: "
+                f"{self.cursor.quote(self.began)!r} could mean all or some of them: "
                 "say it of one place at a time"
             )
         self.cursor.take("yet")

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
-from fleet.language.cursor import Cursor
-from fleet.language.lexicon import CATEGORIES, Entity, Sort
-from fleet.language.mentions import Noun, Quantity
-from fleet.language.tokens import number_of, ordinal_of
-from fleet.language.wordlists import DEFINITE
+from fleet.language.phrases.cursor import Cursor
+from fleet.language.phrases.mentions import NounPhrase, Quantity
+from fleet.language.words.lexicon import CATEGORIES, Entity, EntityType
+from fleet.language.words.tokens import number_of, ordinal_of
+from fleet.language.words.wordlists import DEFINITE
 
 _NUMBER_SIGNS = frozenset({"number", "no", "nr", "#"})
 LAST = frozenset({"last", "final"})
@@ -22,7 +22,7 @@ class Heads:
         self.cursor = cursor
         self.kind: tuple[Entity, ...] = ()  # whom "one" may mean in "the second one"
 
-    def made(
+    def noun_phrase(
         self,
         found: tuple[Entity, ...],
         start: int,
@@ -31,21 +31,21 @@ class Heads:
         plural: bool = False,
         exact: bool = False,
         generic: bool = False,
-    ) -> Noun:
+    ) -> NounPhrase:
         """A noun phrase that began at token `start` and ends here."""
-        text = self.cursor.said(start)
-        return Noun(tuple(found), text, start, quantity, plural, exact, generic)
+        text = self.cursor.quote(start)
+        return NounPhrase(tuple(found), text, start, quantity, plural, exact, generic)
 
-    def named(self, sorts: Sequence[Sort]) -> tuple[int, tuple[Entity, ...]]:
+    def named(self, types: Sequence[EntityType]) -> tuple[int, tuple[Entity, ...]]:
         """The whole name that comes next; a kind that has several members is none."""
         cursor = self.cursor
-        end, found = cursor.lexicon.exact(cursor.tokens, cursor.at, sorts)
+        end, found = cursor.lexicon.exact(cursor.tokens, cursor.at, types)
         if len(found) > 1:
-            raw = cursor.said(cursor.at, end).casefold()
+            raw = cursor.quote(cursor.at, end).casefold()
             found = tuple(e for e in found if e.id.casefold() == raw) or found
         name = tuple(token.word for token in cursor.tokens[cursor.at : end])
-        if found and cursor.lexicon.is_several(name, sorts):
-            raw = cursor.said(cursor.at, end).casefold()
+        if found and cursor.lexicon.is_several(name, types):
+            raw = cursor.quote(cursor.at, end).casefold()
             found = tuple(e for e in found if e.id.casefold() == raw)
         return (end, found) if found else (cursor.at, ())
 
@@ -63,55 +63,55 @@ class Heads:
         )
         return spoken == "ones" or (spoken == "one" and determined and cursor.word(1) != "of")
 
-    def head(self, start: int, what: str, sorts: Sequence[Sort]) -> Noun:
+    def head(self, start: int, what: str, types: Sequence[EntityType]) -> NounPhrase:
         """The noun itself, past determiner and ordinal.
 
         Raises:
-            NotUnderstood: nothing known of these sorts comes next.
+            NotUnderstood: nothing known of these types comes next.
         """
         cursor = self.cursor
-        name_end, named = self.named(sorts)
+        name_end, named = self.named(types)
         if self.is_pronoun_one() and not named:
             plural = cursor.tokens[cursor.at].spoken == "ones"
-            found = tuple(e for e in self.kind if e.sort in sorts)
+            found = tuple(e for e in self.kind if e.type in types)
             cursor.at += 1
             if found:
-                return self.made(found, start, plural=plural)
-        described = self._described(start, sorts)
+                return self.noun_phrase(found, start, plural=plural)
+        described = self._described(start, types)
         if described is not None and cursor.at > name_end:
             return described
         if not named:
             cursor.at = start if described is None else cursor.at
-            raise self.unknown(start, what, sorts)
+            raise self.unknown(start, what, types)
         cursor.at = name_end
-        self._remember_kind(named[0], sorts)
-        return self.made(named, start, exact=True)
+        self._remember_kind(named[0], types)
+        return self.noun_phrase(named, start, exact=True)
 
-    def _described(self, start: int, sorts: Sequence[Sort]) -> Noun | None:
+    def _described(self, start: int, types: Sequence[EntityType]) -> NounPhrase | None:
         """A run of words that occur in names and kinds, perhaps with numbers behind it."""
         cursor, begin = self.cursor, self.cursor.at
-        end, found = cursor.lexicon.described(cursor.tokens, begin, sorts)
+        end, found = cursor.lexicon.described(cursor.tokens, begin, types)
         if not found:
             return None
         plural, generic = False, False
-        kind = cursor.lexicon.kind(cursor.tokens, begin, end, sorts)
+        kind = cursor.lexicon.kind(cursor.tokens, begin, end, types)
         if kind is not None and (of_kind := tuple(e for e in found if e in kind[1])):
             plural, found = kind[0], of_kind
             generic = end - begin == 1 and len(found) == len(kind[1]) and self._is_category(begin)
         cursor.at = end
         found = self._of_what(found)
-        self._remember_kind(found[0], sorts)
+        self._remember_kind(found[0], types)
         one = not cursor.ended and cursor.tokens[cursor.at].spoken in ("one", "ones")
         if kind is None and one:
             plural = cursor.tokens[cursor.at].spoken == "ones"
             cursor.at += 1
-            return self.made(found, start, plural=plural)
+            return self.noun_phrase(found, start, plural=plural)
         numbers = self._numbers()
         if not numbers:
-            return self.made(found, start, plural=plural, generic=generic)
+            return self.noun_phrase(found, start, plural=plural, generic=generic)
         chosen = tuple(e for number in numbers for e in self._numbered(found, number, start))
         quantity = Quantity.ALL if len(numbers) > 1 else Quantity.BARE
-        return self.made(chosen, start, quantity=quantity, exact=True)
+        return self.noun_phrase(chosen, start, quantity=quantity, exact=True)
 
     def _of_what(self, found: tuple[Entity, ...]) -> tuple[Entity, ...]:
         """Those with a name that has the words of `of …` in it: "bottle of water"."""
@@ -155,15 +155,15 @@ class Heads:
         if not chosen:
             known = ", ".join(dict.fromkeys(e.stands_for for e in found))
             raise NotUnderstood(
-                f"{self.cursor.said(start)!r}: there is no number {number}; known are {known}"
+                f"{self.cursor.quote(start)!r}: there is no number {number}; known are {known}"
             )
         return chosen
 
-    def _remember_kind(self, entity: Entity, sorts: Sequence[Sort]) -> None:
-        if entity.sort in ("object", "robot"):
+    def _remember_kind(self, entity: Entity, types: Sequence[EntityType]) -> None:
+        if entity.type in ("object", "robot"):
             self.kind = self.cursor.lexicon.kin(entity)
 
-    def unknown(self, start: int, what: str, sorts: Sequence[Sort]) -> NotUnderstood:
+    def unknown(self, start: int, what: str, types: Sequence[EntityType]) -> NotUnderstood:
         """The phrase that began at token `start` names nothing known."""
         self.cursor.at = start
-        return self.cursor.unknown(what, sorts)
+        return self.cursor.unknown(what, types)

@@ -25,6 +25,7 @@ from fleet.core.state import OUTSTANDING, PlanEntry, Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
 from fleet.service.planning_job import carry_out
+from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import PlanChange
 from keyexpr_schema.payloads.requests import PlanRequest, ReplanRequest
@@ -97,16 +98,16 @@ class Running:
             )  # fmt: skip
             self.tell(events.RobotRegistered, spec=spec)
             self.tell(events.WorkerConnected, robot=spec.robot, incarnation="i1")
-            self.learn(spec.robot, "holding", "nothing")
-            self.learn(spec.robot, "at", f"room_{number % PLACES}")
+            self.learn(spec.robot, HOLDING, NOTHING)
+            self.learn(spec.robot, AT, f"room_{number % PLACES}")
         for number in range(self.goals):
             self.tell(
                 events.ObjectPut,
                 object=Object(object=f"c{number}", kind="cup", label=f"c{number}"),
             )
-            self.learn(f"c{number}", "at", f"room_{number % PLACES}")
+            self.learn(f"c{number}", AT, f"room_{number % PLACES}")
             wanted = f"room_{(number + 1 + number // PLACES % (PLACES - 1)) % PLACES}"
-            condition = Condition(relation="at", subject=f"c{number}", value=wanted)
+            condition = Condition(relation=AT, subject=f"c{number}", value=wanted)
             goal = Goal(goal=f"g{number}", text="", conditions=(condition,), ordinal=number)
             self.tell(events.GoalPut, goal=goal)
         self.tell(events.PlanRequested, request=PlanRequest(request="r", plan="p"))

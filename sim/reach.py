@@ -21,7 +21,7 @@ def out_of_reach(mission: Mission) -> tuple[str, ...]:
     """
     hands = []
     for robot in mission.robots:
-        about = load_description(robot.spec.model).description
+        about = load_description(robot.spec.model, robot.folder).description
         if "pick" in robot.spec.skills and about.arm is not None:
             least, greatest = about.arm.reach_m
             reach_m = (least + REACH_MARGIN_M, greatest - REACH_MARGIN_M)

@@ -15,12 +15,13 @@ from fleet.core.state import OUTSTANDING, PlanEntry, Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
 from fleet.service.planning_job import carry_out
+from keyexpr_schema.facts import Value
 from keyexpr_schema.keyspace import ORDER
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskState
-from keyexpr_schema.payloads.world import Fact, Value
+from keyexpr_schema.payloads.world import Fact
 from tests.household import PLACES, SKILLS, cup
 
 _ALL = compose()

@@ -214,9 +214,9 @@ def _order(record: TaskRecord, entry: PlanEntry, epoch: int) -> Order:
 def _told_facts(old: State, new: State) -> Iterator[Effect]:
     if old.facts is new.facts:
         return
-    for name, fact in new.facts.items():
-        if fact is not old.facts.get(name) and fact.source.startswith(PLANNER_SOURCE):
-            yield Publish(FACT, FactAddress(fact.subject, fact.relation), fact)
+    for key, fact in new.facts.items():
+        if fact is not old.facts.get(key) and fact.source.startswith(PLANNER_SOURCE):
+            yield Publish(FACT, FactAddress.of(key), fact)
 
 
 def _jobs(old: State, new: State) -> Iterator[Effect]:

@@ -7,18 +7,16 @@ from dataclasses import dataclass, field
 
 import msgspec
 
+from keyexpr_schema.facts import Value
 from keyexpr_schema.payloads.robots import RobotSpec
-from keyexpr_schema.payloads.world import Object, Place, Value
-
-Claim = tuple[str, str, Value]
-"""Relation, subject and value of a fact that a sentence says or presupposes; `None` is unknown."""
+from keyexpr_schema.payloads.world import Object, Place
 
 
 class SkillPhrase(msgspec.Struct, frozen=True, kw_only=True):
     """A skill that can be asked for by name: "vacuum the hallway".
 
-    `type` is that of what it is done to, `object` or `place`; `wants` are the relations and values that
-    hold of it then.
+    `type`, `object` or `place`, is that of what it is done to; `wants` are the relations and values
+    that hold of it then.
     """
 
     verb: str

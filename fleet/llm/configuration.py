@@ -10,8 +10,7 @@ import msgspec
 import yaml
 
 from fleet.errors import BadLlmConfig
-
-DEFAULT_FILE = Path("planner.yaml")
+from keyexpr_schema.config_files import config_file
 
 Seconds = Annotated[float, msgspec.Meta(gt=0)]
 Count = Annotated[int, msgspec.Meta(ge=0)]
@@ -118,18 +117,12 @@ RESERVED_OPTIONS = frozenset(
 
 
 def load_llm_config(path: Path | None = None) -> LlmConfig:
-    """The `llm` section of the file at `path`.
-
-    With no `path`, that of `configs/planner.yaml` below the working folder, or else beside the
-    packages, or no model if there is none.
+    """The `llm` section of the file at `path`; else of `planner.yaml` (see `config_file`).
 
     Raises:
         BadLlmConfig: the file cannot be read, or a field is not right.
     """
-    if path is None:
-        path = default_file()
-        if path is None:
-            return LlmConfig()
+    path = path or config_file(".", "planner")
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -151,10 +144,3 @@ def load_llm_config(path: Path | None = None) -> LlmConfig:
     if config.rules_dir is None:
         return config
     return msgspec.structs.replace(config, rules_dir=str(path.parent / config.rules_dir))
-
-
-def default_file() -> Path | None:
-    """The configuration file that is read when none is named, if it exists."""
-    below = Path("configs") / DEFAULT_FILE
-    beside = Path(__file__).parents[2] / "configs" / DEFAULT_FILE
-    return next((file for file in (below, beside) if file.exists()), None)

@@ -29,10 +29,10 @@ from fleet.planners.base import Planner
 from fleet.planners.llm.interpreter import LlmInterpreter
 from fleet.planners.llm.planner import LlmPlanner
 from fleet.planners.symbolic.planner import SymbolicPlanner
+from keyexpr_schema.config_files import config_file
 
 SKILL_MODELS = "robotfleet.skill_models"
 """Entry points to mappings such as the YAML of a skill file holds: `{"skills": {name: model}}`."""
-DEFAULT_SKILLS = Path("skills") / "household.yaml"
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def load_all_skills(skill_files: tuple[Path, ...] = ()) -> dict[str, SkillModel]
             if name in added:
                 raise BadSkillFile(f"{where}: skill {name} is already modelled elsewhere")
             added[name] = skill
-    return {**load_skills(default_skill_file()), **added}
+    return {**load_skills(config_file("skills", "household")), **added}
 
 
 def load_skills(path: Path) -> dict[str, SkillModel]:
@@ -125,12 +125,6 @@ def load_skills(path: Path) -> dict[str, SkillModel]:
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise BadSkillFile(f"{path} is not YAML: {' '.join(str(error).split())}") from None
     return skills_from_data(data, str(path))
-
-
-def default_skill_file() -> Path:
-    """`configs/skills/household.yaml` below the working folder, or else beside the packages."""
-    here = Path("configs") / DEFAULT_SKILLS
-    return here if here.exists() else Path(__file__).parents[2] / "configs" / DEFAULT_SKILLS
 
 
 def _from_packages(group: str) -> list[Any]:

@@ -11,7 +11,6 @@ from msgspec.structs import replace
 
 from fleet.allocators.base import Allocated, Allocator, NotAllocated
 from fleet.core.events import PlanningFailed, PlanningSucceeded
-from fleet.core.handlers.goals import SEARCHED
 from fleet.core.model.world import WorldModel
 from fleet.core.state import PlanningJob, State
 from fleet.planners.base import NoPlan, PlanningProblem
@@ -19,7 +18,8 @@ from fleet.service.allocation_context import circumstances_of
 from fleet.service.composition import Composition
 from fleet.service.oversubscription import PartialPlan, plan_what_can_be
 from fleet.service.plan_repair import mended_plan
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.facts import SEARCHED
+from keyexpr_schema.ids import actor_in
 from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.payloads.tasks import TaskState
@@ -212,7 +212,7 @@ def _work(skill: str, args: Mapping[str, str], robots: Iterable[str | None]) -> 
     return skill, *sorted(
         (name, value)
         for name, value in args.items()
-        if value not in others and not value.startswith(ACTOR_PREFIX)
+        if value not in others and actor_in(value) is None
     )
 
 

@@ -11,13 +11,10 @@ import msgspec
 from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from sim.errors import BadFile
-from sim.files.solids import Solid, solids
+from sim.files.solids import solids
 from sim.files.world_file import check_objects, load_world
 from sim.files.world_schema import LARGEST_RADIUS_M, PointXY, WorldFile
-from sim.files.yaml_file import FileEntry, read_yaml
-
-CONFIGS = Path(__file__).resolve().parents[2] / "configs"
-"""The configurations that come with the source tree."""
+from sim.files.yaml_file import FileEntry, find_file, read_yaml
 
 
 class PlanOptions(FileEntry, frozen=True):
@@ -29,10 +26,11 @@ class PlanOptions(FileEntry, frozen=True):
 
 
 class MissionRobot(msgspec.Struct, frozen=True, kw_only=True):
-    """A robot of a mission and where the simulation puts it."""
+    """A robot of a mission, where the simulation puts it, and the folder of its robot file."""
 
     spec: RobotSpec
     start_m_rad: PoseMRad
+    folder: Path
 
 
 class Mission(msgspec.Struct, frozen=True, kw_only=True):
@@ -75,9 +73,9 @@ class _MissionEntry(FileEntry, frozen=True):
     plan: PlanOptions = PlanOptions()
 
 
-def load_robot(path: str | Path) -> RobotSpec:
-    """The robot file at `path`, checked."""
-    path = Path(path)
+def load_robot(file: str | Path) -> RobotSpec:
+    """The robot file given by path or name (see `config_file`), checked."""
+    path = find_file("robots", file)
     spec = read_yaml(path, RobotSpec, "robot file")
     for name, value in spec.capabilities.items():
         if not (math.isfinite(value) and value >= 0.0):
@@ -89,41 +87,21 @@ def load_robot(path: str | Path) -> RobotSpec:
     return spec
 
 
-def find_mission(name: str | Path) -> Path:
-    """The file of a mission given by path, or by the name of a file in configs/missions.
-
-    Looked for in this order: the path itself, ./configs/missions, the source tree's own configs.
-    """
-    given = Path(name)
-    if given.suffix in (".yaml", ".yml") or len(given.parts) > 1:
-        if given.is_file():
-            return given
-        raise BadFile(f"the mission file {given} does not exist")
-    folders = (Path("configs") / "missions", CONFIGS / "missions")
-    for folder in folders:
-        if (folder / f"{given}.yaml").is_file():
-            return folder / f"{given}.yaml"
-    known = sorted({file.stem for folder in folders for file in folder.glob("*.yaml")})
-    raise BadFile(
-        f"there is no mission {str(given)!r}; there are {', '.join(known) or 'none'}, "
-        "or give the path of a mission file"
-    )
-
-
 def load_mission(name: str | Path) -> Mission:
-    """The mission given by path or name (see `find_mission`), with its world and robots."""
-    path = find_mission(name)
+    """The mission given by path or name (see `config_file`), with its world and robots."""
+    path = find_file("missions", name)
     entry = read_yaml(path, _MissionEntry, "mission file")
-    world = _rearranged(path, load_world(path.parent / entry.world), entry.objects)
+    world = _rearranged(path, load_world(find_file("worlds", entry.world, path)), entry.objects)
     robots: list[MissionRobot] = []
     for number, item in enumerate(entry.robots):
-        spec = load_robot(path.parent / item.spec)
+        file = find_file("robots", item.spec, path)
+        spec = load_robot(file)
         if item.robot is not None:
             spec = msgspec.structs.replace(spec, robot=item.robot)
         start = (*item.start.at_m, math.radians(item.start.yaw_deg))
         where = f"{path}: robots[{number}] ({spec.robot})"
         _check_start(where, world, spec.robot, start, robots)
-        robots.append(MissionRobot(spec=spec, start_m_rad=start))
+        robots.append(MissionRobot(spec=spec, start_m_rad=start, folder=file.parent))
     return Mission(
         mission=entry.mission,
         world=world,
@@ -168,7 +146,7 @@ def _check_start(
             f"(x 0 to {world.size_m[0]}, y 0 to {world.size_m[1]})"
         )
     for solid in solids(world):
-        if _distance(solid, x, y) < LARGEST_RADIUS_M:
+        if solid.distance_m(x, y) < LARGEST_RADIUS_M:
             raise BadFile(
                 f"{where}: start.at_m: [{x}, {y}] is less than {LARGEST_RADIUS_M} m from "
                 f"{solid.name}; a robot needs that much room"
@@ -184,12 +162,3 @@ def _check_start(
                 f"{where}: start.at_m: it overlaps {other.spec.robot}, {gap:.2f} m away; "
                 f"keep {2 * LARGEST_RADIUS_M} m between two robots"
             )
-
-
-def _distance(solid: Solid, x: float, y: float) -> float:
-    """From a point to the box, m; 0 inside."""
-    c, s = math.cos(solid.yaw_rad), math.sin(solid.yaw_rad)
-    dx, dy = x - solid.center_m[0], y - solid.center_m[1]
-    along = max(abs(c * dx + s * dy) - solid.half_m[0], 0.0)
-    across = max(abs(c * dy - s * dx) - solid.half_m[1], 0.0)
-    return math.hypot(along, across)

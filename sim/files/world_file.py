@@ -16,12 +16,12 @@ from sim.files.world_schema import (
     FLOOR,
     WorldFile,
 )
-from sim.files.yaml_file import read_yaml
+from sim.files.yaml_file import find_file, read_yaml
 
 
-def load_world(path: str | Path) -> WorldFile:
-    """The world file at `path`, checked."""
-    path = Path(path)
+def load_world(file: str | Path) -> WorldFile:
+    """The world file given by path or name (see `config_file`), checked."""
+    path = find_file("worlds", file)
     world = read_yaml(path, WorldFile, "world file")
     _check_world(path, world)
     return world

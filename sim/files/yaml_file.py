@@ -9,6 +9,8 @@ from typing import Any, TypeVar, get_args, get_origin
 
 import msgspec
 
+from keyexpr_schema.config_files import config_file
+from keyexpr_schema.errors import NoConfigFile
 from keyexpr_schema.key import plainly
 from sim.errors import BadFile
 
@@ -17,6 +19,14 @@ S = TypeVar("S", bound=msgspec.Struct)
 
 class FileEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Base of what stands in a configuration file: an unknown field is an error, not a wish."""
+
+
+def find_file(kind: str, name: str | Path, named_in: Path | None = None) -> Path:
+    """See `config_file`; a name of no file is a `BadFile`."""
+    try:
+        return config_file(kind, name, named_in)
+    except NoConfigFile as error:
+        raise BadFile(str(error)) from None
 
 
 def read_yaml(path: Path, kind: type[S], what: str) -> S:

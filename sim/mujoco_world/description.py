@@ -6,21 +6,18 @@ Metres, radians; joint, actuator, site, geom and body names are those of the MJC
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import msgspec
 
+from keyexpr_schema.config_files import config_folders
 from sim.errors import BadFile
 from sim.files.yaml_file import FileEntry, read_yaml
 
 MODELS = Path(__file__).resolve().parent.parent / "models"
 """The models that come with this package."""
-
-BESIDE_ROBOTS = Path("configs") / "robots"
-"""Where people keep robot files, and can put models of their own; from the working directory."""
 
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 
@@ -112,23 +109,24 @@ class RobotModel:
     description: Description
 
 
-def load_description(name: str, folders: Sequence[Path] = ()) -> RobotModel:
-    """The model called `name`, looked for in `folders`, `BESIDE_ROBOTS`, then `MODELS`.
+def load_description(name: str, beside: Path | None = None) -> RobotModel:
+    """The model called `name`: from the folder `beside` that a robot's file is in, else from the
+    folders of robot files, else from `MODELS`.
 
     Raises:
         BadFile: there is none, or its description says what cannot be.
     """
-    places = (*folders, BESIDE_ROBOTS, MODELS)
+    places = (*(() if beside is None else (beside,)), *config_folders("robots"), MODELS)
     for folder in places:
-        mjcf, beside = folder / f"{name}.xml", folder / f"{name}.model.yaml"
+        mjcf, described = folder / f"{name}.xml", folder / f"{name}.model.yaml"
         if not mjcf.is_file():
             continue
-        if not beside.is_file():
+        if not described.is_file():
             raise BadFile(
-                f"{mjcf} has no description: write {beside} (see sim/models/hsr.model.yaml)"
+                f"{mjcf} has no description: write {described} (see {MODELS / 'hsr.model.yaml'})"
             )
-        found = read_yaml(beside, Description, "model description")
-        _check(beside, found)
+        found = read_yaml(described, Description, "model description")
+        _check(described, found)
         return RobotModel(name=name, mjcf=mjcf, description=found)
     known = sorted({file.stem for folder in places for file in folder.glob("*.xml")})
     raise BadFile(

@@ -104,7 +104,8 @@ def make_backend(
         return KinematicBackend(mission.world, robots, motion_model, seed, step_s)
     from sim.mujoco_world import MujocoBackend
 
-    return MujocoBackend(mission.world, robots, seed)
+    folders = {robot.spec.robot: robot.folder for robot in mission.robots}
+    return MujocoBackend(mission.world, robots, seed, folders)
 
 
 def _count(number: int, thing: str) -> str:

@@ -331,7 +331,7 @@ def test_the_first_stage_alone() -> None:
 
 def test_where_something_comes_from_is_presumed_and_no_part_of_the_goal() -> None:
     reading = read_goal("Take cup 1 from the kitchen to the hallway", WORDS)
-    assert reading.presumed == (("at", "cup_1", "kitchen"),)
+    assert reading.presumed == ((("at", "cup_1"), "kitchen"),)
     assert shown(reading) == "at(cup_1) = hallway"
 
 

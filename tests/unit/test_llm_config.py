@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import queue
-import shutil
-import subprocess
 import sys
 import threading
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from string import Template
@@ -164,25 +161,6 @@ def test_answers_have_the_types_of_tasks() -> None:
     for answer in (StepAnswer, TaskAnswer):
         for field in msgspec.structs.fields(answer):
             assert field.type == types[field.name]
-
-
-def test_prompts_are_installed_with_the_package(tmp_path: Path) -> None:
-    """A wheel holds them; built from a copy, so that nothing is left in the source tree."""
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, tmp_path / name)
-    shutil.copytree(ROOT / "fleet", tmp_path / "fleet")
-    code = (
-        "from setuptools import build_meta; import sys; "
-        f"print(build_meta.build_wheel({str(tmp_path / 'out')!r}))"
-    )
-    built = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert built.returncode == 0, built.stderr
-    (wheel,) = (tmp_path / "out").glob("*.whl")
-    names = set(zipfile.ZipFile(wheel).namelist())
-    for path in PROMPTS_DIR.glob("*/*.txt"):
-        assert str(path.relative_to(ROOT)) in names
 
 
 def test_calls_go_on_side_by_side_and_litellm_stays_outside(client: ModelClient) -> None:

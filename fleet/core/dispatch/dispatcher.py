@@ -13,6 +13,7 @@ from fleet.core.model.preconditions import Skills, action_of, unmet_before
 from fleet.core.model.skills import Action
 from fleet.core.plan_entry import give_up, set_entry, set_record
 from fleet.core.state import OUTSTANDING, PlanEntry, State
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
@@ -165,7 +166,7 @@ def _way_s(state: State, action: Action, skills: Skills) -> float | None:
     """The way to the task at its robot's top speed, s; `None` if nobody knows from where."""
     if action.skill.travel_to is None:
         return 0.0
-    here = state.fact("at", action.actor)
+    here = state.fact(AT, action.actor)
     if here is None or here.value not in state.places:
         return None
     return state.world(skills).way_s(action.actor, here.value, action.args[action.skill.travel_to])
@@ -215,7 +216,7 @@ def _free(state: State, robot: str, plan: str, kept: bool) -> bool:
 def _carries_for(state: State, robot: str, entry: PlanEntry) -> bool:
     """Whether a robot has something with it that an open goal of the plan is about."""
     return any(
-        (fact := state.fact("at", subject)) is not None and fact.value == robot
+        (fact := state.fact(AT, subject)) is not None and fact.value == robot
         for goal in entry.plan.goals
         if goal in state.goal_states and state.goal_states[goal].state not in ENDED_GOALS
         for condition in state.goal_states[goal].conditions

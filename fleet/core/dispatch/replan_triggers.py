@@ -9,9 +9,10 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.handlers.goals import believe
 from fleet.core.model.preconditions import Skills, action_of
-from fleet.core.model.skills import Action, Variable
+from fleet.core.model.skills import Action
 from fleet.core.plan_entry import set_entry
 from fleet.core.state import OUTSTANDING, PlanEntry, State
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
@@ -38,7 +39,7 @@ def _contradiction(entry: PlanEntry, fact: Fact, skills: Skills) -> str | None:
 
     What a robot says of the work it is doing is part of that work.
     """
-    known = Variable(fact.relation, fact.subject)
+    known = fact.key
     unfinished = {
         record.task: (record, action)
         for record in entry.current()
@@ -76,7 +77,7 @@ def why_replan(state: State, entry: PlanEntry, skills: Skills) -> str | None:
     """What has come up that the plan does not provide for."""
     world = state.world(skills)
     for thing in entry.plan.seeks:
-        where = world.value("at", thing)
+        where = world.value(AT, thing)
         if where is not None:
             return f"{thing} was found: it is at {where}"
     current = list(entry.current())

@@ -9,11 +9,11 @@ from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.state import State, put, without
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, read_goal, statement_facts
+from keyexpr_schema.facts import AT, NOTHING, SEARCHED, FactKey, Value
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState
-from keyexpr_schema.payloads.world import NOTHING, Fact, StatementStatus, Value
+from keyexpr_schema.payloads.world import Fact, StatementStatus
 
-SEARCHED = "searched"
 """Relation that says of a place that somebody looked around in it."""
 
 
@@ -85,7 +85,7 @@ def next_stage(state: State, goal: str) -> State:
     kept = tuple(
         condition
         for condition in status.conditions
-        if condition.relation == "at"
+        if condition.relation == AT
         and about.isdisjoint(condition.subjects)
         and not state.robots.keys() & set(condition.subjects)
     )
@@ -158,7 +158,7 @@ def _reading(state: State, goal: Goal) -> Reading:
 def _note(state: State, reading: Reading) -> str | None:
     """What a goal's sentence says besides what must hold, so that no word is lost unseen."""
     notes = [f"{remark!r} asks for nothing" for remark in reading.remarks]
-    for relation, subject, value in reading.presumed:
+    for (relation, subject), value in reading.presumed:
         fact = state.fact(relation, subject)
         if fact is not None and fact.value not in (None, value):
             notes.append(f"it takes {subject} to be at {value}; believed is {fact.value}")
@@ -167,7 +167,7 @@ def _note(state: State, reading: Reading) -> str | None:
 
 def _presume(state: State, goal: str, reading: Reading) -> State:
     """Believe what a goal takes for granted where nothing is known, as if it had been stated."""
-    for relation, subject, value in reading.presumed:
+    for (relation, subject), value in reading.presumed:
         fact = state.fact(relation, subject)
         if fact is None or fact.value is None:
             said = Fact(
@@ -218,10 +218,9 @@ def mark_goals(
 
 def believe(state: State, fact: Fact) -> State:
     """Believe a fact, whatever was known of its variable."""
-    name = f"{fact.subject}/{fact.relation}"
-    if state.facts.get(name) == fact:
+    if state.facts.get(fact.key) == fact:
         return state
-    return replace(state, facts=put(state.facts, name, fact))
+    return replace(state, facts=put(state.facts, fact.key, fact))
 
 
 def believe_if_newer(state: State, fact: Fact) -> State:
@@ -232,8 +231,8 @@ def believe_if_newer(state: State, fact: Fact) -> State:
 
 def fact_deleted(state: State, event: events.FactDeleted) -> State:
     """No longer believe anything of that variable."""
-    name = f"{event.subject}/{event.relation}"
-    return replace(state, facts=without(state.facts, name)) if name in state.facts else state
+    key = FactKey(event.relation, event.subject)
+    return replace(state, facts=without(state.facts, key)) if key in state.facts else state
 
 
 def statement_put(state: State, event: events.StatementPut) -> State:
@@ -263,13 +262,13 @@ def _read_statement(state: State, name: str) -> State:
         return _set_understood(state, StatementStatus(statement=name, reason=str(error)))
     facts = tuple(
         Fact(
-            subject=subject,
-            relation=relation,
+            subject=key.subject,
+            relation=key.relation,
             value=value,
             source=f"{PLANNER_SOURCE}:{name}",
             time_s=state.time_s,
         )
-        for relation, subject, value in read
+        for key, value in read
     )
     for fact in facts:
         state = believe(state, fact)

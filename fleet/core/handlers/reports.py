@@ -79,11 +79,11 @@ def _again(record: TaskRecord, report: Report) -> TaskRecord:
 def _succeeded(
     state: State, entry: PlanEntry, record: TaskRecord, report: Report, skills: Skills
 ) -> State:
-    told = {(fact.relation, fact.subject) for fact in report.facts}
+    reported = {fact.key for fact in report.facts}
     action = action_of(record, skills)
     state = _learned(state, record, report, action)
     for literal in action.after if action is not None else ():
-        if tuple(literal.variable) not in told:
+        if literal.variable not in reported:
             state = believe(
                 state,
                 Fact(

@@ -8,7 +8,7 @@ from fleet.core import events
 from fleet.core.handlers.goals import active_plan_of, mark_goals
 from fleet.core.plan_entry import answer, next_task, set_entry
 from fleet.core.state import PlanEntry, PlanningJob, State, put, without
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState, Task
 from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest
@@ -250,7 +250,7 @@ def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
     task = Task(
         task=f"t{number}",
         skill=ask.skill,
-        args={"robot": f"{ACTOR_PREFIX}x{number}", **ask.args},
+        args={"robot": actor_arg(f"x{number}"), **ask.args},
         actor=f"x{number}",
         after=ask.after,
     )

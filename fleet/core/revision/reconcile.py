@@ -19,7 +19,7 @@ from fleet.core.model.skills import SkillModel
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from fleet.core.state import OUTSTANDING, PlanEntry
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import bound
 from keyexpr_schema.payloads.plans import Plan, PlanChange, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
@@ -74,12 +74,7 @@ def revise(
 
 def _call(task: Task, allocation: Mapping[str, str]) -> Call:
     return task.skill, tuple(
-        sorted(
-            (name, allocation[value.removeprefix(ACTOR_PREFIX)])
-            if value.startswith(ACTOR_PREFIX)
-            else (name, value)
-            for name, value in task.args.items()
-        )
+        sorted((name, bound(value, allocation)) for name, value in task.args.items())
     )
 
 

@@ -9,7 +9,7 @@ from fleet.language.goals.sentences import Sentences
 from fleet.language.phrases.locations import PLACES
 from fleet.language.phrases.mentions import Mention
 from fleet.language.phrases.subjects import THINGS, Subject
-from fleet.language.vocabulary import Claim, SkillPhrase, Vocabulary
+from fleet.language.vocabulary import SkillPhrase, Vocabulary
 from fleet.language.words.tokens import SENTENCE_ENDS, words_of
 from fleet.language.words.verbs import EXAMPLE, IMPERATIVES
 from fleet.language.words.wordlists import (
@@ -23,6 +23,7 @@ from fleet.language.words.wordlists import (
     REMARKS,
     WANTING,
 )
+from keyexpr_schema.facts import Literal
 from keyexpr_schema.payloads.goals import Condition
 
 _PREPOSED = frozenset({"to", "into", "onto", "in", "on", "at", "inside", "back", "there"})
@@ -33,14 +34,14 @@ class Reading:
     """What a goal sentence asks for.
 
     `stages` come one after the other; all conditions of a stage hold together at its end.
-    `presumed` are facts that the sentence takes for granted, as (relation, subject, value): "bring
-    the first cup from the kitchen …" presumes `at(cup_1) = kitchen`. They are no part of the goal.
+    `presumed` are facts that the sentence takes for granted: "bring the first cup from the
+    kitchen …" presumes `at(cup_1) = kitchen`. They are no part of the goal.
     `remarks` are parts of the text that ask for nothing, as it was written: "I have a headache".
     """
 
     text: str
     stages: tuple[tuple[Condition, ...], ...]
-    presumed: tuple[Claim, ...] = ()
+    presumed: tuple[Literal, ...] = ()
     remarks: tuple[str, ...] = ()
 
 

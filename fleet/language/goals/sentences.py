@@ -20,7 +20,8 @@ from fleet.language.words.verbs import (
     PARTICIPLES,
     VerbSense,
 )
-from fleet.language.words.wordlists import CLOSERS, COPULAR_VERBS, HOME, LOCATED, MODALS, OPENERS
+from fleet.language.words.wordlists import CLOSERS, COPULAR_VERBS, HOME, MODALS, OPENERS, SITUATED
+from keyexpr_schema.facts import HELD, LOCATED, SEARCHED
 
 _QUESTIONS = frozenset(words_in("is are was were does did has what who why how which whose"))
 
@@ -164,9 +165,9 @@ class Sentences(Clauses):
             relation = next(
                 name
                 for senses, name in (
-                    (VerbSense.FIND, "located"),
-                    (VerbSense.PICK, "held"),
-                    (VerbSense.SEARCH, "searched"),
+                    (VerbSense.FIND, LOCATED),
+                    (VerbSense.PICK, HELD),
+                    (VerbSense.SEARCH, SEARCHED),
                 )
                 if senses in done
             )
@@ -208,7 +209,7 @@ class Sentences(Clauses):
                 if not senses & {VerbSense.FIND} or self._ends():
                     return senses
                 cursor.at = start
-            if not cursor.take_of(LOCATED):
+            if not cursor.take_of(SITUATED):
                 return frozenset()
 
     def _ends(self) -> bool:
@@ -216,7 +217,7 @@ class Sentences(Clauses):
 
     def _has_been(self, who: Sequence[Subject], relation: str) -> None:
         mentions = [self.subjects.resolve(self.subjects.movable(s)) for s in who]
-        wanted = PLACES if relation == "searched" else ("object",)
+        wanted = PLACES if relation == SEARCHED else ("object",)
         for mention in mentions:
             if mention.type not in wanted:
                 raise NotUnderstood(
@@ -224,7 +225,7 @@ class Sentences(Clauses):
                     f"{'places' if relation == 'searched' else 'objects'} only"
                 )
             self.draft.add(relation, mention, True)
-        if relation != "searched":
+        if relation != SEARCHED:
             self.subjects.remember(mentions)
 
     # --- refusals --------------------------------------------------------------------------------

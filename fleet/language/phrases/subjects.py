@@ -10,9 +10,10 @@ from fleet.language.phrases.cursor import Cursor
 from fleet.language.phrases.mentions import Mention, NounPhrase, Quantity
 from fleet.language.phrases.noun_phrases import NounPhrases
 from fleet.language.refusals import one_of
-from fleet.language.vocabulary import Claim, Vocabulary
+from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.lexicon import EntityType
 from fleet.language.words.wordlists import PLURAL_PRONOUNS, PREPOSITIONS, SINGULAR_PRONOUNS
+from keyexpr_schema.facts import AT, FactKey, Literal
 
 THINGS: tuple[EntityType, ...] = ("object", "robot")
 Subject = NounPhrase | Mention
@@ -40,7 +41,7 @@ class Subjects:
     def __init__(self, cursor: Cursor, nouns: NounPhrases, vocabulary: Vocabulary) -> None:
         self.cursor, self.nouns, self.vocabulary = cursor, nouns, vocabulary
         self.recent: list[Mention] = []  # whom "it" and "them" may mean
-        self.presumed: list[Claim] = []
+        self.presumed: list[Literal] = []
 
     def read(self, what: str, types: Sequence[EntityType], several: bool = True) -> list[Subject]:
         """One noun phrase or pronoun, or several with commas and "and" between them.
@@ -77,7 +78,7 @@ class Subjects:
         else:
             mention = self._at_source(subject, source, surface)
         if source is not None and not mention.open:
-            self.presumed.extend(("at", name, source) for name in mention.subjects)
+            self.presumed.extend(Literal(FactKey(AT, name), source) for name in mention.subjects)
         return mention
 
     def remember(self, mentions: Sequence[Mention]) -> None:

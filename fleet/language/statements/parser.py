@@ -8,10 +8,10 @@ from fleet.errors import NotUnderstood
 from fleet.language.phrases.locations import PLACES, SPOTS
 from fleet.language.phrases.subjects import THINGS, Subject
 from fleet.language.statements.claims import Claims
-from fleet.language.vocabulary import Claim, Vocabulary
+from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.statement_words import (
     CARRYING,
-    HOLDING,
+    GRIPPING,
     HOUSES,
     NOBODY,
     NOBODY_KNOWS,
@@ -24,13 +24,14 @@ from fleet.language.words.statement_words import (
     WHEREABOUTS,
 )
 from fleet.language.words.tokens import SENTENCE_ENDS
-from fleet.language.words.wordlists import ANYWHERE, COPULAR_VERBS, LOCATED, phrases
+from fleet.language.words.wordlists import ANYWHERE, COPULAR_VERBS, SITUATED, phrases
+from keyexpr_schema.facts import Literal
 
 _EXAMPLE = 'say it like "the first cup is in the kitchen" or "nobody knows where the book is"'
 
 
-def statement_facts(text: str, vocabulary: Vocabulary) -> tuple[Claim, ...]:
-    """The facts in a statement, as (relation, subject, value); the value `None` is *unknown*.
+def statement_facts(text: str, vocabulary: Vocabulary) -> tuple[Literal, ...]:
+    """The facts in a statement, where the value `None` is *unknown*.
 
     Raises:
         NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
@@ -41,7 +42,7 @@ def statement_facts(text: str, vocabulary: Vocabulary) -> tuple[Claim, ...]:
 class _StatementParser(Claims):
     """Joins statements, and tells them apart."""
 
-    def read(self) -> tuple[Claim, ...]:
+    def read(self) -> tuple[Literal, ...]:
         cursor = self.cursor
         if not any(token.word[0].isalnum() for token in cursor.tokens):
             raise NotUnderstood("the sentence is empty: say what holds")
@@ -57,9 +58,7 @@ class _StatementParser(Claims):
                 pass
             if not (cursor.at_border() or cursor.word() == "and"):
                 raise self._unread()
-        return tuple(
-            (relation, subject, value) for (relation, subject), value in self.facts.items()
-        )
+        return tuple(Literal(key, value) for key, value in self.facts.items())
 
     def _join(self) -> bool:
         cursor, must = self.cursor, False
@@ -143,7 +142,7 @@ class _StatementParser(Claims):
             raise self._unread()
         standing = cursor.tokens[cursor.at - 1].word == "'s"
         if all(s.type == "robot" for s in things):
-            holding = cursor.take_of(HOLDING)
+            holding = cursor.take_of(GRIPPING)
             if holding or cursor.take_of(CARRYING):
                 if cursor.take("nothing"):
                     if holding:
@@ -178,7 +177,7 @@ class _StatementParser(Claims):
     def _at(self, things: Sequence[Subject]) -> None:
         """`… in PLACE`, after what stands there."""
         cursor = self.cursor
-        while cursor.take_of(LOCATED):
+        while cursor.take_of(SITUATED):
             pass
         locatives, home = self.locatives()
         if home or not locatives:

@@ -37,7 +37,7 @@ PUT = phrases(
     "put|left|placed|saw|see|found|stored|just put|just left|just saw|have put|have left|"
     "have seen|have placed|can see|noticed|dropped|set|laid|keep"
 )
-HOLDING = phrases("holds|is holding|is gripping|grips|has in its hand")
+GRIPPING = phrases("holds|is holding|is gripping|grips|has in its hand")
 CARRYING = phrases(
     "carries|is carrying|has|has got|transports|is transporting|contains|has in its basket"
 )

@@ -20,8 +20,8 @@ from rich.table import Table
 from fleet.core import events
 from fleet.core.dispatch.delays import FACTOR, MARGIN_S
 from fleet.core.effects import MakePlan
-from fleet.core.events import PlanMade
-from fleet.core.state import OUTSTANDING, PlanBook, Policy, State
+from fleet.core.events import PlanningSucceeded
+from fleet.core.state import OUTSTANDING, PlanEntry, Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
 from fleet.service.planning_job import carry_out
@@ -54,13 +54,13 @@ def main() -> None:
         for _ in range(DONE_BEFORE):
             running.succeed()
         each_s = (time.perf_counter() - began_s) / (2 * DONE_BEFORE)
-        before = running.book.allocation
+        before = running.entry.allocation
         happens(running)
-        book, made = running.book, running.made
-        moved = sum(before.get(actor, robot) != robot for actor, robot in book.allocation.items())
-        changed = book.change or PlanChange()
+        entry, made = running.entry, running.made
+        moved = sum(before.get(actor, robot) != robot for actor, robot in entry.allocation.items())
+        changed = entry.change or PlanChange()
         changes = [str(n) for n in (changed.kept, changed.dropped, changed.added)]
-        least = next((n.split(" is ")[-1] for n in book.notes if "least found" in n), "")
+        least = next((n.split(" is ")[-1] for n in entry.notes if "least found" in n), "")
         table.add_row(
             (happens.__doc__ or "").split(".")[0],
             f"{made.planning_time_s:.2f} s",
@@ -83,36 +83,36 @@ class Running:
     goals: int
 
     def __post_init__(self) -> None:
-        self.state, self.time_s, self.made = State(), 0.0, PlanMade
+        self.state, self.time_s, self.made = State(), 0.0, PlanningSucceeded
         self.tell(events.PlannerStarted, epoch=1, incarnation="bench")
         for number in range(PLACES):
             ways = {f"room_{n}": abs(n - number) * STEP_M for n in range(PLACES) if n != number}
             place = Place(place=f"room_{number}", label=f"room {number}", travel_m=ways)
-            self.tell(events.PlaceTold, place=place)
+            self.tell(events.PlacePut, place=place)
         for number in range(self.robots):
             spec = RobotSpec(
                 robot=f"r{number}", model="hsr",
                 skills=("navigate", "pick", "place"),
                 capabilities={"drive": 0.6, "see": 4.0, "grip": 1.2, "reach": 1.0},
             )  # fmt: skip
-            self.tell(events.RobotTold, spec=spec)
-            self.tell(events.RobotSeen, robot=spec.robot, incarnation="i1")
+            self.tell(events.RobotRegistered, spec=spec)
+            self.tell(events.WorkerConnected, robot=spec.robot, incarnation="i1")
             self.learn(spec.robot, "holding", "nothing")
             self.learn(spec.robot, "at", f"room_{number % PLACES}")
         for number in range(self.goals):
             self.tell(
-                events.ObjectTold,
+                events.ObjectPut,
                 object=Object(object=f"c{number}", kind="cup", label=f"c{number}"),
             )
             self.learn(f"c{number}", "at", f"room_{number % PLACES}")
             wanted = f"room_{(number + 1 + number // PLACES % (PLACES - 1)) % PLACES}"
             condition = Condition(relation="at", subject=f"c{number}", value=wanted)
             goal = Goal(goal=f"g{number}", text="", conditions=(condition,), ordinal=number)
-            self.tell(events.GoalTold, goal=goal)
-        self.tell(events.PlanAsked, request=PlanRequest(request="r", plan="p"))
+            self.tell(events.GoalPut, goal=goal)
+        self.tell(events.PlanRequested, request=PlanRequest(request="r", plan="p"))
 
     @property
-    def book(self) -> PlanBook:
+    def entry(self) -> PlanEntry:
         """What is kept of the plan."""
         return self.state.plans["p"]
 
@@ -124,7 +124,7 @@ class Running:
         for effect in effects:
             if isinstance(effect, MakePlan):
                 made = carry_out(effect.job, self.state, self.parts, at)
-                if not isinstance(made, PlanMade):
+                if not isinstance(made, PlanningSucceeded):
                     raise SystemExit(f"there is no plan: {made.reason}")
                 self.made = made
                 self.state, _ = step(self.state, made, self.parts.skills)
@@ -132,19 +132,19 @@ class Running:
     def learn(self, subject: str, relation: str, value: str) -> None:
         """Something is told."""
         fact = Fact(subject=subject, relation=relation, value=value, source="bench")
-        self.tell(events.FactTold, fact=fact)
+        self.tell(events.FactPut, fact=fact)
 
     def outstanding(self) -> list[TaskRecord]:
         """Tasks that robots are at."""
-        return [record for record in self.book.records.values() if record.state in OUTSTANDING]
+        return [record for record in self.entry.records.values() if record.state in OUTSTANDING]
 
     def succeed(self) -> None:
         """Some robot starts its task and ends it."""
         record = self.outstanding()[0]
         report = self.report_of(record)
-        self.tell(events.ReportTold, report=report)
+        self.tell(events.ReportReceived, report=report)
         done = replace(report, state=ReportState.SUCCEEDED, ended_s=self.time_s + record.duration_s)
-        self.tell(events.ReportTold, report=done)
+        self.tell(events.ReportReceived, report=done)
 
     def report_of(self, record: TaskRecord) -> Report:
         """The report that the task has begun."""
@@ -159,21 +159,21 @@ class Running:
 def lost(running: Running) -> None:
     """A robot is lost: what is left is mended."""
     robot = running.outstanding()[-1].robot
-    running.tell(events.RobotGone, robot=robot, incarnation="i1")
-    running.tell(events.TimePassed, wait_s=Policy().lost_after_s + 1.0)
+    running.tell(events.WorkerDisconnected, robot=robot, incarnation="i1")
+    running.tell(events.TimerFired, wait_s=Policy().lost_after_s + 1.0)
 
 
 def late(running: Running) -> None:
     """A robot is ten minutes late: what is left is mended."""
     record = running.outstanding()[-1]
-    running.tell(events.ReportTold, report=running.report_of(record))
-    running.tell(events.TimePassed, wait_s=FACTOR * record.duration_s + MARGIN_S + 600.0)
+    running.tell(events.ReportReceived, report=running.report_of(record))
+    running.tell(events.TimerFired, wait_s=FACTOR * record.duration_s + MARGIN_S + 600.0)
 
 
 def planned_again(running: Running) -> None:
     """A person wants another plan: everything is planned again."""
     ask = ReplanRequest(request="again", plan="p", reason="because")
-    running.tell(events.ReplanAsked, request=ask)
+    running.tell(events.ReplanRequested, request=ask)
 
 
 if __name__ == "__main__":

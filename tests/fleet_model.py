@@ -11,7 +11,7 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.core import events
 from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.state import OUTSTANDING, PlanBook, Policy, State
+from fleet.core.state import OUTSTANDING, PlanEntry, Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
 from fleet.service.planning_job import carry_out
@@ -49,13 +49,13 @@ class FleetModel:
         self._truth: dict[tuple[str, str], Value] = {}
         self.tell(events.PlannerStarted, epoch=1, incarnation="one")
         for place in PLACES:
-            self.tell(events.PlaceTold, place=place)
+            self.tell(events.PlacePut, place=place)
         for number in range(1, cups + 1):
-            self.tell(events.ObjectTold, object=cup(number))
+            self.tell(events.ObjectPut, object=cup(number))
             self.learn(f"cup_{number}", "at", "kitchen")
         for spec in robots:
-            self.tell(events.RobotTold, spec=spec)
-            self.tell(events.RobotSeen, robot=spec.robot, incarnation="i1")
+            self.tell(events.RobotRegistered, spec=spec)
+            self.tell(events.WorkerConnected, robot=spec.robot, incarnation="i1")
             self.learn(spec.robot, "holding", "nothing")
 
     # --- what happens to the planner -------------------------------------------------------------
@@ -73,10 +73,10 @@ class FleetModel:
             assert effects == ()
             return
         self.journal.append(encode_event(event))
-        for plan, book in self.state.plans.items():
+        for plan, entry in self.state.plans.items():
             old = before.plans.get(plan)
-            if old is not None and book.plan.revision > old.plan.revision:
-                check_revision(old, book)
+            if old is not None and entry.plan.revision > old.plan.revision:
+                check_revision(old, entry)
         self._take(effects)
 
     def _take(self, effects: tuple[Effect, ...]) -> None:
@@ -101,11 +101,11 @@ class FleetModel:
         assert self.given.setdefault(attempt, order.robot) == order.robot, (
             "an attempt changed hands"
         )
-        book = self.state.plans[order.plan]
-        record = book.records[order.task]
+        entry = self.state.plans[order.plan]
+        record = entry.records[order.task]
         for before in (*record.after, *record.behind):
-            if before in book.records:
-                assert book.records[before].state.value == "succeeded", "ordered before its time"
+            if before in entry.records:
+                assert entry.records[before].state.value == "succeeded", "ordered before its time"
         busy = [
             other
             for other in self.orders()
@@ -121,14 +121,14 @@ class FleetModel:
         fact = Fact(
             subject=subject, relation=relation, value=value, source="test", time_s=self.time_s
         )
-        self.tell(events.FactTold, fact=fact)
+        self.tell(events.FactPut, fact=fact)
 
     def plan(self, *goals: Goal, **more: Any) -> None:
         """Put goals and ask for a plan for all that wait."""
         for goal in goals:
-            self.tell(events.GoalTold, goal=goal)
-        number = sum(b"PlanAsked" in line for line in self.journal)
-        self.tell(events.PlanAsked, request=PlanRequest(request=f"r{number}", **more))
+            self.tell(events.GoalPut, goal=goal)
+        number = sum(b"PlanRequested" in line for line in self.journal)
+        self.tell(events.PlanRequested, request=PlanRequest(request=f"r{number}", **more))
 
     # --- what robots do --------------------------------------------------------------------------
 
@@ -150,7 +150,7 @@ class FleetModel:
             **more,
         )
         self.told.append(report)
-        self.tell(events.ReportTold, report=report)
+        self.tell(events.ReportReceived, report=report)
 
     def start(self, order: Order) -> None:
         """A worker starts an attempt; nobody may ever start it again."""
@@ -197,13 +197,13 @@ class FleetModel:
 
     def lose(self, robot: str) -> None:
         """A robot goes away for so long that it counts as lost."""
-        self.tell(events.RobotGone, robot=robot, incarnation="i1")
+        self.tell(events.WorkerDisconnected, robot=robot, incarnation="i1")
         self.wall_s += Policy().lost_after_s + 1.0
-        self.tell(events.TimePassed)
+        self.tell(events.TimerFired)
 
     def return_(self, robot: str) -> None:
         """A robot comes back."""
-        self.tell(events.RobotSeen, robot=robot, incarnation="i1")
+        self.tell(events.WorkerConnected, robot=robot, incarnation="i1")
 
     def finish(self, limit: int = 500) -> None:
         """Robots carry out everything they are told, until there is no order left."""
@@ -227,7 +227,7 @@ class FleetModel:
         self._take(effects_of(self.state))
 
 
-def check_revision(old: PlanBook, new: PlanBook) -> None:
+def check_revision(old: PlanEntry, new: PlanEntry) -> None:
     """What a revision says of itself is so, and what it keeps of running work is left alone."""
     assert new.change is not None
     names = {task.task for task in new.plan.tasks}

@@ -14,10 +14,10 @@ from keyexpr_schema.transport.session import Change
 
 FLOOR = "floor"
 WORLD_KEYS = (PLACE, OBJECT, FACT, ROBOT_SPEC, ROBOT_STATE)
-"""The keys that `WorldView.apply` takes changes of."""
+"""The keys that `WorldCache.apply` takes changes of."""
 
 
-class WorldView:
+class WorldCache:
     """The latest word on everything, kept up to date by `apply`."""
 
     def __init__(self) -> None:
@@ -57,14 +57,14 @@ class WorldView:
             return False
         return True
 
-    def belief(self, relation: str, subject: str) -> Value:
+    def value_of(self, relation: str, subject: str) -> Value:
         """The value of the fact `relation(subject)`; `None` if unknown or never told."""
         fact = self.facts.get(FactAddress(subject, relation))
         return None if fact is None else fact.value
 
-    def believed_at(self, place: str) -> tuple[str, ...]:
+    def objects_at(self, place: str) -> tuple[str, ...]:
         """The known objects of which the facts say that they are at `place`, sorted."""
-        return tuple(sorted(o for o in self.objects if self.belief("at", o) == place))
+        return tuple(sorted(o for o in self.objects if self.value_of("at", o) == place))
 
     def surface_place(self, surface: str) -> str | None:
         """The place that a surface stands in."""

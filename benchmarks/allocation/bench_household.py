@@ -35,8 +35,7 @@ from fleet.allocators.makespan import DEADLINE_S, MakespanAllocator
 from fleet.allocators.milp import MilpAllocator
 from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.core.schedule.idle_time import predicted_unit, union_s
-from fleet.planners.llm import ModelCaller, load_llm_config
-from fleet.service.allocation_asker import AllocationAsker
+from fleet.llm import LanguageModel, load_llm_config
 
 PAPER = {"3 robots, 5 goals": 0.350, "5 robots, 10 goals": 0.429}
 """Least idle time that the paper reports for any planner and allocator (reference's definition)."""
@@ -71,8 +70,7 @@ def allocators(limit_s: float = DEADLINE_S, llm_file: Path | None = None) -> tup
     )
     if llm_file is None:
         return own
-    asker = AllocationAsker(load_llm_config(llm_file), ModelCaller())
-    return (*own, LlmAllocator(asker, BalancedAllocator()))
+    return (*own, LlmAllocator(LanguageModel(load_llm_config(llm_file)), BalancedAllocator()))
 
 
 def runs(seeds: int, compared: Sequence[Allocator], console: Console) -> list[Run]:

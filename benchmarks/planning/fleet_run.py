@@ -19,7 +19,7 @@ from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract
 from fleet.core.events import Event
 from fleet.core.state import Policy, State
 from fleet.core.step import step
-from fleet.planners.llm import LlmInterpreter
+from fleet.planners import LlmInterpreter
 from fleet.service.composition import Composition
 from fleet.service.planning_job import carry_out
 from keyexpr_schema.keyspace import FACT, OBJECT, ORDER, PLACE, ROBOT_SPEC, ROBOT_STATE
@@ -30,10 +30,11 @@ from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotSta
 from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Report, ReportState
 from keyexpr_schema.payloads.world import Fact, FactAddress, ObjectAddress, PlaceAddress, Statement
 from keyexpr_schema.transport.watch import Change
-from sim.kinematic import KinematicBackend
+from sim.files.world_payloads import object_payloads
+from sim.kinematic.backend import KinematicBackend
 from workers.skill import SkillRegistry
 from workers.skills.household import HOUSEHOLD
-from workers.world_cache import WorldView
+from workers.world_cache import WorldCache
 
 SEED = 7
 MOST_SIMULATED_S = 7200.0
@@ -79,7 +80,7 @@ class FleetRun:
         self._ended: asyncio.Future[None] = loop.create_future()
         loop.drive(self._go_on, lambda: self._fail(Stuck("everybody waits for somebody else")))
         self._places = {place.place: place for place in mission.places}
-        self._view = WorldView()
+        self._view = WorldCache()
         registry = SkillRegistry(HOUSEHOLD)
         self._robots = {
             spec.robot: Robot(
@@ -101,9 +102,9 @@ class FleetRun:
         self._tell_beliefs()
         working = [asyncio.ensure_future(robot.work()) for robot in self._robots.values()]
         for number, text in enumerate(self.mission.entry.goals, 1):
-            self._tell(events.GoalTold, goal=Goal(goal=f"goal_{number}", text=text, ordinal=number))
+            self._tell(events.GoalPut, goal=Goal(goal=f"goal_{number}", text=text, ordinal=number))
         request = PlanRequest(request="r1", planner=self._planner, strategy=self._strategy)
-        self._tell(events.PlanAsked, request=request)
+        self._tell(events.PlanRequested, request=request)
         self._note_stage()
         wrong: str | None = None
         try:
@@ -115,9 +116,9 @@ class FleetRun:
             task.cancel()
         with suppress(asyncio.CancelledError):
             await asyncio.gather(*working)
-        for book in self.state.plans.values():
-            if book.reason:
-                self.counts.reasons.append(book.reason)
+        for entry in self.state.plans.values():
+            if entry.reason:
+                self.counts.reasons.append(entry.reason)
         return wrong
 
     def witness(self) -> Witness:
@@ -189,14 +190,14 @@ class FleetRun:
         self._tell(events.PlannerStarted, epoch=1, incarnation=INCARNATION, policy=policy)
         for place in self._places.values():
             self._view.apply(Change(PLACE, PlaceAddress(place.place), place, ""))
-            self._tell(events.PlaceTold, place=place)
-        for thing in self.mission.world.objects():
+            self._tell(events.PlacePut, place=place)
+        for thing in object_payloads(self.mission.world):
             self._view.apply(Change(OBJECT, ObjectAddress(thing.object), thing, ""))
-            self._tell(events.ObjectTold, object=thing)
+            self._tell(events.ObjectPut, object=thing)
         for spec, _ in self.mission.robots:
             self._view.apply(Change(ROBOT_SPEC, RobotAddress(spec.robot), spec, ""))
-            self._tell(events.RobotTold, spec=spec)
-            self._tell(events.RobotSeen, robot=spec.robot, incarnation=INCARNATION)
+            self._tell(events.RobotRegistered, spec=spec)
+            self._tell(events.WorkerConnected, robot=spec.robot, incarnation=INCARNATION)
         self._show_robots()
 
     def _tell_beliefs(self) -> None:
@@ -206,7 +207,7 @@ class FleetRun:
             self._learn(Fact(subject=thing, relation="on", value=surface, source="person"))
         for number, text in enumerate(self.mission.entry.statements, 1):
             self._tell(
-                events.StatementTold, statement=Statement(statement=f"said_{number}", text=text)
+                events.StatementPut, statement=Statement(statement=f"said_{number}", text=text)
             )
 
     def _hear(self, facts: tuple[Fact, ...], report: Report | None) -> None:
@@ -219,19 +220,19 @@ class FleetRun:
         elif report.state in FINAL_REPORTS and report.state is not ReportState.SUCCEEDED:
             self.counts.failed_tasks += 1
             self.counts.reasons.append(f"{report.task} {report.state.value}: {report.reason}")
-        self._tell(events.ReportTold, report=report)
+        self._tell(events.ReportReceived, report=report)
         if self._done() and not self._ended.done():
             self._ended.set_result(None)
 
     def _learn(self, fact: Fact) -> None:
         self._view.apply(Change(FACT, FactAddress(fact.subject, fact.relation), fact, ""))
-        self._tell(events.FactTold, fact=fact)
+        self._tell(events.FactPut, fact=fact)
 
     def _done(self) -> bool:
         """Whether nothing more will happen by itself."""
-        books = self.state.plans.values()
-        return all(book.ended or book.state in ENDED_PLANS for book in books) and not any(
-            book.outstanding() for book in books
+        entries = self.state.plans.values()
+        return all(entry.ended or entry.state in ENDED_PLANS for entry in entries) and not any(
+            entry.outstanding() for entry in entries
         )
 
     def goals_ended(self) -> bool:
@@ -278,7 +279,7 @@ class FleetRun:
         made = carry_out(effect.job, self.state, self._parts, self._at())
         self.counts.planning_s += time.perf_counter() - began_s
         self.counts.revisions += 1
-        if isinstance(made, events.PlanMade):
+        if isinstance(made, events.PlanningSucceeded):
             making = made.plan.making
             self.counts.rounds += making.rounds
             self.counts.tokens += making.tokens_in + making.tokens_out

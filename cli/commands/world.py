@@ -29,17 +29,18 @@ async def load(
 ) -> None:
     """Tell the fleet the places and objects of a world file (not where the objects are)."""
     from cli.telling import put_world
-    from sim.world_file import load_world
+    from sim.files.world_file import load_world
+    from sim.files.world_payloads import object_payloads, place_payloads
 
-    told = load_world(file)
+    world = load_world(file)
     async with call.session() as session:
         # Working out the distances takes a second: only once there is somebody to tell.
-        places, objects = told.places(), told.objects()
+        places, objects = place_payloads(world), object_payloads(world)
         await put_world(session, places, objects)
     call.show(
         {"places": places, "objects": objects},
         lambda: (
-            f"loaded {told.world}: places {', '.join(p.place for p in places)}; "
+            f"loaded {world.world}: places {', '.join(p.place for p in places)}; "
             f"objects {', '.join(o.object for o in objects) or 'none'}"
         ),
     )

@@ -17,10 +17,11 @@ from keyexpr_schema.keyspace import PLANNER_ALIVE, ROBOT_ALIVE, ROBOT_SPEC, STOR
 from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.service import StoreAddress, StoreQuery
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from sim.files.world_payloads import object_payloads, place_payloads
 
 if TYPE_CHECKING:
     from cli.demo.mission_run import DemoOptions
-    from sim.world_file import Mission
+    from sim.files.mission_file import Mission
 
 READY_S = 60.0
 """How long a process may take until it shows that it is there; a busy machine starts slowly."""
@@ -73,7 +74,7 @@ async def router_up(fleet: Fleet) -> None:
 
 async def bring_up(fleet: Fleet, session: Session, board: Board, mission: Mission) -> None:
     """Tell the store of the world and the robots, start the rest, wait until all are ready."""
-    await put_world(session, mission.world.places(), mission.world.objects())
+    await put_world(session, place_payloads(mission.world), object_payloads(mission.world))
     for robot in mission.robots:
         await session.confirm(ROBOT_SPEC, RobotAddress(robot.spec.robot), robot.spec)
     for name in fleet.names:

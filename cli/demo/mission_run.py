@@ -21,7 +21,7 @@ from cli.telling import add_statement, put_goal
 from keyexpr_schema.payloads.goals import GoalState, GoalStatus
 from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
-from sim.world_file import Mission, load_mission
+from sim.files.mission_file import Mission, load_mission
 
 if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Change

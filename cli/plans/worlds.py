@@ -49,21 +49,21 @@ def world_of_files(
         BadArgument: a fact is not RELATION SUBJECT VALUE.
         Unknown: a fact's subject is nothing that there is.
     """
-    from sim.world_file import load_robot, load_world
+    from sim.files.mission_file import load_robot
+    from sim.files.world_file import load_world
+    from sim.files.world_payloads import object_payloads, place_payloads
 
-    told = load_world(world)
+    loaded = load_world(world)
+    places, objects = place_payloads(loaded), object_payloads(loaded)
     specs = [load_robot(file) for file in robots]
-    places = [place.place for place in told.places()]
-    names = [spec.robot for spec in specs]
+    where = [*(place.place for place in places), *(spec.robot for spec in specs)]
     known = [parse_fact(fact) for fact in facts]
     for fact in known:
-        subjects = [*places, *names, *(thing.object for thing in told.objects())]
+        subjects = [*where, *(thing.object for thing in objects)]
         check_known("place, object or robot", fact.subject, subjects, "name it in a file")
         if fact.relation == "at" and fact.value is not None:
-            check_known("place or robot", str(fact.value), [*places, *names], "name it in a file")
-    return WorldModel.of(
-        skills, told.places(), told.objects(), specs, [*_empty_hands(specs), *known]
-    )
+            check_known("place or robot", str(fact.value), where, "name it in a file")
+    return WorldModel.of(skills, places, objects, specs, [*_empty_hands(specs), *known])
 
 
 def _empty_hands(specs: Iterable[RobotSpec]) -> list[Fact]:

@@ -29,112 +29,112 @@ class PlannerStarted(Event, frozen=True, kw_only=True):
     policy: Policy = Policy()
 
 
-class GoalTold(Event, frozen=True, kw_only=True):
+class GoalPut(Event, frozen=True, kw_only=True):
     """A goal was put."""
 
     goal: Goal
 
 
-class GoalForgotten(Event, frozen=True, kw_only=True):
+class GoalDeleted(Event, frozen=True, kw_only=True):
     """A goal was deleted."""
 
     goal: str
 
 
-class FactTold(Event, frozen=True, kw_only=True):
+class FactPut(Event, frozen=True, kw_only=True):
     """A fact was put."""
 
     fact: Fact
 
 
-class FactForgotten(Event, frozen=True, kw_only=True):
+class FactDeleted(Event, frozen=True, kw_only=True):
     """A fact was deleted."""
 
     subject: str
     relation: str
 
 
-class StatementTold(Event, frozen=True, kw_only=True):
+class StatementPut(Event, frozen=True, kw_only=True):
     """A statement was put."""
 
     statement: Statement
 
 
-class StatementForgotten(Event, frozen=True, kw_only=True):
+class StatementDeleted(Event, frozen=True, kw_only=True):
     """A statement was deleted."""
 
     statement: str
 
 
-class PlaceTold(Event, frozen=True, kw_only=True):
+class PlacePut(Event, frozen=True, kw_only=True):
     """A place was put."""
 
     place: Place
 
 
-class PlaceForgotten(Event, frozen=True, kw_only=True):
+class PlaceDeleted(Event, frozen=True, kw_only=True):
     """A place was deleted."""
 
     place: str
 
 
-class ObjectTold(Event, frozen=True, kw_only=True):
+class ObjectPut(Event, frozen=True, kw_only=True):
     """An object was put."""
 
     object: Object
 
 
-class ObjectForgotten(Event, frozen=True, kw_only=True):
+class ObjectDeleted(Event, frozen=True, kw_only=True):
     """An object was deleted."""
 
     object: str
 
 
-class RobotTold(Event, frozen=True, kw_only=True):
+class RobotRegistered(Event, frozen=True, kw_only=True):
     """A robot was registered."""
 
     spec: RobotSpec
 
 
-class RobotForgotten(Event, frozen=True, kw_only=True):
+class RobotUnregistered(Event, frozen=True, kw_only=True):
     """A robot was unregistered."""
 
     robot: str
 
 
-class RobotSeen(Event, frozen=True, kw_only=True):
+class WorkerConnected(Event, frozen=True, kw_only=True):
     """A run of a robot's worker is connected."""
 
     robot: str
     incarnation: str
 
 
-class RobotGone(Event, frozen=True, kw_only=True):
+class WorkerDisconnected(Event, frozen=True, kw_only=True):
     """A run of a robot's worker is no longer connected."""
 
     robot: str
     incarnation: str
 
 
-class ReportTold(Event, frozen=True, kw_only=True):
-    """A worker said something of an attempt."""
+class ReportReceived(Event, frozen=True, kw_only=True):
+    """A worker reported on an attempt."""
 
     report: Report
 
 
-class PlanAsked(Event, frozen=True, kw_only=True):
+class PlanRequested(Event, frozen=True, kw_only=True):
     """Someone wants a plan."""
 
     request: PlanRequest
 
 
-class ReplanAsked(Event, frozen=True, kw_only=True):
+class ReplanRequested(Event, frozen=True, kw_only=True):
     """Someone wants a plan made again."""
 
     request: ReplanRequest
 
 
-class ControlAsked(Event, frozen=True, kw_only=True):
+class ControlRequested(Event, frozen=True, kw_only=True):
     """Someone wants a plan started, cancelled, deleted or extended."""
 
     request: ControlRequest
@@ -146,7 +146,7 @@ class PlanProposed(Event, frozen=True, kw_only=True):
     plan: Plan
 
 
-class PlanMade(Event, frozen=True, kw_only=True):
+class PlanningSucceeded(Event, frozen=True, kw_only=True):
     """A planning job ended with a checked and allocated plan.
 
     `durations_s` and `extra_after` are by task, `sequence` lists each robot's actors in order.
@@ -168,7 +168,7 @@ class PlanMade(Event, frozen=True, kw_only=True):
     left_out: dict[str, str] = {}
 
 
-class PlanNotMade(Event, frozen=True, kw_only=True):
+class PlanningFailed(Event, frozen=True, kw_only=True):
     """A planning job ended without a plan."""
 
     job: int
@@ -185,8 +185,8 @@ class GoalInterpreted(Event, frozen=True, kw_only=True):
     reason: str | None = None
 
 
-class Remembered(Event, frozen=True, kw_only=True):
-    """What an earlier planner left in the store, told to one that has no journal of it."""
+class PriorStateLoaded(Event, frozen=True, kw_only=True):
+    """What an earlier planner left in the store was read by one that has no journal of it."""
 
     answers: tuple[Answer, ...] = ()
     goals: tuple[GoalStatus, ...] = ()
@@ -194,37 +194,66 @@ class Remembered(Event, frozen=True, kw_only=True):
     durations: tuple[Durations, ...] = ()
 
 
-class TimePassed(Event, frozen=True, kw_only=True):
+class TimerFired(Event, frozen=True, kw_only=True):
     """A timer that the state asked for has run out."""
 
 
 AnyEvent = (
     PlannerStarted
-    | GoalTold
-    | GoalForgotten
-    | FactTold
-    | FactForgotten
-    | StatementTold
-    | StatementForgotten
-    | PlaceTold
-    | PlaceForgotten
-    | ObjectTold
-    | ObjectForgotten
-    | RobotTold
-    | RobotForgotten
-    | RobotSeen
-    | RobotGone
-    | ReportTold
-    | PlanAsked
-    | ReplanAsked
-    | ControlAsked
+    | GoalPut
+    | GoalDeleted
+    | FactPut
+    | FactDeleted
+    | StatementPut
+    | StatementDeleted
+    | PlacePut
+    | PlaceDeleted
+    | ObjectPut
+    | ObjectDeleted
+    | RobotRegistered
+    | RobotUnregistered
+    | WorkerConnected
+    | WorkerDisconnected
+    | ReportReceived
+    | PlanRequested
+    | ReplanRequested
+    | ControlRequested
     | PlanProposed
-    | PlanMade
-    | PlanNotMade
+    | PlanningSucceeded
+    | PlanningFailed
     | GoalInterpreted
-    | Remembered
-    | TimePassed
+    | PriorStateLoaded
+    | TimerFired
 )
+
+
+_TAG_FIRST = b'{"event":"'
+"""How a line begins: msgspec writes the tag first."""
+_OLD_TAGS = {
+    b"GoalTold": b"GoalPut",
+    b"GoalForgotten": b"GoalDeleted",
+    b"FactTold": b"FactPut",
+    b"FactForgotten": b"FactDeleted",
+    b"StatementTold": b"StatementPut",
+    b"StatementForgotten": b"StatementDeleted",
+    b"PlaceTold": b"PlacePut",
+    b"PlaceForgotten": b"PlaceDeleted",
+    b"ObjectTold": b"ObjectPut",
+    b"ObjectForgotten": b"ObjectDeleted",
+    b"RobotTold": b"RobotRegistered",
+    b"RobotForgotten": b"RobotUnregistered",
+    b"RobotSeen": b"WorkerConnected",
+    b"RobotGone": b"WorkerDisconnected",
+    b"ReportTold": b"ReportReceived",
+    b"PlanAsked": b"PlanRequested",
+    b"ReplanAsked": b"ReplanRequested",
+    b"ControlAsked": b"ControlRequested",
+    b"PlanMade": b"PlanningSucceeded",
+    b"PlanNotMade": b"PlanningFailed",
+    b"Remembered": b"PriorStateLoaded",
+    b"TimePassed": b"TimerFired",
+}
+"""Tags in journals of earlier versions, and what they are called now."""
 
 
 def encode_event(event: Event) -> bytes:
@@ -233,10 +262,13 @@ def encode_event(event: Event) -> bytes:
 
 
 def decode_event(data: bytes) -> Event:
-    """The event in a line of JSON.
+    """The event in a line of JSON, of this or an earlier version.
 
     Raises:
         msgspec.ValidationError: it is not one.
     """
+    tag, _, rest = data.removeprefix(_TAG_FIRST).partition(b'"')
+    if (new := _OLD_TAGS.get(tag)) is not None:
+        data = b'%b%b"%b' % (_TAG_FIRST, new, rest)
     event: Event = msgspec.json.decode(data, type=AnyEvent)
     return event

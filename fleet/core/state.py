@@ -10,7 +10,7 @@ import msgspec
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.language import Vocabulary
-from fleet.language.vocabulary import Deed
+from fleet.language.vocabulary import SkillPhrase
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.plans import ENDED_PLANS, Plan, PlanChange, PlanState, Task, Violation
@@ -30,17 +30,17 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     `approval`: a person has to approve every new plan. `auto_plan`: goals that wait are planned
     without being asked for, into a running plan where there is one. `interpreter`: sentences that
     the grammar refuses go to a language model. `lost_after_s`: a robot whose worker is gone for
-    longer (wall time, s) counts as lost. `deeds` are skills that goals can ask for by name.
+    longer (wall time, s) counts as lost. `skill_phrases` are skills that goals can ask for by name.
     """
 
     approval: bool = False
     auto_plan: bool = False
     interpreter: bool = False
     lost_after_s: float = 30.0
-    deeds: tuple[Deed, ...] = ()
+    skill_phrases: tuple[SkillPhrase, ...] = msgspec.field(default=(), name="deeds")
 
 
-class Job(msgspec.Struct, frozen=True, kw_only=True):
+class PlanningJob(msgspec.Struct, frozen=True, kw_only=True):
     """Planning to be done outside the core: for goals, or of a plan that someone proposed."""
 
     job: int
@@ -72,7 +72,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     """Why the plan is made again."""
 
 
-class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
+class PlanEntry(msgspec.Struct, frozen=True, kw_only=True):
     """A plan with everything the planner keeps about it.
 
     `records` hold the tasks of every revision; `plan` only those of the current one.
@@ -91,7 +91,7 @@ class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
     records: dict[str, TaskRecord] = {}
     allocation: dict[str, str] = {}
     sequence: dict[str, tuple[str, ...]] = {}
-    job: Job | None = None
+    job: PlanningJob | None = None
     replan_reason: str | None = None
     anew_reason: str | None = None
     outside_reason: str | None = None
@@ -147,11 +147,11 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     alive: dict[str, tuple[str, ...]] = {}
     gone_since: dict[str, float] = {}
     """Unix time [s] at which the last worker of a robot went away."""
-    plans: dict[str, PlanBook] = {}
+    plans: dict[str, PlanEntry] = {}
     past_plans: tuple[str, ...] = ()
     answers: dict[str, Answer] = {}
     jobs: int = 0
-    previews: dict[str, Job] = {}
+    previews: dict[str, PlanningJob] = {}
     """Planning jobs of dry runs, by request."""
     interpreting: tuple[str, ...] = ()
     """Goals whose sentences a language model reads now."""
@@ -173,8 +173,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
                 continue
             if isinstance(fact.value, str) and rooms.get(fact.value, where) == where:
                 rests[fact.subject] = fact.value
-        deeds = self.policy.deeds
-        return Vocabulary(self.places, self.objects, self.robots, whereabouts, rests, deeds)
+        phrases = self.policy.skill_phrases
+        return Vocabulary(self.places, self.objects, self.robots, whereabouts, rests, phrases)
 
     def world(self, skills: Mapping[str, SkillModel]) -> WorldModel:
         """The world as believed now."""

@@ -20,26 +20,26 @@ from fleet.core.model.preconditions import Skills
 from fleet.core.state import State
 
 _NEWS: dict[type[Event], Callable[[State, Any], State]] = {
-    events.GoalTold: goals.goal_told,
-    events.GoalForgotten: goals.goal_forgotten,
-    events.FactForgotten: goals.fact_forgotten,
-    events.StatementTold: goals.statement_told,
-    events.StatementForgotten: goals.statement_forgotten,
-    events.PlaceTold: goals.place_told,
-    events.PlaceForgotten: goals.place_forgotten,
-    events.ObjectTold: goals.object_told,
-    events.ObjectForgotten: goals.object_forgotten,
-    events.RobotTold: goals.robot_told,
-    events.RobotForgotten: goals.robot_forgotten,
-    events.RobotSeen: goals.robot_seen,
-    events.RobotGone: goals.robot_gone,
-    events.Remembered: goals.remembered,
+    events.GoalPut: goals.goal_put,
+    events.GoalDeleted: goals.goal_deleted,
+    events.FactDeleted: goals.fact_deleted,
+    events.StatementPut: goals.statement_put,
+    events.StatementDeleted: goals.statement_deleted,
+    events.PlacePut: goals.place_put,
+    events.PlaceDeleted: goals.place_deleted,
+    events.ObjectPut: goals.object_put,
+    events.ObjectDeleted: goals.object_deleted,
+    events.RobotRegistered: goals.robot_registered,
+    events.RobotUnregistered: goals.robot_unregistered,
+    events.WorkerConnected: goals.worker_connected,
+    events.WorkerDisconnected: goals.worker_disconnected,
+    events.PriorStateLoaded: goals.prior_state_loaded,
     events.GoalInterpreted: goals.goal_interpreted,
-    events.PlanAsked: requests.plan_asked,
-    events.ReplanAsked: requests.replan_asked,
-    events.ControlAsked: requests.control_asked,
+    events.PlanRequested: requests.plan_requested,
+    events.ReplanRequested: requests.replan_requested,
+    events.ControlRequested: requests.control_requested,
     events.PlanProposed: requests.plan_proposed,
-    events.PlanNotMade: plan_results.plan_not_made,
+    events.PlanningFailed: plan_results.planning_failed,
 }
 
 
@@ -66,13 +66,13 @@ def _take_in(state: State, event: Event, skills: Skills) -> State:
             return replace(
                 state, epoch=event.epoch, incarnation=event.incarnation, policy=event.policy
             )
-        case events.PlanMade():
-            return plan_results.plan_made(state, event, skills)
-        case events.FactTold():
-            return replan_triggers.fact_told(state, event, skills)
-        case events.ReportTold():
-            return reports.report_told(state, event, skills)
-        case events.TimePassed():
+        case events.PlanningSucceeded():
+            return plan_results.planning_succeeded(state, event, skills)
+        case events.FactPut():
+            return replan_triggers.fact_put(state, event, skills)
+        case events.ReportReceived():
+            return reports.report_received(state, event, skills)
+        case events.TimerFired():
             return state
     return _NEWS[type(event)](state, event)
 

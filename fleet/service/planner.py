@@ -17,8 +17,8 @@ from fleet.core.dispatch.delays import SAME_CLOCK_S
 from fleet.core.dispatch.dispatcher import next_timer
 from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event
-from fleet.core.model.spoken_skills import deeds_of
-from fleet.core.state import Job, Policy, State
+from fleet.core.model.skill_phrases import phrases_of
+from fleet.core.state import PlanningJob, Policy, State
 from fleet.core.step import replay, step
 from fleet.errors import Superseded
 from fleet.service.composition import Composition
@@ -32,6 +32,7 @@ from keyexpr_schema.keyspace import (
     DURATIONS,
     GOAL_STATUS,
     ORDER,
+    PLAN_SPEC,
     PLAN_STATUS,
     PLANNER_ALIVE,
     PLANNER_STATUS,
@@ -58,11 +59,11 @@ class PlannerService:
         self._session = session
         self._journal = journal
         self._parts = parts
-        self._interpreter = parts.llm.interpreter(parts.skills)
+        self._interpreter = parts.interpreter
         self._policy = replace(
             policy or Policy(),
             interpreter=self._interpreter.configured,
-            deeds=deeds_of(parts.skills),
+            skill_phrases=phrases_of(parts.skills),
         )
         self._incarnation = uuid.uuid4().hex[:12]
         self._state = State()
@@ -130,7 +131,7 @@ class PlannerService:
         plans = await self._session.list(PLAN_STATUS)
         durations = await self._session.list(DURATIONS)
         self._apply(
-            events.Remembered(
+            events.PriorStateLoaded(
                 answers=tuple(answers.values()),
                 goals=tuple(goals.values()),
                 plans=tuple(address.plan for address in plans),
@@ -179,7 +180,9 @@ class PlannerService:
         for robot, runs in self._state.alive.items():
             for run in runs:
                 if (robot, run) not in here:
-                    self._apply(events.RobotGone(robot=robot, incarnation=run, **self._at()))
+                    self._apply(
+                        events.WorkerDisconnected(robot=robot, incarnation=run, **self._at())
+                    )
 
         while not self._inbox.empty():
             self._apply(self._inbox.get_nowait())
@@ -204,7 +207,13 @@ class PlannerService:
             for effect in effects_of(self._state)
             if isinstance(effect, Publish)
         }
-        ours: tuple[Key[Any, Any], ...] = (ORDER, TASK_RECORD, PLAN_STATUS, GOAL_STATUS)
+        ours: tuple[Key[Any, Any], ...] = (
+            ORDER,
+            TASK_RECORD,
+            PLAN_SPEC,
+            PLAN_STATUS,
+            GOAL_STATUS,
+        )
         return [
             Retract(key, address)
             for key in ours
@@ -239,7 +248,7 @@ class PlannerService:
             self._token(token)
 
     def _token(self, token: Any) -> None:
-        kind = events.RobotSeen if token.alive else events.RobotGone
+        kind = events.WorkerConnected if token.alive else events.WorkerDisconnected
         robot, incarnation = token.address.robot, token.address.incarnation
         self._inbox.put_nowait(kind(robot=robot, incarnation=incarnation, **self._at()))
 
@@ -251,7 +260,7 @@ class PlannerService:
                 async with asyncio.timeout(None if timer is None else timer - time.time()):
                     event = await self._inbox.get()
             except TimeoutError:
-                event = events.TimePassed(**self._at())
+                event = events.TimerFired(**self._at())
             self._apply(event)
 
     def _apply(self, event: Event) -> None:
@@ -278,13 +287,13 @@ class PlannerService:
         self._planning.add(task)
         task.add_done_callback(self._planning.discard)
 
-    async def _make_plan(self, job: Job) -> None:
+    async def _make_plan(self, job: PlanningJob) -> None:
         at = self._at()
         try:
             event: Event = await asyncio.to_thread(carry_out, job, self._state, self._parts, at)
         except Exception as error:
             log.exception("planning job %d", job.job)
-            event = events.PlanNotMade(
+            event = events.PlanningFailed(
                 job=job.job, reason=f"the planner failed: {error or type(error).__name__}", **at
             )
         self._inbox.put_nowait(event)
@@ -297,7 +306,7 @@ class PlannerService:
 
 
 def _report_time_s(event: Event) -> float:
-    if isinstance(event, events.ReportTold):
+    if isinstance(event, events.ReportReceived):
         return event.report.ended_s or event.report.started_s or 0.0
     return 0.0
 

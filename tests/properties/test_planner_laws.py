@@ -62,7 +62,7 @@ class Undisturbed(RuleBasedStateMachine):
     @rule(pick=PICK)
     def an_old_report_comes_again(self, pick: int) -> None:
         report = self.model.told[pick % len(self.model.told)]
-        self.model.tell(events.ReportTold, report=report)
+        self.model.tell(events.ReportReceived, report=report)
 
     @precondition(lambda self: any(order.cancelled for order in self.model.orders()))
     @rule()
@@ -74,7 +74,7 @@ class Undisturbed(RuleBasedStateMachine):
     def a_person_wants_another_plan(self) -> None:
         number = len(self.model.state.answers)
         request = ReplanRequest(request=f"again-{number}", plan="plan-1", reason="because")
-        self.model.tell(events.ReplanAsked, request=request)
+        self.model.tell(events.ReplanRequested, request=request)
 
     @precondition(lambda self: self.model.orders())
     @rule(pick=PICK)
@@ -87,17 +87,17 @@ class Undisturbed(RuleBasedStateMachine):
         number = len(self.model.state.answers)
         wanted = Condition(relation="searched", subject=room, value=True)
         goal = Goal(goal=f"look-{number}", text="", conditions=(wanted,), ordinal=100 + number)
-        self.model.tell(events.GoalTold, goal=goal)
+        self.model.tell(events.GoalPut, goal=goal)
         request = ReplanRequest(
             request=f"more-{number}", plan="plan-1", reason="more", goals=(goal.goal,)
         )
-        self.model.tell(events.ReplanAsked, request=request)
+        self.model.tell(events.ReplanRequested, request=request)
 
     @precondition(lambda self: len(self.model.state.goals) > 1)
     @rule(pick=PICK)
     def a_goal_is_deleted(self, pick: int) -> None:
         goals = sorted(self.model.state.goals)
-        self.model.tell(events.GoalForgotten, goal=goals[pick % len(goals)])
+        self.model.tell(events.GoalDeleted, goal=goals[pick % len(goals)])
 
     @rule()
     def the_planner_crashes(self) -> None:
@@ -106,7 +106,7 @@ class Undisturbed(RuleBasedStateMachine):
     @rule(seconds=st.sampled_from([20.0, 120.0, 2000.0]))
     def time_passes(self, seconds: float) -> None:
         self.model.time_s += seconds
-        self.model.tell(events.TimePassed)
+        self.model.tell(events.TimerFired)
 
     def teardown(self) -> None:
         if not hasattr(self, "model"):
@@ -115,12 +115,13 @@ class Undisturbed(RuleBasedStateMachine):
             self.model.return_(robot)
         self.model.finish()
         state = self.model.state
-        for book in state.plans.values():
-            assert book.state in ENDED_PLANS, f"{book.plan.plan} is {book.state}: it never ends"
-            assert not book.outstanding()
+        for entry in state.plans.values():
+            assert entry.state in ENDED_PLANS, f"{entry.plan.plan} is {entry.state}: it never ends"
+            assert not entry.outstanding()
         for goal, status in state.goal_states.items():
             waits = all(
-                goal not in book.plan.goals or book.state in UNDONE for book in state.plans.values()
+                goal not in entry.plan.goals or entry.state in UNDONE
+                for entry in state.plans.values()
             )
             assert status.state in ENDED_GOALS or waits, f"{goal} is {status.state} for ever"
             if self.reaches_everything and not waits:
@@ -132,8 +133,8 @@ class Undisturbed(RuleBasedStateMachine):
     def finished_work_stays_finished(self) -> None:
         if not hasattr(self, "model"):
             return
-        for plan, book in self.model.state.plans.items():
-            for record in book.records.values():
+        for plan, entry in self.model.state.plans.items():
+            for record in entry.records.values():
                 if (plan, record.task) in self.finished:
                     assert record.state is TaskState.SUCCEEDED, "finished work was undone"
                 elif record.state is TaskState.SUCCEEDED:

@@ -124,7 +124,7 @@ def test_what_failed_or_was_interrupted_teaches_nothing() -> None:
 
 def test_a_planner_that_lost_its_journal_still_knows() -> None:
     known = Durations(model="hsr", skills={"pick": Estimate(mean=50.0, count=7, weight=8.0)})
-    remembered = events.Remembered(time_s=0.0, wall_time_s=0.0, durations=(known,))
+    remembered = events.PriorStateLoaded(time_s=0.0, wall_time_s=0.0, durations=(known,))
     state, effects = step(State(), remembered, SKILLS)
     assert state.durations == {"hsr": known}
     assert [getattr(effect, "key", None) for effect in effects] == [DURATIONS]

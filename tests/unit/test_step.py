@@ -50,11 +50,11 @@ def test_a_failed_task_leads_to_a_new_revision_with_finished_work_kept() -> None
     model.succeed(model.orders()[0])
     (pick,) = model.orders()
     model.fail(pick)
-    book = model.state.plans["plan-1"]
-    assert book.plan.revision == 2
-    assert book.records["t1"].state is TaskState.SUCCEEDED
-    assert book.records["t2"].state is TaskState.FAILED
-    assert "it slipped" in (book.records["t2"].reason or "")
+    entry = model.state.plans["plan-1"]
+    assert entry.plan.revision == 2
+    assert entry.records["t1"].state is TaskState.SUCCEEDED
+    assert entry.records["t2"].state is TaskState.FAILED
+    assert "it slipped" in (entry.records["t2"].reason or "")
     model.finish()
     assert goal_state(model, "g1") is GoalState.REACHED
 
@@ -117,9 +117,9 @@ def test_a_worker_that_comes_back_in_time_keeps_its_work() -> None:
     model = fleet()
     model.plan(bring(1, "hallway"))
     (order,) = model.orders()
-    model.tell(events.RobotGone, robot="hsr", incarnation="i1")
-    model.tell(events.TimePassed)
-    model.tell(events.RobotSeen, robot="hsr", incarnation="i2")
+    model.tell(events.WorkerDisconnected, robot="hsr", incarnation="i1")
+    model.tell(events.TimerFired)
+    model.tell(events.WorkerConnected, robot="hsr", incarnation="i2")
     assert model.orders() == [order]
     assert model.state.plans["plan-1"].plan.revision == 1
 
@@ -137,8 +137,8 @@ def test_a_fact_that_contradicts_the_plan_leads_to_a_new_one() -> None:
     model.plan(bring(1, "hallway"))
     model.learn("cup_1", "at", "living_room")
     model.succeed(model.orders()[0])
-    book = model.state.plans["plan-1"]
-    assert book.plan.revision == 2
+    entry = model.state.plans["plan-1"]
+    assert entry.plan.revision == 2
     model.finish()
     assert goal_state(model, "g1") is GoalState.REACHED
 
@@ -148,8 +148,8 @@ def test_what_nobody_can_look_for_is_told() -> None:
     blind = manipulator().__class__(
         robot="hsr", model="hsr", skills=("navigate",), capabilities={"drive": 1.0}
     )
-    model.tell(events.RobotTold, spec=blind)
-    model.tell(events.FactForgotten, subject="cup_1", relation="at")
+    model.tell(events.RobotRegistered, spec=blind)
+    model.tell(events.FactDeleted, subject="cup_1", relation="at")
     model.plan(bring(1, "hallway"))
     assert not model.state.answers["r0"].accepted
     assert "where cup_1 is" in model.state.answers["r0"].sentence
@@ -166,9 +166,9 @@ def test_a_discovery_ends_the_search_and_leads_to_the_goal() -> None:
     while not any(o.robot == "locobot" and o.skill == "search" for o in model.orders()):
         model.succeed(next(o for o in model.orders() if o.robot == "locobot"))
     model.learn("cup_1", "at", "living_room")
-    book = model.state.plans["plan-1"]
-    assert book.plan.revision == 2
-    assert "pick" in {task.skill for task in book.plan.tasks}
+    entry = model.state.plans["plan-1"]
+    assert entry.plan.revision == 2
+    assert "pick" in {task.skill for task in entry.plan.tasks}
     for order in model.orders():
         if order.cancelled:
             model.report(order, ReportState.CANCELLED)
@@ -188,15 +188,15 @@ def test_what_is_found_nowhere_ends_the_goal_with_where_it_was_looked_for() -> N
 
 def test_sentences_wait_for_the_names_they_use() -> None:
     model = FleetModel((manipulator(),), cups=1)
-    model.tell(events.GoalTold, goal=Goal(goal="g", text="bring the vase to the hallway"))
+    model.tell(events.GoalPut, goal=Goal(goal="g", text="bring the vase to the hallway"))
     assert goal_state(model, "g") is GoalState.REJECTED
     assert "known are cup_1" in (model.state.goal_states["g"].reason or "")
-    vase = events.ObjectTold(
+    vase = events.ObjectPut(
         object=model.state.objects["cup_1"].__class__(object="vase", kind="vase", label="vase"),
         time_s=1.0,
         wall_time_s=1.0,
     )
-    model.tell(events.ObjectTold, object=vase.object)
+    model.tell(events.ObjectPut, object=vase.object)
     assert goal_state(model, "g") is GoalState.WAITING
 
 
@@ -208,7 +208,7 @@ def test_a_ready_plan_waits_for_start_and_can_be_cancelled_and_deleted() -> None
 
     def control(name: str, what: Control) -> bool:
         request = ControlRequest(request=name, control=what, plan="plan-1")
-        model.tell(events.ControlAsked, request=request)
+        model.tell(events.ControlRequested, request=request)
         return model.state.answers[name].accepted
 
     assert control("c1", Control.START)
@@ -228,10 +228,10 @@ def test_a_robot_that_is_unregistered_loses_its_work_and_gets_new_once_it_is_bac
     model.plan(bring(1, "hallway"))
     (order,) = model.orders()
     other = {"r1": "r2", "r2": "r1"}[order.robot]
-    model.tell(events.RobotForgotten, robot=order.robot)
+    model.tell(events.RobotUnregistered, robot=order.robot)
     assert {o.robot for o in model.orders()} == {other}
     model.finish()
-    model.tell(events.RobotTold, spec=manipulator(order.robot))
+    model.tell(events.RobotRegistered, spec=manipulator(order.robot))
     assert model.state.ready(order.robot)
     model.plan(bring(2, "hallway"))
     model.finish()
@@ -245,12 +245,12 @@ def test_a_task_can_be_added_to_a_running_plan() -> None:
         request="c", control=Control.ADD_TASK, plan="plan-1", skill="navigate",
         args={"to": "living_room"}, robot="locobot",
     )  # fmt: skip
-    model.tell(events.ControlAsked, request=request)
+    model.tell(events.ControlRequested, request=request)
     model.finish()
-    book = model.state.plans["plan-1"]
-    assert book.state is PlanState.SUCCEEDED
-    assert book.records["t5"].robot == "locobot"
-    assert book.records["t5"].state is TaskState.SUCCEEDED
+    entry = model.state.plans["plan-1"]
+    assert entry.state is PlanState.SUCCEEDED
+    assert entry.records["t5"].robot == "locobot"
+    assert entry.records["t5"].state is TaskState.SUCCEEDED
 
 
 def test_a_task_that_cannot_be_added_leaves_the_plan_as_it_was() -> None:
@@ -259,10 +259,10 @@ def test_a_task_that_cannot_be_added_leaves_the_plan_as_it_was() -> None:
     request = ControlRequest(
         request="c", control=Control.ADD_TASK, plan="plan-1", skill="fly", args={}
     )
-    model.tell(events.ControlAsked, request=request)
+    model.tell(events.ControlRequested, request=request)
     model.finish()
-    book = model.state.plans["plan-1"]
-    assert book.state is PlanState.SUCCEEDED
+    entry = model.state.plans["plan-1"]
+    assert entry.state is PlanState.SUCCEEDED
     assert "there is no skill fly" in model.state.answers["c"].sentence
     assert not model.state.answers["c"].accepted
 
@@ -292,10 +292,10 @@ def test_requests_are_answered_once_and_wrong_ones_with_the_reason() -> None:
     model.plan(goals=("g1",))
     assert "already in plan plan-1" in model.state.answers["r3"].sentence
     replan = ReplanRequest(request="x", plan="nope", reason="because")
-    model.tell(events.ReplanAsked, request=replan)
+    model.tell(events.ReplanRequested, request=replan)
     assert "known are plan-1" in model.state.answers["x"].sentence
     before = model.state
-    model.tell(events.ReplanAsked, request=replan)
+    model.tell(events.ReplanRequested, request=replan)
     assert model.state is before
 
 
@@ -305,11 +305,11 @@ def test_a_replan_that_changes_nothing_disturbs_nobody() -> None:
     before = model.orders()
     model.start(before[0])
     model.tell(
-        events.ReplanAsked, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
+        events.ReplanRequested, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
     )
-    book = model.state.plans["plan-1"]
-    assert book.plan.revision == 2
-    assert book.change == PlanChange(kept=9, dropped=0, added=0)
+    entry = model.state.plans["plan-1"]
+    assert entry.plan.revision == 2
+    assert entry.change == PlanChange(kept=9, dropped=0, added=0)
     assert model.orders() == before
     model.finish()
     assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
@@ -322,7 +322,7 @@ def test_a_replan_in_the_middle_of_a_pick_goes_on_with_it() -> None:
     (pick,) = model.orders()
     model.start(pick)
     model.tell(
-        events.ReplanAsked, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
+        events.ReplanRequested, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
     )
     assert model.orders() == [pick]
     assert model.state.plans["plan-1"].change == PlanChange(kept=3, dropped=0, added=0)
@@ -351,9 +351,9 @@ def test_work_that_is_no_longer_wanted_is_cancelled_before_what_conflicts_starts
 def test_a_goal_that_comes_up_joins_the_running_plan_when_asked() -> None:
     model = fleet()
     model.plan(BOTH[0])
-    model.tell(events.GoalTold, goal=BOTH[1])
+    model.tell(events.GoalPut, goal=BOTH[1])
     model.tell(
-        events.ReplanAsked,
+        events.ReplanRequested,
         request=ReplanRequest(request="x", plan="plan-1", reason="more", goals=("g2",)),
     )
     assert model.state.plans["plan-1"].plan.goals == ("g1", "g2")
@@ -365,7 +365,7 @@ def test_goals_are_planned_unasked_where_the_policy_says_so() -> None:
     model = fleet()
     model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(auto_plan=True))
     for goal in BOTH:
-        model.tell(events.GoalTold, goal=goal)
+        model.tell(events.GoalPut, goal=goal)
     assert list(model.state.plans) == ["plan-1"]
     model.finish()
     assert [goal_state(model, g) for g in ("g1", "g2")] == [GoalState.REACHED] * 2
@@ -374,14 +374,14 @@ def test_goals_are_planned_unasked_where_the_policy_says_so() -> None:
 def test_a_new_robot_is_given_a_share() -> None:
     model = FleetModel((manipulator("r1"),), cups=2)
     model.plan(*BOTH)
-    model.tell(events.RobotTold, spec=manipulator("r2"))
-    model.tell(events.RobotSeen, robot="r2", incarnation="i1")
+    model.tell(events.RobotRegistered, spec=manipulator("r2"))
+    model.tell(events.WorkerConnected, robot="r2", incarnation="i1")
     model.learn("r2", "holding", "nothing")
-    book = model.state.plans["plan-1"]
-    assert book.plan.revision == 2
-    assert {record.robot for record in book.current()} == {"r1", "r2"}
+    entry = model.state.plans["plan-1"]
+    assert entry.plan.revision == 2
+    assert {record.robot for record in entry.current()} == {"r1", "r2"}
     model.finish()
-    assert book.plan.goals == ("g1", "g2")
+    assert entry.plan.goals == ("g1", "g2")
     assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
 
 
@@ -392,7 +392,7 @@ def test_a_plan_waits_for_approval_where_the_policy_says_so() -> None:
     assert model.state.plans["plan-1"].state is PlanState.PROPOSED
     assert model.orders() == []
     approve = ControlRequest(request="a", control=Control.APPROVE, plan="plan-1")
-    model.tell(events.ControlAsked, request=approve)
+    model.tell(events.ControlRequested, request=approve)
     model.finish()
     assert goal_state(model, "g1") is GoalState.REACHED
 
@@ -413,7 +413,7 @@ def test_a_dry_run_shows_the_plan_and_leaves_nothing_behind() -> None:
 def test_a_goal_in_steps_takes_one_after_the_other() -> None:
     model = fleet()
     model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(interpreter=True))
-    model.tell(events.GoalTold, goal=Goal(goal="g", text="kindly do the usual with cup one"))
+    model.tell(events.GoalPut, goal=Goal(goal="g", text="kindly do the usual with cup one"))
     assert goal_state(model, "g") is GoalState.READING
     model.plan(goals=("g",))
     assert "still being worked out" in model.state.answers["r0"].sentence
@@ -448,7 +448,7 @@ def test_what_an_earlier_step_brought_somewhere_stays_there() -> None:
 def test_a_sentence_that_no_model_understands_is_refused() -> None:
     model = fleet()
     model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(interpreter=True))
-    model.tell(events.GoalTold, goal=Goal(goal="g", text="hum a tune"))
+    model.tell(events.GoalPut, goal=Goal(goal="g", text="hum a tune"))
     model.tell(events.GoalInterpreted, goal="g", reason="it is no task for robots")
     assert goal_state(model, "g") is GoalState.REJECTED
     assert "no task for robots" in (model.state.goal_states["g"].reason or "")
@@ -457,11 +457,11 @@ def test_a_sentence_that_no_model_understands_is_refused() -> None:
 def test_a_deleted_goal_leaves_the_plan() -> None:
     model = fleet()
     model.plan(*BOTH)
-    model.tell(events.GoalForgotten, goal="g2")
+    model.tell(events.GoalDeleted, goal="g2")
     model.finish()
-    book = model.state.plans["plan-1"]
-    assert book.state is PlanState.SUCCEEDED
-    assert book.plan.goals == ("g1",)
+    entry = model.state.plans["plan-1"]
+    assert entry.state is PlanState.SUCCEEDED
+    assert entry.plan.goals == ("g1",)
     assert "goals/g2/status" not in model.documents
 
 
@@ -482,7 +482,7 @@ def test_a_planner_without_a_journal_does_nothing_a_second_time() -> None:
     model.plan(*BOTH)
     model.finish()
     fresh = State()
-    remembered = events.Remembered(
+    remembered = events.PriorStateLoaded(
         time_s=0.0, wall_time_s=0.0,
         answers=tuple(model.state.answers.values()),
         goals=tuple(model.state.goal_states.values()),
@@ -491,7 +491,7 @@ def test_a_planner_without_a_journal_does_nothing_a_second_time() -> None:
     fresh, _ = step(fresh, remembered, SKILLS)
     for line in model.journal:
         event = events.decode_event(line)
-        if isinstance(event, events.PlanAsked | events.GoalTold):
+        if isinstance(event, events.PlanRequested | events.GoalPut):
             fresh, effects = step(fresh, event, SKILLS)
             assert not any(isinstance(effect, MakePlan) for effect in effects)
     proposed = events.PlanProposed(
@@ -505,7 +505,7 @@ def test_a_planner_without_a_journal_does_nothing_a_second_time() -> None:
 def test_an_event_without_meaning_changes_nothing() -> None:
     model = fleet()
     state, effects = step(
-        model.state, events.GoalForgotten(goal="x", time_s=1e9, wall_time_s=1e12), SKILLS
+        model.state, events.GoalDeleted(goal="x", time_s=1e9, wall_time_s=1e12), SKILLS
     )
     assert state is model.state
     assert effects == ()

@@ -8,7 +8,7 @@ from keyexpr_schema.payloads.motions import MotionKind, PointM
 from keyexpr_schema.payloads.world import NOTHING
 from workers.context import SkillContext
 from workers.errors import SkillFailed
-from workers.skill import Kind, skill
+from workers.skill import ParameterKind, skill
 
 WORD_S = 10.0
 """Wall seconds to wait for the carrier's worker to say where it stands or what it carries."""
@@ -20,14 +20,18 @@ MOST_APPROACHES = 3
 
 @skill(
     "place_on_robot",
-    parameters={"object": Kind.OBJECT, "carrier": Kind.ROBOT, "place": Kind.PLACE},
+    parameters={
+        "object": ParameterKind.OBJECT,
+        "carrier": ParameterKind.ROBOT,
+        "place": ParameterKind.PLACE,
+    },
 )
 async def place_on_robot(ctx: SkillContext, object: str, carrier: str, place: str) -> None:
     """Put the held object into the basket of a robot that stands in the same place."""
     held = await ctx.holding()
     if held != object:
         if _in_basket(ctx, object, carrier):  # an earlier try let it down
-            ctx.learn("at", object, carrier)
+            ctx.observe("at", object, carrier)
             return
         raise SkillFailed(
             f"{ctx.robot} holds {held or NOTHING}, not {object}, so it cannot give it to {carrier}",
@@ -42,7 +46,7 @@ async def place_on_robot(ctx: SkillContext, object: str, carrier: str, place: st
         raise SkillFailed(f"the hand was opened over {carrier} but still holds {object}")
     if not await _arrived(ctx, object, carrier):
         raise SkillFailed(f"{object} was let down over {carrier} but is not in its basket")
-    ctx.learn("at", object, carrier)
+    ctx.observe("at", object, carrier)
 
 
 async def _stand_beside(ctx: SkillContext, carrier: str, place: str) -> None:
@@ -84,11 +88,11 @@ async def _arrived(ctx: SkillContext, object: str, carrier: str) -> bool:
     seen = {d.object: d for d in await ctx.look()}.get(object)
     if seen is not None:
         where = ctx.world.whereabouts(seen)
-        ctx.learn("at", object, where)
+        ctx.observe("at", object, where)
         return where == carrier
     if await ctx.world.until(lambda: _in_basket(ctx, object, carrier), WORD_S):
         return True
-    ctx.learn("at", object, None)
+    ctx.observe("at", object, None)
     return False
 
 

@@ -17,15 +17,15 @@ SEARCHED = "searched"
 """Relation that says of a place that somebody looked around in it."""
 
 
-def goal_told(state: State, event: events.GoalTold) -> State:
+def goal_put(state: State, event: events.GoalPut) -> State:
     """Keep the goal and say what it is understood to mean; a changed goal begins anew."""
     goal = event.goal
     if state.goals.get(goal.goal) == goal:
         return state
-    remembered = goal.goal not in state.goals and goal.goal in state.goal_states
+    known_ended = goal.goal not in state.goals and goal.goal in state.goal_states
     state = replace(state, goals=put(state.goals, goal.goal, goal))
-    if remembered:
-        return state  # it ended under an earlier planner
+    if known_ended:
+        return state  # under an earlier planner
     return _take_goal(state, goal)
 
 
@@ -93,7 +93,7 @@ def next_stage(state: State, goal: str) -> State:
     return _begin_stage(set_goal(state, status), goal)
 
 
-def goal_forgotten(state: State, event: events.GoalForgotten) -> State:
+def goal_deleted(state: State, event: events.GoalDeleted) -> State:
     """Drop the goal; a plan that works on it is made again without it."""
     if event.goal not in state.goals:
         return state
@@ -102,17 +102,17 @@ def goal_forgotten(state: State, event: events.GoalForgotten) -> State:
         goals=without(state.goals, event.goal),
         goal_states=without(state.goal_states, event.goal),
     )
-    for plan, book in state.plans.items():
-        if event.goal in book.plan.goals and not book.ended:
-            rest = without_goal(state, book.plan, event.goal)
-            book = replace(
-                book,
+    for plan, entry in state.plans.items():
+        if event.goal in entry.plan.goals and not entry.ended:
+            rest = without_goal(state, entry.plan, event.goal)
+            entry = replace(
+                entry,
                 plan=rest,
                 replan_reason=f"goal {event.goal} was deleted",
                 outside_reason=f"goal {event.goal} was deleted",
-                cancelling=book.cancelling or not rest.goals,
+                cancelling=entry.cancelling or not rest.goals,
             )
-            state = replace(state, plans=put(state.plans, plan, book))
+            state = replace(state, plans=put(state.plans, plan, entry))
     return state
 
 
@@ -230,13 +230,13 @@ def believe_if_newer(state: State, fact: Fact) -> State:
     return state if known is not None and fact.time_s < known.time_s else believe(state, fact)
 
 
-def fact_forgotten(state: State, event: events.FactForgotten) -> State:
+def fact_deleted(state: State, event: events.FactDeleted) -> State:
     """No longer believe anything of that variable."""
     name = f"{event.subject}/{event.relation}"
     return replace(state, facts=without(state.facts, name)) if name in state.facts else state
 
 
-def statement_told(state: State, event: events.StatementTold) -> State:
+def statement_put(state: State, event: events.StatementPut) -> State:
     """Keep the statement, and believe the facts that can be read out of it."""
     statement = event.statement
     if state.statements.get(statement.statement) == statement:
@@ -245,7 +245,7 @@ def statement_told(state: State, event: events.StatementTold) -> State:
     return _read_statement(state, statement.statement)
 
 
-def statement_forgotten(state: State, event: events.StatementForgotten) -> State:
+def statement_deleted(state: State, event: events.StatementDeleted) -> State:
     """Drop the statement. Facts once read out of it stay: they may have been confirmed since."""
     if event.statement not in state.statements:
         return state
@@ -282,19 +282,19 @@ def _set_understood(state: State, status: StatementStatus) -> State:
     return replace(state, understood=put(state.understood, status.statement, status))
 
 
-def place_told(state: State, event: events.PlaceTold) -> State:
+def place_put(state: State, event: events.PlacePut) -> State:
     """Know the place."""
     if state.places.get(event.place.place) == event.place:
         return state
     return _words_changed(replace(state, places=put(state.places, event.place.place, event.place)))
 
 
-def place_forgotten(state: State, event: events.PlaceForgotten) -> State:
+def place_deleted(state: State, event: events.PlaceDeleted) -> State:
     """Forget the place."""
     return replace(state, places=without(state.places, event.place))
 
 
-def object_told(state: State, event: events.ObjectTold) -> State:
+def object_put(state: State, event: events.ObjectPut) -> State:
     """Know the object."""
     if state.objects.get(event.object.object) == event.object:
         return state
@@ -303,12 +303,12 @@ def object_told(state: State, event: events.ObjectTold) -> State:
     )
 
 
-def object_forgotten(state: State, event: events.ObjectForgotten) -> State:
+def object_deleted(state: State, event: events.ObjectDeleted) -> State:
     """Forget the object."""
     return replace(state, objects=without(state.objects, event.object))
 
 
-def robot_told(state: State, event: events.RobotTold) -> State:
+def robot_registered(state: State, event: events.RobotRegistered) -> State:
     """Know the robot."""
     if state.robots.get(event.spec.robot) == event.spec:
         return state
@@ -320,7 +320,7 @@ def robot_told(state: State, event: events.RobotTold) -> State:
     return _words_changed(state)
 
 
-def robot_forgotten(state: State, event: events.RobotForgotten) -> State:
+def robot_unregistered(state: State, event: events.RobotUnregistered) -> State:
     """Forget the robot; what it was doing is as with a robot that went away."""
     if event.robot not in state.robots:
         return state
@@ -331,7 +331,7 @@ def robot_forgotten(state: State, event: events.RobotForgotten) -> State:
     )
 
 
-def robot_seen(state: State, event: events.RobotSeen) -> State:
+def worker_connected(state: State, event: events.WorkerConnected) -> State:
     """A worker is connected; plans that waited for robots are looked at again."""
     runs = state.alive.get(event.robot, ())
     if event.incarnation in runs:
@@ -343,7 +343,7 @@ def robot_seen(state: State, event: events.RobotSeen) -> State:
     )
 
 
-def robot_gone(state: State, event: events.RobotGone) -> State:
+def worker_disconnected(state: State, event: events.WorkerDisconnected) -> State:
     """A worker is gone; a new one has some time to come before its robot counts as lost."""
     runs = state.alive.get(event.robot, ())
     if event.incarnation not in runs:
@@ -355,7 +355,7 @@ def robot_gone(state: State, event: events.RobotGone) -> State:
     return replace(state, gone_since=put(state.gone_since, event.robot, event.wall_time_s))
 
 
-def remembered(state: State, event: events.Remembered) -> State:
+def prior_state_loaded(state: State, event: events.PriorStateLoaded) -> State:
     """Take over what an earlier planner left, so that nothing is done a second time."""
     answers = {answer.request: answer for answer in event.answers}
     goals = {status.goal: status for status in event.goals if status.state in ENDED_GOALS}
@@ -385,7 +385,7 @@ def _words_changed(state: State) -> State:
 
 def active_plan_of(state: State, goal: str) -> str | None:
     """The plan that works on a goal and has not ended."""
-    for plan, book in state.plans.items():
-        if goal in book.plan.goals and not book.ended and book.state is not PlanState.REJECTED:
+    for plan, entry in state.plans.items():
+        if goal in entry.plan.goals and not entry.ended and entry.state is not PlanState.REJECTED:
             return plan
     return None

@@ -1,0 +1,129 @@
+"""How skills, the planning problem and the names that exist are put to a language model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from fleet.core.model.skills import SPACE, SkillModel
+from fleet.core.model.world import WorldModel
+from fleet.language import Vocabulary
+from fleet.llm.quoting import fenced
+from keyexpr_schema.payloads.goals import Condition, Goal
+from keyexpr_schema.payloads.world import Value
+
+
+def skills_text(skills: Iterable[SkillModel]) -> str:
+    """The skills, one a line: parameters, what they need, what must hold before and holds after."""
+    return "\n".join(_skill_text(skill) for skill in skills)
+
+
+def _skill_text(skill: SkillModel) -> str:
+    parameters = ", ".join(f"{name}: {kind}" for name, kind in skill.parameters.items())
+    before = [_literal_text(*row) for row in skill.before]
+    before += [f"{SPACE}({carrier})" for carrier in skill.space_in]
+    sentences = [f"- {skill.name}({parameters}): {skill.about}".rstrip(": ")]
+    needs = [
+        f"{parameter} has {need.capability}"
+        + (f" >= {need.measure}({need.of})" if need.measure else "")
+        for parameter, rows in skill.needs.items()
+        for need in rows
+    ]
+    if needs:
+        sentences.append(f"Needs: {', '.join(needs)}.")
+    sentences.append(f"Before: {', '.join(before) or 'nothing'}.")
+    sentences.append(
+        f"After: {', '.join(_literal_text(*row) for row in skill.after) or 'nothing'}."
+    )
+    return " ".join(sentences)
+
+
+def _literal_text(relation: str, subject: str, value: Value) -> str:
+    return f"{relation}({subject}) = {_value_text(value)}"
+
+
+def _value_text(value: Value) -> str:
+    return "unknown" if value is None else str(value).lower() if value is True else str(value)
+
+
+def team_skills(world: WorldModel) -> list[SkillModel]:
+    """The skills that some connected robot has."""
+    names = {name for robot in world.team for name in world.robots[robot].skills}
+    return [skill for skill in world.skills.values() if skill.name in names]
+
+
+def problem_text(world: WorldModel, goals: Iterable[Goal], keep: Iterable[Condition] = ()) -> str:
+    """Robots, places, objects, facts and goals, fenced. Where robots stand is left out.
+
+    `keep` holds already and must hold at the end.
+    """
+    robots = [
+        {
+            "robot": name,
+            "label": world.robots[name].label,
+            "skills": list(world.robots[name].skills),
+            "capabilities": world.robots[name].capabilities,
+        }
+        for name in world.team
+    ]
+    objects = [
+        {**_names(thing.label, thing.aliases), "object": name, "mass_kg": thing.mass_kg}
+        for name, thing in world.objects.items()
+    ]
+    facts = [
+        f"{variable} = {_value_text(value)}"
+        for variable, value in world.facts.items()
+        if not (variable.relation == "at" and variable.subject in world.robots)
+    ]
+    wanted = [
+        {
+            "goal": goal.goal,
+            "text": goal.text,
+            "conditions": [str(condition) for condition in goal.conditions],
+        }
+        for goal in goals
+    ]
+    places = [
+        {**_names(place.label, place.aliases), "place": name}
+        for name, place in world.places.items()
+    ]
+    return fenced(
+        {
+            "robots": robots,
+            "places": places,
+            "objects": objects,
+            "facts": facts,
+            "keep": [str(condition) for condition in keep],
+            "goals": wanted,
+        }
+    )
+
+
+def vocabulary_text(text: str, vocabulary: Vocabulary) -> str:
+    """A sentence and the names that it may use, fenced."""
+    return fenced(
+        {
+            "places": [
+                {**_names(place.label, place.aliases), "place": name}
+                for name, place in vocabulary.places.items()
+            ],
+            "objects": [
+                {
+                    **_names(thing.label, thing.aliases),
+                    "object": name,
+                    "kind": thing.kind,
+                    "ordinal": thing.ordinal,
+                    "at": vocabulary.whereabouts.get(name, "unknown"),
+                }
+                for name, thing in vocabulary.objects.items()
+            ],
+            "robots": [
+                {"robot": name, "label": spec.label} for name, spec in vocabulary.robots.items()
+            ],
+            "sentence": text,
+        }
+    )
+
+
+def _names(label: str, aliases: tuple[str, ...]) -> dict[str, Any]:
+    return {"label": label, "aliases": list(aliases)} if aliases else {"label": label}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 
+from keyexpr_schema.facts import AT, HOLDING, NOTHING, ON, FactKey, Value
 from keyexpr_schema.payloads.motions import (
     Detection,
     Motion,
@@ -14,7 +15,7 @@ from keyexpr_schema.payloads.motions import (
     Senses,
 )
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec, RobotState
-from keyexpr_schema.payloads.world import NOTHING, Fact, FactAddress, Value
+from keyexpr_schema.payloads.world import Fact
 from workers.embodiment import Embodiment
 from workers.errors import SkillFailed
 from workers.world_cache import WorldCache
@@ -27,18 +28,18 @@ class SkillContext:
     and goes out as facts just before the final report.
     """
 
-    def __init__(self, spec: RobotSpec, body: Embodiment, world: WorldCache) -> None:
+    def __init__(self, spec: RobotSpec, embodiment: Embodiment, world: WorldCache) -> None:
         self.robot: str = spec.robot
         self.spec = spec
-        self.body = body
+        self.embodiment = embodiment
         self.world = world
-        self._observed: dict[FactAddress, Fact] = {}
+        self._observed: dict[FactKey, Fact] = {}
         self._log = logging.getLogger(f"robotfleet.worker.{spec.robot}")
 
     @property
     def now_s(self) -> float:
         """Seconds on the fleet's clock."""
-        return self.body.now_s()
+        return self.embodiment.now_s()
 
     @property
     def observed(self) -> tuple[Fact, ...]:
@@ -47,7 +48,7 @@ class SkillContext:
 
     def observe(self, relation: str, subject: str, value: Value) -> None:
         """Note that `relation(subject)` is `value` now; `None` says that it is unknown."""
-        self._observed[FactAddress(subject, relation)] = Fact(
+        self._observed[FactKey(relation, subject)] = Fact(
             subject=subject,
             relation=relation,
             value=value,
@@ -96,7 +97,7 @@ class SkillContext:
             point_m=point_m,
             timeout_s=timeout_s,
         )
-        outcome = await self.body.perform(motion)
+        outcome = await self.embodiment.perform(motion)
         if outcome.state is not MotionState.SUCCEEDED:
             raise SkillFailed(
                 outcome.reason or f"{kind.value} {outcome.state.value} without a reason"
@@ -113,22 +114,22 @@ class SkillContext:
         for detection in seen:
             where = self.world.whereabouts(detection)
             if where is not None and self._known(detection.object) != where:
-                self.observe("at", detection.object, where)
+                self.observe(AT, detection.object, where)
             # In a basket it is at the robot, which says all; `on` is of furniture and the floor.
-            if where in self.world.places and self._known(detection.object, "on") != (
+            if where in self.world.places and self._known(detection.object, ON) != (
                 detection.support
             ):
-                self.observe("on", detection.object, detection.support)
+                self.observe(ON, detection.object, detection.support)
         return seen
 
     async def holding(self) -> str | None:
         """The object in the hand, by the hand's own sensor; what it says is learned."""
-        held = (await self.body.senses()).holding
-        self.observe("holding", self.robot, NOTHING if held is None else held)
+        held = (await self.embodiment.senses()).holding
+        self.observe(HOLDING, self.robot, NOTHING if held is None else held)
         if held is not None:
-            self.observe("at", held, self.robot)
-            if self._known(held, "on") is not None:
-                self.observe("on", held, None)
+            self.observe(AT, held, self.robot)
+            if self._known(held, ON) is not None:
+                self.observe(ON, held, None)
         return held
 
     async def be_in(self, place: str) -> Senses:
@@ -140,13 +141,13 @@ class SkillContext:
         Raises:
             SkillFailed: the way is not open.
         """
-        senses = await self.body.senses()
+        senses = await self.embodiment.senses()
         if senses.place != place:
             self.log(f"is in {senses.place or 'no place'}, not in {place}: goes there first")
             senses = (await self.do(MotionKind.GO_TO, place=place)).senses
-        self.observe("at", self.robot, place)
+        self.observe(AT, self.robot, place)
         return senses
 
-    def _known(self, object: str, relation: str = "at") -> Value:
-        fact = self._observed.get(FactAddress(object, relation))
+    def _known(self, object: str, relation: str = AT) -> Value:
+        fact = self._observed.get(FactKey(relation, object))
         return fact.value if fact is not None else self.world.value_of(relation, object)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from keyexpr_schema.payloads.world import Value
+from keyexpr_schema.facts import Value
 
 Observation = tuple[str, str, Value]
 """One thing learned: `(relation, subject, value)`, e.g. `("at", "cup_1", None)` for *unknown*."""

@@ -20,7 +20,8 @@ import yaml
 
 from fleet.core.model.skills import skills_from_data
 from fleet.core.model.world import WorldModel
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.facts import AT
+from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.payloads.plans import Task as PlanTask
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -157,7 +158,7 @@ def plan_of(home: Household, strategy: str) -> Plan:
                 PlanTask(
                     task=number[chore.name],
                     skill=chore.name,
-                    args={"robot": ACTOR_PREFIX + actor[chore.name], "place": chore.place},
+                    args={"robot": actor_arg(actor[chore.name]), "place": chore.place},
                     actor=actor[chore.name],
                     after=tuple(number[before] for before in befores),
                     goal=goal,
@@ -191,7 +192,7 @@ def world_of(home: Household, clock: str) -> WorldModel:
         for chore in home.chores
     }
     facts = [
-        Fact(subject=robot.robot, relation="at", value="hallway", source="household")
+        Fact(subject=robot.robot, relation=AT, value="hallway", source="household")
         for robot in home.robots
     ]
     return WorldModel.of(

@@ -21,7 +21,8 @@ from fleet.core.state import Policy, State
 from fleet.core.step import step
 from fleet.planners import LlmInterpreter
 from fleet.service.composition import Composition
-from fleet.service.planning_job import carry_out
+from fleet.service.planning_job import run_planning_job
+from keyexpr_schema.facts import AT, ON
 from keyexpr_schema.keyspace import FACT, OBJECT, ORDER, PLACE, ROBOT_SPEC, ROBOT_STATE
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal
 from keyexpr_schema.payloads.plans import ENDED_PLANS
@@ -131,7 +132,7 @@ class FleetRun:
             believed={
                 fact.subject: fact.value
                 for fact in self.state.facts.values()
-                if fact.relation == "at"
+                if fact.relation == AT
             },
             looks=[(place, x, y, see_m[robot]) for place, x, y, robot in self.shared.looks],
         )
@@ -202,9 +203,9 @@ class FleetRun:
 
     def _tell_beliefs(self) -> None:
         for thing, place in self.mission.told().items():
-            self._learn(Fact(subject=thing, relation="at", value=place, source="person"))
+            self._learn(Fact(subject=thing, relation=AT, value=place, source="person"))
         for thing, surface in self.mission.told_on().items():
-            self._learn(Fact(subject=thing, relation="on", value=surface, source="person"))
+            self._learn(Fact(subject=thing, relation=ON, value=surface, source="person"))
         for number, text in enumerate(self.mission.entry.statements, 1):
             self._tell(
                 events.StatementPut, statement=Statement(statement=f"said_{number}", text=text)
@@ -225,7 +226,7 @@ class FleetRun:
             self._ended.set_result(None)
 
     def _learn(self, fact: Fact) -> None:
-        self._view.apply(Change(FACT, FactAddress(fact.subject, fact.relation), fact, ""))
+        self._view.apply(Change(FACT, FactAddress.of(fact.key), fact, ""))
         self._tell(events.FactPut, fact=fact)
 
     def _done(self) -> bool:
@@ -276,7 +277,7 @@ class FleetRun:
             self._fail(TimeoutError(f"not done after {MOST_REVISIONS} revisions"))
             return
         began_s = time.perf_counter()
-        made = carry_out(effect.job, self.state, self._parts, self._at())
+        made = run_planning_job(effect.job, self.state, self._parts, self._at())
         self.counts.planning_s += time.perf_counter() - began_s
         self.counts.revisions += 1
         if isinstance(made, events.PlanningSucceeded):

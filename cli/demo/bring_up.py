@@ -12,6 +12,7 @@ from cli.demo.fleet import Fleet
 from cli.errors import TooLate
 from cli.telling import check_skills, put_world
 from keyexpr_schema.errors import NoAnswer, Unreachable
+from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import PLANNER_ALIVE, ROBOT_ALIVE, ROBOT_SPEC, STORE_JOURNAL
 from keyexpr_schema.payloads.robots import RobotAddress
@@ -113,7 +114,7 @@ async def bring_up(fleet: Fleet, session: Session, board: Board, mission: Missio
 
 def _can_be_planned(board: Board, robot: str) -> bool:
     """Whether a planner knows where the robot is and what it holds: else it can do nothing."""
-    return all((robot, relation) in board.facts for relation in ("at", "holding"))
+    return all(FactKey(relation, robot) in board.facts for relation in (AT, HOLDING))
 
 
 async def _token(

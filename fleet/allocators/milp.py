@@ -10,6 +10,7 @@ from fleet.allocators.load_balancing import Unbalanced, balance
 from fleet.allocators.min_max_load import Bound, min_max_load
 from fleet.allocators.reasons import not_apart
 from fleet.allocators.round_robin import in_turn
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.plans import Violation
 
 log = logging.getLogger(__name__)
@@ -108,7 +109,7 @@ def approaches_s(problem: AllocationProblem) -> dict[tuple[str, str], float]:
         action = problem.checked.actions[task.task]
         if action.skill.travel_to is not None:
             to.setdefault(task.actor, action.args[action.skill.travel_to])
-    where = {robot: world.value("at", robot) for robot in world.team} if to else {}
+    where = {robot: world.value(AT, robot) for robot in world.team} if to else {}
     return {
         (actor, robot): world.travel_s(robot, where[robot], to[actor]) if actor in to else 0.0
         for actor, robots in problem.able.items()

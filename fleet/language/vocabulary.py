@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import msgspec
 
+from keyexpr_schema.facts import Value
 from keyexpr_schema.payloads.robots import RobotSpec
-from keyexpr_schema.payloads.world import Object, Place, Value
+from keyexpr_schema.payloads.world import Object, Place
 
 
 class SkillPhrase(msgspec.Struct, frozen=True, kw_only=True):

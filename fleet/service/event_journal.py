@@ -17,7 +17,7 @@ from typing import TextIO
 import msgspec
 
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.state import State
+from fleet.core.state import State, decode_state, encode_state
 from fleet.errors import FleetError
 
 SNAPSHOT_FORMAT = 2
@@ -112,7 +112,7 @@ class EventJournal:
             kept = msgspec.json.decode(row[1], type=_Snapshot)
             if kept.format != SNAPSHOT_FORMAT:
                 return 0, State()
-            return int(row[0]), msgspec.json.decode(kept.state, type=State)
+            return int(row[0]), decode_state(kept.state)
         except msgspec.DecodeError:
             return 0, State()
 
@@ -125,5 +125,5 @@ class EventJournal:
 
 
 def _snapshot_of(state: State) -> bytes:
-    kept = _Snapshot(format=SNAPSHOT_FORMAT, state=msgspec.Raw(msgspec.json.encode(state)))
+    kept = _Snapshot(format=SNAPSHOT_FORMAT, state=msgspec.Raw(encode_state(state)))
     return msgspec.json.encode(kept)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from fleet.core import events
 from fleet.core.effects import Interpret, MakePlan, Publish
-from fleet.core.handlers.plan_results import MAX_REPLANS
+from fleet.core.revision.replanning import MAX_REPLANS
 from fleet.core.state import Policy, State
 from fleet.core.step import step
+from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.keyspace import PLACE, PLAN_STATUS
 from keyexpr_schema.payloads.goals import Goal, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanChange, PlanState, Task
@@ -423,7 +424,7 @@ def test_a_goal_in_steps_takes_one_after_the_other() -> None:
     model.plan()
     model.finish()
     assert goal_state(model, "g") is GoalState.REACHED
-    assert model.state.facts["cup_1/at"].value == "living_room"
+    assert model.state.facts[FactKey(AT, "cup_1")].value == "living_room"
     places = [
         record.args["place"]
         for record in model.state.plans["plan-1"].records.values()

@@ -131,7 +131,7 @@ async def test_what_a_lost_robot_was_to_do_goes_to_another(router: Any, tmp_path
         ):
             await robot.confirm(ROBOT_SPEC, RobotAddress("near"), manipulator("near"))
             for known in (fact("near", "at", "kitchen"), fact("near", "holding", "nothing")):
-                await robot.confirm(FACT, FactAddress(known.subject, known.relation), known)
+                await robot.confirm(FACT, FactAddress.of(known.key), known)
             await ask_for_plan(session)
             await until(lambda: session.list(ORDER, robot="near"), "an order for the nearest")
         # Its worker is gone now, and does not come back.

@@ -13,11 +13,12 @@ from conftest import RouterProcess
 from msgspec.structs import replace
 from worker_world import DEADLINE_S, Fleet, running_fleet
 
+from keyexpr_schema.facts import NOTHING
 from keyexpr_schema.keyspace import FACT, ORDER, REJECT, REPORT, ROBOT_ALIVE, ROBOT_STATE
 from keyexpr_schema.payloads.motions import MotionKind
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.payloads.tasks import OrderAddress, Report, ReportAddress, ReportState
-from keyexpr_schema.payloads.world import NOTHING, Fact, FactAddress
+from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.session import SessionConfig
 from sim.backend import Backend
 from sim.files.mission_file import Mission

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.motions import MotionKind
 from workers.context import SkillContext
 from workers.errors import SkillFailed
@@ -14,15 +15,15 @@ DOORWAY_M = 0.6
 @skill("navigate", parameters={"to": ParameterKind.PLACE})
 async def navigate(ctx: SkillContext, to: str) -> None:
     """Drive to a free spot in a place."""
-    senses = await ctx.body.senses()
+    senses = await ctx.embodiment.senses()
     x_m, y_m, _ = senses.pose_m_rad
     place = ctx.world.places[to]
     if senses.place == to and inner_distance_m(place.region_m, x_m, y_m) >= DOORWAY_M:
-        ctx.observe("at", ctx.robot, to)
+        ctx.observe(AT, ctx.robot, to)
         return
     senses = (await ctx.do(MotionKind.GO_TO, place=to)).senses
     if senses.place is not None:
-        ctx.observe("at", ctx.robot, senses.place)
+        ctx.observe(AT, ctx.robot, senses.place)
     if senses.place != to:
         raise SkillFailed(
             f"{ctx.robot} drove off to {to} but stands in {senses.place or 'no place'}"

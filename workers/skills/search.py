@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import aclosing
 
+from keyexpr_schema.facts import AT, SEARCHED
 from workers.context import SkillContext
 from workers.skill import ParameterKind, skill
 from workers.skills.finding import looks
@@ -28,9 +29,9 @@ async def search(ctx: SkillContext, place: str) -> None:
                 break
     for thing, where in found.items():
         if where is not None:
-            ctx.observe("at", thing, where)
+            ctx.observe(AT, thing, where)
     if viewing.complete:
         for missing in sorted(believed - set(found)):
-            ctx.observe("at", missing, None)
+            ctx.observe(AT, missing, None)
     await ctx.be_in(place)
-    ctx.observe("searched", place, True)
+    ctx.observe(SEARCHED, place, True)

@@ -17,12 +17,12 @@ def phrases_of(skills: Mapping[str, SkillModel]) -> tuple[SkillPhrase, ...]:
     found = []
     for name in sorted(skills):
         skill = skills[name]
-        rows = [row for row in skill.after if skill.parameters[row[1]] != "robot"]
-        about = {subject for _, subject, _ in rows}
-        plain = all(value not in skill.parameters for _, _, value in rows)
+        rows = [row for row in skill.after if skill.parameters[row.variable.subject] != "robot"]
+        about = {row.variable.subject for row in rows}
+        plain = all(row.value not in skill.parameters for row in rows)
         if len(about) == 1 and plain:
             sort = skill.parameters[about.pop()]
-            wants = tuple((relation, value) for relation, _, value in rows if value is not None)
+            wants = tuple((key.relation, value) for key, value in rows if value is not None)
             if wants:
                 found.append(SkillPhrase(verb=name.replace("_", " "), sort=sort, wants=wants))
     return tuple(found)

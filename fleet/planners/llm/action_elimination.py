@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterable
 from msgspec.structs import replace
 
 from fleet.core.checker.plan_checker import check_plan
-from fleet.core.model.skills import Variable
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
+from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.plans import Plan, Task
 
 
@@ -24,7 +24,7 @@ def without_redundant_tasks(plan: Plan, world: WorldModel) -> Plan:
     # Where robots stand may change before the plan starts: the way to the work is not redundant.
     mentioned = {subject for condition in plan.conditions for subject in condition.subjects}
     unlocated = world.with_facts(
-        {Variable("at", robot): None for robot in world.robots if robot not in mentioned}
+        {FactKey(AT, robot): None for robot in world.robots if robot not in mentioned}
     )
     if not check_plan(plan, unlocated).valid:
         unlocated = world

@@ -9,20 +9,21 @@ from fleet.core.model.skills import SkillModel
 from fleet.language import Vocabulary
 from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
 from fleet.llm.quoting import cleaned
-from fleet.llm.structured_output import Answer, read_answer, schema_of
+from fleet.llm.structured_output import StructuredAnswer, read_answer, schema_of
 from fleet.planners.llm.prompt_text import vocabulary_text
+from keyexpr_schema.facts import HELD, LOCATED
 from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Violation
 
 MAX_CONDITIONS = 100
-DERIVED = {"located": "it is known where the object is", "held": "a hand holds the object"}
+DERIVED = {LOCATED: "it is known where the object is", HELD: "a hand holds the object"}
 """Relations that follow from others; `keyexpr_schema.payloads.goals.Condition` says how."""
 
 Stages = tuple[tuple[Condition, ...], ...]
 
 
-class ConditionAnswer(Answer, frozen=True):
+class ConditionAnswer(StructuredAnswer, frozen=True):
     """A `Condition`, with every field said."""
 
     relation: Id
@@ -31,7 +32,7 @@ class ConditionAnswer(Answer, frozen=True):
     any_of: tuple[Id, ...] = ()
 
 
-class GoalAnswer(Answer, frozen=True):
+class GoalAnswer(StructuredAnswer, frozen=True):
     """Stages of conditions, or why there are none."""
 
     stages: tuple[tuple[ConditionAnswer, ...], ...]
@@ -171,7 +172,7 @@ def _contradictions(number: int, stage: tuple[ConditionAnswer, ...]) -> list[Vio
 def _signatures(skills: Mapping[str, SkillModel]) -> dict[str, _Signature]:
     types: dict[str, set[tuple[str, str | bool]]] = {}
     for skill in skills.values():
-        for relation, subject, value in skill.after:
+        for (relation, subject), value in skill.after:
             if isinstance(value, str):
                 # `holding = nothing` is a word; `at = to` a parameter of some type.
                 type_or_value: str | bool = skill.parameters.get(value, value)

@@ -25,6 +25,7 @@ from fleet.planners.llm.candidate import (
 )
 from fleet.planners.llm.prompt_text import problem_text, skills_text, team_skills
 from fleet.planners.llm.verification import violations_of
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan
 
@@ -159,7 +160,7 @@ def _not_located(goals: Sequence[Goal], world: WorldModel) -> str | None:
     for goal in goals:
         for condition in goal.conditions:
             things = [subject for subject in condition.subjects if subject in world.objects]
-            if things and all(world.value("at", thing) is None for thing in things):
+            if things and all(world.value(AT, thing) is None for thing in things):
                 return " or ".join(things)
     return None
 

@@ -9,8 +9,8 @@ from fleet.core.model.skills import SPACE, SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.language import Vocabulary
 from fleet.llm.quoting import fenced
+from keyexpr_schema.facts import AT, Literal
 from keyexpr_schema.payloads.goals import Condition, Goal
-from keyexpr_schema.payloads.world import Value
 
 
 def skills_text(skills: Iterable[SkillModel]) -> str:
@@ -20,7 +20,7 @@ def skills_text(skills: Iterable[SkillModel]) -> str:
 
 def _skill_text(skill: SkillModel) -> str:
     parameters = ", ".join(f"{name}: {kind}" for name, kind in skill.parameters.items())
-    before = [_literal_text(*row) for row in skill.before]
+    before = [str(row) for row in skill.before]
     before += [f"{SPACE}({carrier})" for carrier in skill.space_in]
     sentences = [f"- {skill.name}({parameters}): {skill.about}".rstrip(": ")]
     needs = [
@@ -32,18 +32,8 @@ def _skill_text(skill: SkillModel) -> str:
     if needs:
         sentences.append(f"Needs: {', '.join(needs)}.")
     sentences.append(f"Before: {', '.join(before) or 'nothing'}.")
-    sentences.append(
-        f"After: {', '.join(_literal_text(*row) for row in skill.after) or 'nothing'}."
-    )
+    sentences.append(f"After: {', '.join(map(str, skill.after)) or 'nothing'}.")
     return " ".join(sentences)
-
-
-def _literal_text(relation: str, subject: str, value: Value) -> str:
-    return f"{relation}({subject}) = {_value_text(value)}"
-
-
-def _value_text(value: Value) -> str:
-    return "unknown" if value is None else str(value).lower() if value is True else str(value)
 
 
 def team_skills(world: WorldModel) -> list[SkillModel]:
@@ -71,9 +61,9 @@ def problem_text(world: WorldModel, goals: Iterable[Goal], keep: Iterable[Condit
         for name, thing in world.objects.items()
     ]
     facts = [
-        f"{variable} = {_value_text(value)}"
+        str(Literal(variable, value))
         for variable, value in world.facts.items()
-        if not (variable.relation == "at" and variable.subject in world.robots)
+        if not (variable.relation == AT and variable.subject in world.robots)
     ]
     wanted = [
         {

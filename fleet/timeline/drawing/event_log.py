@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fleet.timeline.drawing.lanes import call_text
+from keyexpr_schema.facts import render_value
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus
 from keyexpr_schema.payloads.robots import RobotActivity, RobotSpec, RobotState
 from keyexpr_schema.payloads.service import Reject
 from keyexpr_schema.payloads.simulation import Truth
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskRecord, TaskState, Try
-from keyexpr_schema.payloads.world import Fact, Value
+from keyexpr_schema.payloads.world import Fact
 
 INFO, WARN, ERROR = "INFO", "WARN", "ERROR"
 
@@ -117,10 +118,10 @@ def fact(now: Fact, before: Fact | None) -> Iterator[Line]:
     """Someone said something about the world that was not known so."""
     if before is not None and before.value == now.value:
         return
-    was = f" (was {_value(before.value)})" if before is not None else ""
+    was = f" (was {render_value(before.value)})" if before is not None else ""
     yield (
         INFO,
-        f"{now.source} says {now.relation}({now.subject}) = {_value(now.value)}{was}",
+        f"{now.source} says {now.literal}{was}",
     )
 
 
@@ -171,7 +172,3 @@ def _why(reason: str | None) -> str:
 
 def _last(tries: tuple[Try, ...]) -> str | None:
     return tries[-1].reason if tries else None
-
-
-def _value(value: Value) -> str:
-    return "unknown" if value is None else str(value)

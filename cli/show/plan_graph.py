@@ -9,6 +9,7 @@ from rich.text import Text
 
 from cli.show.plan_tree import MARKS, in_order
 from cli.show.words import STATE_STYLE, call, seconds
+from keyexpr_schema.ids import actor_arg, actor_in
 from keyexpr_schema.payloads.plans import Plan, PlanStatus, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
@@ -111,7 +112,7 @@ def _state(task: Task, records: Mapping[str, TaskRecord]) -> TaskState:
 def _who(task: Task, status: PlanStatus | None, records: Mapping[str, TaskRecord]) -> str:
     record = records.get(task.task)
     allocated = status.allocation.get(task.actor) if status else None
-    return (record.robot if record else None) or allocated or f"?{task.actor}"
+    return (record.robot if record else None) or allocated or actor_arg(task.actor)
 
 
 def _said(task: Task, status: PlanStatus | None) -> str:
@@ -120,8 +121,8 @@ def _said(task: Task, status: PlanStatus | None) -> str:
     return call(
         task.skill,
         {
-            name: allocation.get(value[1:], value) if value.startswith("?") else value
+            name: allocation.get(actor_in(value) or "", value)
             for name, value in task.args.items()
-            if value != f"?{task.actor}"
+            if value != actor_arg(task.actor)
         },
     )

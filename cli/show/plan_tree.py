@@ -8,6 +8,7 @@ from rich.text import Text
 from rich.tree import Tree
 
 from cli.show.words import STATE_STYLE, call, natural, outcome, seconds, spent_s
+from keyexpr_schema.ids import actor_arg, actor_in
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanStatus, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -119,9 +120,10 @@ def _task(
     robot = (record.robot if record else None) or allocated
     state = record.state if record else TaskState.WAITING
     style = STATE_STYLE[state.value]
-    args = {name: arg for name, arg in task.args.items() if arg not in (f"?{task.actor}", robot)}
+    own = (actor_arg(task.actor), robot)
+    args = {name: arg for name, arg in task.args.items() if arg not in own}
     if status:
-        args = {n: status.allocation.get(a[1:], a) if a[:1] == "?" else a for n, a in args.items()}
+        args = {n: status.allocation.get(actor_in(a) or "", a) for n, a in args.items()}
     text = Text.assemble((f"{MARKS[state]} ", style), (task.task, "bold"), " ")
     text.append(call(task.skill, args))
     text.append(f"  {task.actor}→{robot or '?'}", "blue")

@@ -13,7 +13,7 @@ from fleet.core.schedule.actor_order import carried_at_end, first_actors
 from fleet.core.schedule.plan_schedule import predicted_duration_s
 from fleet.jobshop.problem import Block, Machine, Operation, Position, Shop
 from keyexpr_schema.facts import AT, FactKey, Value
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.plans import Plan
 
 MOST_PRIORITY = 8
@@ -41,7 +41,7 @@ def plan_shop(problem: AllocationProblem) -> PlanShop:
     assert graph is not None, "a valid plan has a graph"
     robots = tuple(world.team)
     actors = tuple(problem.able)
-    names = {ACTOR_PREFIX + actor: i for i, actor in enumerate(actors)}
+    names = {actor_arg(actor): i for i, actor in enumerate(actors)}
     number = {task: i for i, task in enumerate(graph.order)}
     numbers = _Numbers(world, robots)
     weights, dues = _wishes(problem)
@@ -67,7 +67,7 @@ def plan_shop(problem: AllocationProblem) -> PlanShop:
             )
         )
     machine = {robot: i for i, robot in enumerate(robots)}
-    able = {ACTOR_PREFIX + actor: rows for actor, rows in problem.able.items()}
+    able = {actor_arg(actor): rows for actor, rows in problem.able.items()}
     positions = _positions(problem, actors)
     apart = _apart(problem, {actor: i for i, actor in enumerate(actors)})
     blocks_of = tuple(
@@ -158,11 +158,11 @@ def _positions(problem: AllocationProblem, actors: tuple[str, ...]) -> dict[str,
     positions: dict[str, Position] = {}
     for actor in actors:
         if actor in first:
-            positions[ACTOR_PREFIX + actor] = Position.FIRST
+            positions[actor_arg(actor)] = Position.FIRST
         elif actor in last:
-            positions[ACTOR_PREFIX + actor] = Position.LAST
+            positions[actor_arg(actor)] = Position.LAST
         elif actor in problem.circumstances.under_way:
-            positions[ACTOR_PREFIX + actor] = Position.FIRST
+            positions[actor_arg(actor)] = Position.FIRST
     return positions
 
 

@@ -22,13 +22,14 @@ from fleet.core.schedule.idle_time import (
     predicted_unit,
     unit_idle,
 )
+from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus, Task
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState, Try
 
 
 def task(name: str, actor: str, duration_s: float, *after: str, with_: str = "") -> Task:
-    args = {"robot": f"?{actor}", **({"carrier": f"?{with_}"} if with_ else {})}
+    args = {"robot": actor_arg(actor), **({"carrier": actor_arg(with_)} if with_ else {})}
     return Task(
         task=name,
         skill="work",

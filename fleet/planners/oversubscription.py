@@ -1,4 +1,4 @@
-"""Planning for those goals that can be reached, where one that cannot would spoil the plan."""
+"""Oversubscription: a plan for those goals that can be reached, where not all can."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from keyexpr_schema.payloads.plans import Plan
 class PartialPlan:
     """A plan, and the goals that it leaves out, each with the reason.
 
-    `changed` is false for what is left of a plan and stays as it was.
+    `changed` is false for a residual plan that stays as it was.
     """
 
     plan: Plan
@@ -21,13 +21,13 @@ class PartialPlan:
     changed: bool = True
 
 
-def plan_what_can_be(
+def plan_reachable_goals(
     planner: Planner,
-    judge: Planner,
+    feasibility: Planner,
     problem: PlanningProblem,
     reached: frozenset[str] = frozenset(),
 ) -> PartialPlan | NoPlan:
-    """A plan for all goals, or else for all but those for which `judge` finds none even alone.
+    """A plan for all goals, or else for all but those that `feasibility` cannot plan even alone.
 
     Goals that are `reached` stay in the plan, so that it does not undo them; a plan for nothing
     else is no plan.
@@ -38,7 +38,7 @@ def plan_what_can_be(
     left_out: dict[str, str] = {}
     for goal in problem.goals if len(problem.goals) > 1 else ():
         if goal.goal not in reached:
-            alone = judge.plan(replace(problem, goals=(goal,)))
+            alone = feasibility.plan(replace(problem, goals=(goal,)))
             if isinstance(alone, NoPlan):
                 left_out[goal.goal] = alone.reason
     rest = tuple(goal for goal in problem.goals if goal.goal not in left_out)

@@ -7,14 +7,16 @@ import os
 import signal
 import socket
 import sys
+import threading
 from collections.abc import Coroutine, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 from cli.errors import BadArgument, ProcessDied
-from cli.running import END_WITH_STDIN
 
 T = TypeVar("T")
+END_WITH_STDIN = "ROBOTFLEET_END_WITH_STDIN"
+"""Set by `robotctl demo` for its children: end when stdin ends, that is, when the parent died."""
 TERM_S = 5.0
 """How long a process has to end after SIGTERM before it gets SIGKILL."""
 
@@ -26,12 +28,12 @@ def free_endpoint() -> str:
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
-class Fleet:
+class ChildProcesses:
     """Child processes `robotctl …`, by name, each with a log file in `out`.
 
-    Use as `async with Fleet(…) as fleet:`; at the end every child is told to stop, then killed.
-    Each is in a session of its own, so that Ctrl-C reaches the parent only, and ends by itself
-    when the parent dies (its stdin ends).
+    Use as `async with ChildProcesses(…) as processes:`; at the end every child gets SIGTERM, then
+    SIGKILL. Each is in a session of its own, so that Ctrl-C reaches the parent only, and ends by
+    itself when the parent dies (its stdin ends).
     """
 
     def __init__(self, endpoint: str, realm: str, out: Path) -> None:
@@ -43,7 +45,7 @@ class Fleet:
         self._ending: set[str] = set()
         self._died: asyncio.Future[ProcessDied] | None = None
 
-    async def __aenter__(self) -> Fleet:
+    async def __aenter__(self) -> ChildProcesses:
         self._died = asyncio.get_running_loop().create_future()
         return self
 
@@ -114,13 +116,13 @@ class Fleet:
         await self._end(name, (signal.SIGTERM, signal.SIGKILL))
 
     async def guard(self, work: Coroutine[Any, Any, T]) -> T:
-        """Do `work`; stop it when a process dies that nobody told to.
+        """Do `work`; stop it when a process dies unasked.
 
         Raises:
             ProcessDied: one did; the message names it, and its log.
         """
         if self._died is None:
-            raise RuntimeError("use a Fleet in `async with`")
+            raise RuntimeError("use ChildProcesses in `async with`")
         task = asyncio.ensure_future(work)
         try:
             watched: list[asyncio.Future[Any]] = [task, self._died]
@@ -168,6 +170,20 @@ class Fleet:
 
 def _last_words(log: Path) -> str:
     """The last line of a log, as part of a sentence."""
-    lines = log.read_text(encoding="utf-8", errors="replace").split("\n")
-    said = [line.strip() for line in lines if line.strip()]
-    return f", saying “{said[-1].removeprefix('Error: ')}”" if said else ""
+    text = log.read_text(encoding="utf-8", errors="replace")
+    lines = [line.strip() for line in text.split("\n") if line.strip()]
+    return f", saying “{lines[-1].removeprefix('Error: ')}”" if lines else ""
+
+
+def end_with_parent() -> None:
+    """If a demo started this process, give it SIGTERM when the demo is gone, however it went."""
+    if not os.environ.get(END_WITH_STDIN):
+        return
+    stdin = sys.stdin.fileno()
+
+    def wait() -> None:
+        while os.read(stdin, 4096):
+            pass
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    threading.Thread(target=wait, name="end-with-parent", daemon=True).start()

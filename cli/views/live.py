@@ -13,23 +13,23 @@ from rich.console import Group, RenderableType
 from rich.live import Live
 from rich.text import Text
 
-from cli.show.page import page, table
-from cli.show.plan_tree import plan_tree
-from cli.show.words import call, carried, doing, seconds
+from cli.views.console import console, table
+from cli.views.plan_tree import plan_tree
+from cli.views.text import call, carried, doing, seconds
 from keyexpr_schema.payloads.goals import GoalStatus
 from keyexpr_schema.payloads.plans import PlanStatus
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 if TYPE_CHECKING:
-    from cli.board import Board
+    from cli.client.fleet_view import FleetView
     from keyexpr_schema.transport.session import Change
 
 REDRAW_S = 0.2
 """How often the picture is redrawn, so that running tasks count up."""
 
 
-class Ticker:
-    """Tells each change of a goal, plan or task in a line, where nothing draws a picture.
+class ChangePrinter:
+    """Prints each change of a goal, plan or task as a line, where nothing draws a picture.
 
     `to_stderr` keeps stdout for data; `only` names the one plan that is of interest.
     """
@@ -37,7 +37,7 @@ class Ticker:
     def __init__(self, to_stderr: bool, only: str | None = None) -> None:
         self._to_stderr = to_stderr
         self._only = only
-        self._told: dict[str, str] = {}
+        self._printed: dict[str, str] = {}
         self.silent = False
 
     @property
@@ -50,22 +50,22 @@ class Ticker:
         """Whether stdout is kept for data."""
         return self._to_stderr
 
-    def hear(self, change: Change[Any, Any]) -> None:
-        """Take in a change; say it if it is worth a line and was not said."""
-        told = tell(change.value)
-        if told is None or self.silent:
+    def on_change(self, change: Change[Any, Any]) -> None:
+        """Print the change if it is worth a line that was not printed."""
+        line = change_line(change.value)
+        if line is None or self.silent:
             return
         if self._only not in (None, getattr(change.address, "plan", self._only)):
             return
-        time_s, sentence = told
+        time_s, sentence = line
         where = change.key.build(change.address)
-        if self._told.get(where) != sentence:
-            self._told[where] = sentence
+        if self._printed.get(where) != sentence:
+            self._printed[where] = sentence
             time = " " * 10 if time_s is None else f"{time_s:8.1f} s"
             typer.echo(f"{time}  {sentence}", err=self._to_stderr)
 
 
-def tell(what: object) -> tuple[float | None, str] | None:
+def change_line(what: object) -> tuple[float | None, str] | None:
     """What happened, and when on the fleet's clock [s]; `None` if it is not worth a line."""
     if isinstance(what, TaskRecord):
         time_s = {
@@ -92,35 +92,35 @@ def _because(reason: str | None) -> str:
     return f": {reason}" if reason else ""
 
 
-def picture(board: Board, only: str | None = None) -> RenderableType:
+def picture(view: FleetView, only: str | None = None) -> RenderableType:
     """Plans as trees and robots as a table."""
     parts: list[RenderableType] = []
-    clock = board.now_s
+    clock = view.now_s
     if clock is not None:
         parts.append(Text(f"{seconds(clock)} on the fleet's clock", "bold"))
-    for name in sorted(board.plans):
+    for name in sorted(view.plans):
         if only not in (None, name):
             continue
-        records = {task: record for (of, task), record in board.tasks.items() if of == name}
+        records = {task: record for (of, task), record in view.tasks.items() if of == name}
         parts.append(
             plan_tree(
-                board.plans[name],
-                board.plan_status.get(name),
+                view.plans[name],
+                view.plan_status.get(name),
                 records,
-                board.goals,
-                board.goal_status,
+                view.goals,
+                view.goal_status,
                 clock,
             )
         )
-    if not board.plans:
-        waiting = ", ".join(board.goals) or "none"
+    if not view.plans:
+        waiting = ", ".join(view.goals) or "none"
         parts.append(f"No plan yet; goals: {waiting}")
     parts.append(
         table(
             ["robot", "activity", "place", "holding", "task"],
             (
                 (s.robot, s.activity.value, s.place, carried(s), doing(s))
-                for _, s in sorted(board.robots.items())
+                for _, s in sorted(view.robot_states.items())
             ),
         )
     )
@@ -128,18 +128,20 @@ def picture(board: Board, only: str | None = None) -> RenderableType:
 
 
 @asynccontextmanager
-async def showing(board: Board, ticker: Ticker, plan: str | None = None) -> AsyncIterator[None]:
-    """Redraw `board` on the terminal during the block; without one the ticker tells the changes."""
-    if not ticker.draws:
+async def live_view(
+    view: FleetView, printer: ChangePrinter, plan: str | None = None
+) -> AsyncIterator[None]:
+    """Redraw `view` on the terminal during the block; without one the changes are printed."""
+    if not printer.draws:
         yield
         return
-    ticker.silent = True
-    console = page(sys.stderr if ticker.to_stderr else sys.stdout)
-    with Live(console=console, auto_refresh=False, transient=False) as live:
+    printer.silent = True
+    screen = console(sys.stderr if printer.to_stderr else sys.stdout)
+    with Live(console=screen, auto_refresh=False, transient=False) as live:
 
         async def redraw() -> None:
             while True:
-                live.update(picture(board, plan), refresh=True)
+                live.update(picture(view, plan), refresh=True)
                 await asyncio.sleep(REDRAW_S)
 
         task = asyncio.create_task(redraw())
@@ -148,5 +150,5 @@ async def showing(board: Board, ticker: Ticker, plan: str | None = None) -> Asyn
         finally:
             task.cancel()
             await asyncio.wait([task])
-            live.update(picture(board, plan), refresh=True)
-            ticker.silent = False
+            live.update(picture(view, plan), refresh=True)
+            printer.silent = False

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from rich.text import Text
 from rich.tree import Tree
 
-from cli.show.words import STATE_STYLE, call, natural, outcome, seconds, spent_s
+from cli.views.text import STATE_STYLE, call, natural_order, outcome, seconds, spent_s
 from keyexpr_schema.ids import actor_arg, actor_in
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanStatus, Task
@@ -63,7 +63,7 @@ def _earlier(plan: Plan, records: Mapping[str, TaskRecord]) -> list[Task]:
             goal=record.goal,
             duration_s=record.duration_s,
         )
-        for record in sorted(records.values(), key=lambda record: natural(record.task))
+        for record in sorted(records.values(), key=lambda record: natural_order(record.task))
         if record.task not in current and record.started_s is not None
     ]
 

@@ -1,4 +1,4 @@
-"""Everything robotctl knows of a running fleet, kept current by the key-space."""
+"""The latest values of a running fleet, kept current by the key-space."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NoReturn
+
+from msgspec.structs import astuple
 
 from cli.errors import TooLate
 from keyexpr_schema.errors import Unreachable
@@ -40,7 +42,7 @@ from keyexpr_schema.payloads.world import Fact
 if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Change, Session, Watch
 
-FLEET = (
+FLEET_KEYS = (
     GOAL_SPEC,
     GOAL_STATUS,
     PLAN_SPEC,
@@ -51,14 +53,14 @@ FLEET = (
     FACT,
 )
 """What any fleet has."""
-SIMULATION = (SIM_CLOCK, SIM_TRUTH, SIM_CONTACTS, SIM_SCENE, SIM_SENSES)
+SIMULATION_KEYS = (SIM_CLOCK, SIM_TRUTH, SIM_CONTACTS, SIM_SCENE, SIM_SENSES)
 """What only a simulated one has."""
 SYNC_S = 10.0
 """Longest time for the store to list what it has."""
 
 
 @dataclass
-class Board:
+class FleetView:
     """The latest value of every key that matters to a person who watches; by its address.
 
     `tasks` are by (plan, task), all else by the one id.
@@ -71,8 +73,8 @@ class Board:
     plans: dict[str, Plan] = field(default_factory=dict)
     plan_status: dict[str, PlanStatus] = field(default_factory=dict)
     tasks: dict[tuple[str, str], TaskRecord] = field(default_factory=dict)
-    specs: dict[str, RobotSpec] = field(default_factory=dict)
-    robots: dict[str, RobotState] = field(default_factory=dict)
+    robot_specs: dict[str, RobotSpec] = field(default_factory=dict)
+    robot_states: dict[str, RobotState] = field(default_factory=dict)
     facts: dict[FactKey, Fact] = field(default_factory=dict)
     rejects: dict[tuple[str, str], Reject] = field(default_factory=dict)
     truths: dict[str, Truth] = field(default_factory=dict)
@@ -86,17 +88,14 @@ class Board:
     def apply(self, change: Change[Any, Any]) -> None:
         """Take in one change of a key."""
         value: Payload | None = change.value
-        shelf = self._shelf(change.key.name)
-        if shelf is not None:
-            fields = change.address.__struct_fields__
-            parts = tuple(getattr(change.address, name) for name in fields)
-            where = parts if len(parts) > 1 else parts[0]
-            if change.key is FACT:
-                where = change.address.key
+        table = self._table(change.key.name)
+        if table is not None:
+            address = change.address.key if change.key is FACT else astuple(change.address)
+            at = address if len(address) > 1 else address[0]
             if value is None:
-                shelf.pop(where, None)
+                table.pop(at, None)
             else:
-                shelf[where] = value
+                table[at] = value
         elif value is not None:
             if isinstance(value, SimClock):
                 self.clock = value
@@ -106,28 +105,28 @@ class Board:
                 self.scene = value
         self.changed.set()
 
-    def _shelf(self, key: str) -> dict[Any, Any] | None:
-        shelves: dict[str, dict[Any, Any]] = {
+    def _table(self, key: str) -> dict[Any, Any] | None:
+        tables: dict[str, dict[Any, Any]] = {
             GOAL_SPEC.name: self.goals,
             GOAL_STATUS.name: self.goal_status,
             PLAN_SPEC.name: self.plans,
             PLAN_STATUS.name: self.plan_status,
             TASK_RECORD.name: self.tasks,
-            ROBOT_SPEC.name: self.specs,
-            ROBOT_STATE.name: self.robots,
+            ROBOT_SPEC.name: self.robot_specs,
+            ROBOT_STATE.name: self.robot_states,
             SIM_TRUTH.name: self.truths,
             SIM_SENSES.name: self.senses,
             REJECT.name: self.rejects,
             FACT.name: self.facts,
         }
-        return shelves.get(key)
+        return tables.get(key)
 
     @property
     def now_s(self) -> float | None:
         """The fleet's clock, where a simulation publishes it; else the latest time on a key."""
         if self.clock is not None:
             return self.clock.time_s
-        times = [state.time_s for state in self.robots.values()]
+        times = [state.time_s for state in self.robot_states.values()]
         times += [status.time_s for status in self.plan_status.values()]
         return max(times, default=None)
 
@@ -170,18 +169,18 @@ class Board:
 
 
 @asynccontextmanager
-async def following(
+async def fleet_view(
     session: Session, *keys: Any, on_change: Callable[[Change[Any, Any]], None] | None = None
-) -> AsyncIterator[Board]:
-    """A board that is kept current in the background; at entry all that is stored is on it.
+) -> AsyncIterator[FleetView]:
+    """A view that is kept current in the background; at entry all that is stored is in it.
 
-    `on_change` hears of each change before it is on the board. An error in the background is
-    raised by `Board.until`.
+    `on_change` hears of each change before it is on the view. An error in the background is
+    raised by `FleetView.until`.
 
     Raises:
         Unreachable: the store did not list what it has.
     """
-    board = Board()
+    view = FleetView()
     async with session.watch(*keys) as watch:
 
         async def follow() -> None:
@@ -189,22 +188,32 @@ async def following(
                 async for change in watch:
                     if on_change is not None:
                         on_change(change)
-                    board.apply(change)
+                    view.apply(change)
             except Exception as error:
-                board.failure = error
-                board.changed.set()
+                view.failure = error
+                view.changed.set()
 
         follower = asyncio.create_task(follow())
         try:
             await _synced(watch)
-            yield board
+            yield view
         finally:
             follower.cancel()
             await asyncio.wait([follower])
 
 
+async def snapshot(session: Session, *keys: Any) -> FleetView:
+    """What is stored now under these keys.
+
+    Raises:
+        Unreachable: the store did not list what it has.
+    """
+    async with fleet_view(session, *keys) as view:
+        return view
+
+
 async def _synced(watch: Watch) -> None:
-    """Wait until all that is stored is on the board.
+    """Wait until all that is stored is on the view.
 
     Once it was handed to the iterator the follower, which was woken first, drains it before this
     task runs on.

@@ -6,12 +6,12 @@ from rich.console import Group
 from rich.text import Text
 
 from cli.demo.summary import Summary
-from cli.judge import Judgement
-from cli.show.page import table
-from cli.show.words import call, seconds
+from cli.demo.verdict import Verdict
+from cli.views.console import table
+from cli.views.text import call, seconds
 from keyexpr_schema.payloads.goals import GoalState
 
-MARKS = {Judgement.HOLDS: "✓", Judgement.FAILS: "✗", Judgement.NOT_JUDGED: "?"}
+MARKS = {Verdict.HOLDS: "✓", Verdict.FAILS: "✗", Verdict.NOT_JUDGED: "?"}
 
 
 def summary_page(summary: Summary) -> Group:
@@ -71,7 +71,7 @@ def _title(summary: Summary) -> Text:
         return Text("Every goal is reached: the physics and the planner agree.", "bold green")
     wrong = [verdict for verdict in summary.goals if not verdict.agreed]
     if wrong and all(
-        verdict.physics is Judgement.NOT_JUDGED and verdict.planner is GoalState.REACHED
+        verdict.physics is Verdict.NOT_JUDGED and verdict.planner is GoalState.REACHED
         for verdict in wrong
     ):
         return Text(

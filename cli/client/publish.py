@@ -1,4 +1,4 @@
-"""What robotctl tells the fleet: goals, statements, facts, places, objects; each confirmed."""
+"""Publishes what people say: goals, statements and facts; each write is confirmed."""
 
 from __future__ import annotations
 
@@ -6,44 +6,33 @@ import asyncio
 import time
 from collections.abc import Iterable
 from contextlib import suppress
-from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
-from cli.errors import BadArgument, Unknown, check_known
-from cli.naming import free_name
-from cli.presence import planner_alive
+from cli.errors import BadArgument, check_known
+from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.facts import AT, parse_value
+from keyexpr_schema.ids import slug
 from keyexpr_schema.keyspace import (
     FACT,
     GOAL_SPEC,
     GOAL_STATUS,
     OBJECT,
     PLACE,
-    PLANNER_STATUS,
     ROBOT_SPEC,
     ROBOT_STATE,
     SIM_CLOCK,
     SIM_SCENE,
     STATEMENT,
-    STATEMENT_STATUS,
 )
 from keyexpr_schema.payloads.goals import Goal, GoalAddress
-from keyexpr_schema.payloads.service import PlannerAddress
 from keyexpr_schema.payloads.world import (
     Fact,
     FactAddress,
-    Object,
-    ObjectAddress,
-    Place,
-    PlaceAddress,
     Statement,
     StatementAddress,
-    StatementStatus,
 )
 
 if TYPE_CHECKING:
-    from keyexpr_schema.payloads.robots import RobotSpec
-    from keyexpr_schema.payloads.service import PlannerStatus
     from keyexpr_schema.transport.session import Session
 
 
@@ -51,19 +40,25 @@ CLOCK_S = 0.6
 """How long to listen for a simulation's clock [s, wall]; it ticks several times as often."""
 
 
-READ_S = 5.0
-"""How long the planner may take to read a statement."""
+def free_name(text: str, taken: Iterable[str], kind: str) -> str:
+    """A name made from the words of `text` that is not one of `taken`.
+
+    Where no letter of it can stand in a name, as of Chinese, the name is `kind`.
+    """
+    used = set(taken)
+    try:
+        base = slug(text)
+    except InvalidId:
+        base = kind
+    number = 1
+    name = base
+    while name in used:
+        number += 1
+        name = f"{base}-{number}"
+    return name
 
 
-async def put_world(session: Session, places: Iterable[Place], objects: Iterable[Object]) -> None:
-    """Store places and objects, confirmed."""
-    for place in places:
-        await session.confirm(PLACE, PlaceAddress(place.place), place)
-    for thing in objects:
-        await session.confirm(OBJECT, ObjectAddress(thing.object), thing)
-
-
-async def add_statement(session: Session, text: str, name: str | None = None) -> Statement:
+async def put_statement(session: Session, text: str, name: str | None = None) -> Statement:
     """Store a sentence, confirmed, under `name` or one made from its words.
 
     Raises:
@@ -80,52 +75,7 @@ async def add_statement(session: Session, text: str, name: str | None = None) ->
     return said
 
 
-async def statement_read(session: Session, statement: str) -> StatementStatus | None:
-    """What the planner read out of a statement; `None` if no planner runs, or it does not say."""
-    if not await planner_alive(session):
-        return None
-    with suppress(TimeoutError):
-        async with (
-            asyncio.timeout(READ_S),
-            session.watch((STATEMENT_STATUS, {"statement": statement})) as watch,
-        ):
-            async for change in watch:
-                if change.value is not None:
-                    status: StatementStatus = change.value
-                    return status
-    return None
-
-
-async def planner_status(session: Session) -> PlannerStatus | None:
-    """What the latest planner says that it can do; `None` where none ever ran, or nobody can tell.
-
-    A value that is no status is reported on its reject key, and is no reason to refuse a command.
-    """
-    return (await session.list(PLANNER_STATUS)).get(PlannerAddress())
-
-
-async def check_skills(session: Session, specs: Iterable[RobotSpec]) -> None:
-    """Do nothing if the planner has a model of each skill, or if no planner ever ran here.
-
-    Raises:
-        Unknown: it lacks one, so that no plan could ever ask a robot for it.
-    """
-    planner = await planner_status(session)
-    if planner is None or not planner.skills:
-        return
-    for spec in specs:
-        for skill in spec.skills:
-            if skill not in planner.skills:
-                near = get_close_matches(skill, planner.skills, n=1)
-                hint = f" (did you mean {near[0]!r}?)" if near else ""
-                raise Unknown(
-                    f"robot {spec.robot!r}: the planner knows no skill {skill!r}{hint}; it knows "
-                    f"{', '.join(sorted(planner.skills))}; "
-                    "teach it more with `robotctl planner --skills FILE`"
-                )
-
-
-async def add_fact(session: Session, relation: str, subject: str, written: str) -> Fact:
+async def put_fact(session: Session, relation: str, subject: str, written: str) -> Fact:
     """Store a fact, confirmed.
 
     Raises:
@@ -152,10 +102,10 @@ async def add_fact(session: Session, relation: str, subject: str, written: str) 
 
 
 async def fleet_time_s(session: Session) -> float:
-    """The time that a fact said now carries [s]: a simulation's clock if there is one, else Unix.
+    """What is now on the fleet's clock [s]: a simulation's if there is one, else Unix time.
 
     A realm that has a simulated scene whose clock is not heard has stopped; then the time is the
-    latest that a robot has told, since Unix time would outdate whatever the simulation says later.
+    latest that a robot has reported: Unix time would outdate whatever the simulation says later.
     """
     heard: float | None = None
     simulated = False

@@ -6,8 +6,8 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from cli.plans.idle import Idle, IdleReport
-from cli.show.page import table
-from cli.show.words import seconds
+from cli.views.console import table
+from cli.views.text import seconds
 
 
 def idle_page(report: IdleReport) -> RenderableType:
@@ -41,10 +41,10 @@ def _lines(report: IdleReport) -> list[str]:
     ]
     if report.over_bound is not None:
         bound = f"lower bound ({seconds(report.lower_bound_s)})"
-        told = f"makespan ÷ {bound}: {report.over_bound:.3f} predicted"
+        ratio = f"makespan ÷ {bound}: {report.over_bound:.3f} predicted"
         if report.measured_over_bound is not None:
-            told += f", {report.measured_over_bound:.3f} measured"
-        lines.append(told)
+            ratio += f", {report.measured_over_bound:.3f} measured"
+        lines.append(ratio)
     else:
         lines.append("the allocator gave no lower bound of the makespan; `makespan` does")
     if report.measured is not None and not report.ended:

@@ -16,7 +16,7 @@ PIPED_WIDTH = 200
 """Columns where nobody's terminal sets a limit: wide enough for `grep` to find whole lines."""
 
 
-def page(file: TextIO | None = None) -> Console:
+def console(file: TextIO | None = None) -> Console:
     """A console on `file` (stdout at the time of the call); piped output is wide.
 
     Text is never markup: a person's sentence may have brackets in it.

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 ASK_S = 3.0
 
 
-async def still_unreadable(session: Session, rejects: Iterable[Reject]) -> list[Reject]:
+async def current_rejects(session: Session, rejects: Iterable[Reject]) -> list[Reject]:
     """Those whose key still has a value that does not decode.
 
     A reject stays on its key when the bad value is replaced or deleted. What is not stored, and

@@ -1,20 +1,44 @@
-"""Pages about one plan: everything known of it, its violations, how it differs from another."""
+"""Plans as a table; pages about one: all that is known of it, violations, differences."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
 from rich.console import Group, RenderableType
+from rich.table import Table
 from rich.text import Text
 
 from cli.plans.comparison import PlanDiff, TaskChange
-from cli.show.page import table
-from cli.show.plan_graph import plan_graph
-from cli.show.plan_tree import plan_tree
-from cli.show.words import call, seconds
+from cli.views.console import table
+from cli.views.plan_graph import plan_graph
+from cli.views.plan_tree import plan_tree
+from cli.views.text import call, natural_order, outcome, seconds
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.plans import Making, Plan, PlanStatus, Task, Violation
 from keyexpr_schema.payloads.tasks import TaskRecord
+
+
+def plans_table(plans: Mapping[str, Plan], status: Mapping[str, PlanStatus]) -> Table:
+    """One line a plan; also those that never came to have tasks."""
+    rows = []
+    for name in sorted(set(plans) | set(status), key=natural_order):
+        plan, now = plans.get(name), status.get(name)
+        rows.append(
+            (
+                name,
+                now.revision if now else plan.revision if plan else "",
+                now.state.value if now else "proposed",
+                ", ".join(plan.goals if plan else now.goals if now else ()),
+                len(plan.tasks) if plan else "",
+                plan.strategy if plan else "",
+                plan.made_by if plan else now.made_by if now else "",
+                plan.allocator if plan else now.allocator if now else "",
+                seconds(now.predicted_makespan_s) if now else "",
+                outcome(now) if now else "",
+            )
+        )
+    columns = ["plan", "rev", "state", "goals", "tasks", "strategy", "made by", "allocator"]
+    return table([*columns, "predicted", "reason"], rows)
 
 
 def plan_page(

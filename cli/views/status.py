@@ -9,19 +9,14 @@ from typing import TYPE_CHECKING
 from rich.console import Group, RenderableType
 from rich.table import Table
 
-from cli.show.fleet_tables import (
-    GoalRow,
-    RobotRow,
-    goals_table,
-    plans_table,
-    rejects_table,
-    robots_table,
-)
-from cli.show.page import table
+from cli.views.console import table
+from cli.views.goals import GoalRow, goals_table
+from cli.views.plans import plans_table
+from cli.views.robots import RobotRow, robots_table
 from keyexpr_schema.payloads.service import PlannerStatus, Reject, StoreJournal
 
 if TYPE_CHECKING:
-    from cli.board import Board
+    from cli.client.fleet_view import FleetView
 
 VALUE_WIDTH = 120
 """Characters of a value shown in the journal; `--json` shows all of it."""
@@ -34,11 +29,11 @@ def status_page(
     planning: bool,
     robots: Sequence[RobotRow],
     goals: Sequence[GoalRow],
-    board: Board,
+    view: FleetView,
     rejects: Sequence[Reject],
 ) -> Group:
     """One page; a part with nothing in it is one short line."""
-    plans = set(board.plans) | set(board.plan_status)
+    plans = set(view.plans) | set(view.plan_status)
     unreadable: list[RenderableType] = ["", rejects_table(rejects)] if rejects else []
     return Group(
         f"router   {', '.join(routers)}, realm {realm}",
@@ -48,7 +43,7 @@ def status_page(
         "",
         goals_table(goals) if goals else "No goals.",
         "",
-        plans_table(board.plans, board.plan_status) if plans else "No plans.",
+        plans_table(view.plans, view.plan_status) if plans else "No plans.",
         *unreadable,
     )
 
@@ -64,8 +59,17 @@ def _planner(planner: PlannerStatus | None, planning: bool) -> str:
         ("allocators", planner.allocators),
         ("skills", planner.skills),
     )
-    said = [f"  {what:<11}{', '.join(names)}" for what, names in offers if names]
-    return "\n".join([f"running, epoch {planner.epoch}", *said])
+    lines = [f"  {what:<11}{', '.join(names)}" for what, names in offers if names]
+    return "\n".join([f"running, epoch {planner.epoch}", *lines])
+
+
+def rejects_table(rejects: Sequence[Reject]) -> Table:
+    """One line a value that somebody could not read."""
+    return table(
+        ["key", "told by", "times", "reason"],
+        ((r.keyexpr, r.component, r.count, r.reason) for r in rejects),
+        title="Unreadable values",
+    )
 
 
 def journal_table(journal: StoreJournal) -> Table:

@@ -1,9 +1,9 @@
-"""Objects and places that a person tells the fleet of, one by one."""
+"""Publishes objects and places, of a world file or one by one; each write is confirmed."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
@@ -16,42 +16,16 @@ from keyexpr_schema.payloads.world import Object, ObjectAddress, Place, PlaceAdd
 if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Session
 
-HOW_TO_PLACE = "tell one with `robotctl world add --place`"
-_GOES_WITH = {
-    "--id": ("a sentence",),
-    "--label": ("--object", "--place"),
-    "--alias": ("--object", "--place"),
-    "--kind": ("--object",),
-    "--home": ("--object",),
-    "--mass-kg": ("--object",),
-    "--region": ("--place",),
-    "--distance": ("--place",),
-}
-"""Each option of `world add`: the forms that take it."""
+
+async def put_world(session: Session, places: Iterable[Place], objects: Iterable[Object]) -> None:
+    """Store places and objects, confirmed."""
+    for place in places:
+        await session.confirm(PLACE, PlaceAddress(place.place), place)
+    for thing in objects:
+        await session.confirm(OBJECT, ObjectAddress(thing.object), thing)
 
 
-def check_options(
-    *, sentence: bool, fact: bool, object: bool, place: bool, given: Mapping[str, object]
-) -> None:
-    """Do nothing if the options tell of one thing.
-
-    Raises:
-        BadArgument: of none, of two at once, or an option goes with another form.
-    """
-    forms = {"a sentence": sentence, "--fact": fact, "--object": object, "--place": place}
-    chosen = [form for form, wanted in forms.items() if wanted]
-    if not chosen:
-        raise BadArgument("say a sentence, or tell of a --fact, an --object or a --place")
-    if len(chosen) > 1:
-        raise BadArgument(f"{' and '.join(chosen)} are different things to tell: choose one")
-    for option, value in given.items():
-        if value not in (None, []) and chosen[0] not in _GOES_WITH[option]:
-            raise BadArgument(f"{option} goes with {' or '.join(_GOES_WITH[option])}")
-    if object and not given["--kind"]:
-        raise BadArgument("an object has a --kind, such as cup")
-
-
-async def told_object(
+async def put_object(
     session: Session,
     name: str,
     kind: str,
@@ -73,7 +47,7 @@ async def told_object(
     check_id(kind, "kind")
     places = [address.place for address in await session.list(PLACE)]
     if home is not None:
-        check_known("place", home, places, HOW_TO_PLACE)
+        check_known("place", home, places)
     _check_free(name, "place", places)
     _check_free(name, "robot", [address.robot for address in await session.list(ROBOT_SPEC)])
     objects = {a.object: thing for a, thing in (await session.list(OBJECT)).items()}
@@ -92,7 +66,7 @@ async def told_object(
     return thing
 
 
-async def told_place(
+async def put_place(
     session: Session,
     name: str,
     label: str | None,
@@ -114,7 +88,7 @@ async def told_place(
     travel_m = dict(_distance(written) for written in distances)
     places = {a.place: place for a, place in (await session.list(PLACE)).items()}
     for other in travel_m:
-        check_known("place", other, [p for p in places if p != name], HOW_TO_PLACE)
+        check_known("place", other, [p for p in places if p != name])
     _check_free(name, "object", [address.object for address in await session.list(OBJECT)])
     _check_free(name, "robot", [address.robot for address in await session.list(ROBOT_SPEC)])
     old = places.get(name) or Place(place=name, label=_in_words(name))

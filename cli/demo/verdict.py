@@ -1,4 +1,4 @@
-"""Did it really happen? Goals against the truth of the simulated world.
+"""Verifies goals against the truth of the simulated world: did it really happen?
 
 Pure: what the planner says a goal means (`GoalStatus.conditions`) is held against what the physics
 says (`Truth`, and where robots stand). What a worker or the planner claims plays no part.
@@ -17,7 +17,7 @@ from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
 from keyexpr_schema.payloads.simulation import Truth
 
 
-class Judgement(str, Enum):
+class Verdict(str, Enum):
     """What the physics says of a condition or a goal."""
 
     HOLDS = "holds"
@@ -25,31 +25,31 @@ class Judgement(str, Enum):
     NOT_JUDGED = "not judged by physics"
 
 
-class ConditionVerdict(msgspec.Struct, frozen=True, kw_only=True):
+class ConditionVerdict(msgspec.Struct, frozen=True, kw_only=True, rename={"verdict": "judgement"}):
     """One condition, and in a sentence why it holds or does not."""
 
     condition: Condition
-    judgement: Judgement
+    verdict: Verdict
     sentence: str
 
 
-class Verdict(msgspec.Struct, frozen=True, kw_only=True):
+class GoalVerdict(msgspec.Struct, frozen=True, kw_only=True):
     """One goal: what the physics says, what the planner says, and whether both say reached."""
 
     goal: str
-    physics: Judgement
+    physics: Verdict
     planner: GoalState
     agreed: bool
     sentence: str
     conditions: tuple[ConditionVerdict, ...]
 
 
-def judge(
+def goal_verdicts(
     goals: Mapping[str, GoalStatus],
     truths: Mapping[str, Truth],
     robot_places: Mapping[str, str | None],
     beliefs: Mapping[str, Value] = {},
-) -> tuple[Verdict, ...]:
+) -> tuple[GoalVerdict, ...]:
     """A verdict on every goal, in the order of `goals`.
 
     `robot_places` says which place each robot really stands in (`None`: in none), `beliefs` where
@@ -60,7 +60,7 @@ def judge(
     the physics. Of several subjects one is enough. A goal with no conditions is not judged either.
     """
     seen = _Seen(truths, robot_places, beliefs)
-    return tuple(_verdict(status, seen) for status in goals.values())
+    return tuple(_goal_verdict(status, seen) for status in goals.values())
 
 
 class _Seen(NamedTuple):
@@ -69,33 +69,33 @@ class _Seen(NamedTuple):
     beliefs: Mapping[str, Value]
 
 
-def all_agreed(verdicts: tuple[Verdict, ...]) -> bool:
+def all_agreed(verdicts: tuple[GoalVerdict, ...]) -> bool:
     """Whether there are goals, and physics and planner both say of each that it is reached."""
     return bool(verdicts) and all(verdict.agreed for verdict in verdicts)
 
 
-def _verdict(status: GoalStatus, seen: _Seen) -> Verdict:
+def _goal_verdict(status: GoalStatus, seen: _Seen) -> GoalVerdict:
     found = tuple(_condition(each, seen) for each in status.conditions)
-    judgements = {each.judgement for each in found}
-    if Judgement.FAILS in judgements:
-        physics = Judgement.FAILS
-    elif Judgement.NOT_JUDGED in judgements or not found:
-        physics = Judgement.NOT_JUDGED
+    verdicts = {each.verdict for each in found}
+    if Verdict.FAILS in verdicts:
+        physics = Verdict.FAILS
+    elif Verdict.NOT_JUDGED in verdicts or not found:
+        physics = Verdict.NOT_JUDGED
     else:
-        physics = Judgement.HOLDS
+        physics = Verdict.HOLDS
     sentence = "; ".join(each.sentence for each in found) or (
         "nobody said what must hold for this goal, so there is nothing to judge"
     )
-    if status.state is GoalState.REACHED and physics is Judgement.FAILS:
+    if status.state is GoalState.REACHED and physics is Verdict.FAILS:
         sentence += " (but the planner says it is reached)"
     elif status.state is not GoalState.REACHED:
         why = f": {status.reason}" if status.reason else ""
         sentence += f" (the planner says {status.state.value}{why})"
-    return Verdict(
+    return GoalVerdict(
         goal=status.goal,
         physics=physics,
         planner=status.state,
-        agreed=physics is Judgement.HOLDS and status.state is GoalState.REACHED,
+        agreed=physics is Verdict.HOLDS and status.state is GoalState.REACHED,
         sentence=sentence,
         conditions=found,
     )
@@ -103,18 +103,18 @@ def _verdict(status: GoalStatus, seen: _Seen) -> Verdict:
 
 def _condition(condition: Condition, seen: _Seen) -> ConditionVerdict:
     """The best of what can be said of its subjects: one that holds is enough."""
-    said = [_for_subject(condition, subject, seen) for subject in condition.subjects]
-    judgements = [judgement for judgement, _ in said]
-    if Judgement.HOLDS in judgements:
-        judgement = Judgement.HOLDS
+    found = [_for_subject(condition, subject, seen) for subject in condition.subjects]
+    verdicts = [verdict for verdict, _ in found]
+    if Verdict.HOLDS in verdicts:
+        verdict = Verdict.HOLDS
     else:
-        unsure = Judgement.NOT_JUDGED in judgements
-        judgement = Judgement.NOT_JUDGED if unsure else Judgement.FAILS
-    sentence = "; ".join(sentence for found, sentence in said if found is judgement)
-    return ConditionVerdict(condition=condition, judgement=judgement, sentence=sentence)
+        unsure = Verdict.NOT_JUDGED in verdicts
+        verdict = Verdict.NOT_JUDGED if unsure else Verdict.FAILS
+    sentence = "; ".join(sentence for each, sentence in found if each is verdict)
+    return ConditionVerdict(condition=condition, verdict=verdict, sentence=sentence)
 
 
-def _for_subject(condition: Condition, subject: str, seen: _Seen) -> tuple[Judgement, str]:
+def _for_subject(condition: Condition, subject: str, seen: _Seen) -> tuple[Verdict, str]:
     relation, wanted = condition.relation, condition.value
     if relation == AT and subject in seen.truths:
         return _object_at(seen.truths[subject], wanted)
@@ -128,36 +128,36 @@ def _for_subject(condition: Condition, subject: str, seen: _Seen) -> tuple[Judge
         return _holds((by is not None) is wanted), f"{subject} is {where}"
     if relation == LOCATED and wanted is True and subject in seen.truths:
         return _located(seen.truths[subject], seen)
-    return Judgement.NOT_JUDGED, f"{condition} is not judged by physics"
+    return Verdict.NOT_JUDGED, f"{condition} is not judged by physics"
 
 
-def _holds(holds: bool) -> Judgement:
-    return Judgement.HOLDS if holds else Judgement.FAILS
+def _holds(holds: bool) -> Verdict:
+    return Verdict.HOLDS if holds else Verdict.FAILS
 
 
-def _located(truth: Truth, seen: _Seen) -> tuple[Judgement, str]:
+def _located(truth: Truth, seen: _Seen) -> tuple[Verdict, str]:
     """Whether the fleet has it where it is; what it takes to be on a robot is where that stands."""
-    told = seen.beliefs.get(truth.object)
+    belief = seen.beliefs.get(truth.object)
     where = truth.place or "no known place"
-    if told is None:
-        return Judgement.FAILS, f"{truth.object} lies in {where}, and the fleet does not know where"
-    name = str(told)
+    if belief is None:
+        return Verdict.FAILS, f"{truth.object} lies in {where}, and the fleet does not know where"
+    name = str(belief)
     place = seen.robot_places.get(name, name)
     right = place == truth.place
     rest = "as the fleet says" if right else f"and the fleet says in {place}"
     return _holds(right), f"{truth.object} is in {where}, {rest}"
 
 
-def _object_at(truth: Truth, wanted: object) -> tuple[Judgement, str]:
+def _object_at(truth: Truth, wanted: object) -> tuple[Verdict, str]:
     where = f"in {truth.place}" if truth.place else "in no known place"
     if truth.held_by is not None:
         return (
-            Judgement.FAILS,
+            Verdict.FAILS,
             f"{truth.object} is {where} but still in the hand of {truth.held_by}",
         )
     if not truth.settled:
-        return Judgement.FAILS, f"{truth.object} is {where} but has not come to rest"
+        return Verdict.FAILS, f"{truth.object} is {where} but has not come to rest"
     on = f" on {truth.support}" if truth.support else ""
     if truth.place != wanted:
-        return Judgement.FAILS, f"{truth.object} lies {where}{on}, not in {wanted}"
-    return Judgement.HOLDS, f"{truth.object} lies {where}{on}"
+        return Verdict.FAILS, f"{truth.object} lies {where}{on}, not in {wanted}"
+    return Verdict.HOLDS, f"{truth.object} lies {where}{on}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from keyexpr_schema.payloads.goals import GoalStatus
+from keyexpr_schema.payloads.goals import Condition, GoalStatus
 from keyexpr_schema.payloads.plans import PlanStatus
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -57,10 +57,14 @@ def doing(state: RobotState | None) -> str:
     return f"{state.plan}/{state.task}" if state.plan else state.task
 
 
+def stages(status: GoalStatus) -> tuple[tuple[Condition, ...], ...]:
+    """What must hold for a goal, stage by stage."""
+    return status.stages or ((status.conditions,) if status.conditions else ())
+
+
 def meaning(status: GoalStatus) -> str:
     """What a goal was understood as: its conditions, stage by stage."""
-    stages = status.stages or ((status.conditions,) if status.conditions else ())
-    return ", then ".join(" and ".join(str(each) for each in stage) for stage in stages)
+    return ", then ".join(" and ".join(str(each) for each in stage) for stage in stages(status))
 
 
 def statement_means(status: StatementStatus | None) -> str:
@@ -97,7 +101,7 @@ def outcome(status: PlanStatus) -> str:
     return "; ".join(parts)
 
 
-def natural(name: str) -> tuple[tuple[int, str], ...]:
+def natural_order(name: str) -> tuple[tuple[int, str], ...]:
     """A sort key that puts `t2` before `t10`."""
     return tuple(
         (int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", name)

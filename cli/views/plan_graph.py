@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from rich.table import Table
 from rich.text import Text
 
-from cli.show.plan_tree import MARKS, in_order
-from cli.show.words import STATE_STYLE, call, seconds
+from cli.views.plan_tree import MARKS, in_order
+from cli.views.text import STATE_STYLE, call, seconds
 from keyexpr_schema.ids import actor_arg, actor_in
 from keyexpr_schema.payloads.plans import Plan, PlanStatus, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState

@@ -10,7 +10,7 @@ from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotA
 from fleet.allocators.load_balancing import Unbalanced, balance
 from fleet.allocators.reasons import not_apart
 from keyexpr_schema.facts import AT, Value
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_arg
 
 NEVER_S = 1e9
 """Cost of a robot that cannot be the actor, s: more than any travel, and safe to add up."""
@@ -106,7 +106,7 @@ def _trips(problem: AllocationProblem) -> dict[str, _Trip]:
         if action.skill.travel_to is not None:
             to.setdefault(actor, action.args[action.skill.travel_to])
         for literal in action.after:
-            if literal.variable == (AT, ACTOR_PREFIX + actor):
+            if literal.variable == (AT, actor_arg(actor)):
                 ends[actor] = literal.value
     return {actor: _Trip(to.get(actor), ends.get(actor)) for actor in problem.able}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 
 from fleet.allocators.base import AllocationProblem, NotAllocated
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import bare_name
 from keyexpr_schema.payloads.plans import Violation
 
 NAMED = 6
@@ -58,4 +58,4 @@ def _why(problem: AllocationProblem, group: Sequence[str]) -> str:
 
 
 def _actors(participants: Iterable[str]) -> set[str]:
-    return {name.removeprefix(ACTOR_PREFIX) for name in participants}
+    return {bare_name(name) for name in participants}

@@ -31,11 +31,14 @@ COMPONENTS = {
 """By the name that a session goes by, up to the first hyphen."""
 
 NOT_WRITTEN = {
-    # Whoever cannot read a value writes it, and here no worker and no
-    # simulation has to read such a thing.
+    # Who cannot read a value says so; here nothing of that kind is for workers or the simulation.
     "reject": Component.WORKER | Component.SIMULATION,
 }
-NOT_READ: dict[str, Component] = {}
+NOT_READ = {
+    # A worker that comes back looks up what it reported last; a simulation, whether one runs.
+    "report": Component.OWN_WORKER,
+    "sim_clock": Component.SIMULATION,
+}
 """What the table allows, and this mission has no need of."""
 
 PLAN = """

@@ -129,8 +129,8 @@ def worker(
     ] = SIM,
 ) -> None:
     """Run one robot's worker: it takes orders and carries them out."""
-    from cli.errors import check_known
     from cli.demo.child_processes import end_with_parent
+    from cli.errors import check_known
     from keyexpr_schema.plug_ins import plug_in_names
     from sim.embodiment import sim_embodiment
     from workers.embodiment import EMBODIMENTS, installed_embodiment

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from workers.skill import Skill
+from workers.skill_registry import Skill
 from workers.skills.navigate import navigate
 from workers.skills.pick import pick
 from workers.skills.place import place

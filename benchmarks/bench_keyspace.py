@@ -20,6 +20,7 @@ from rich.table import Table
 
 from fleet.service.router_process import with_port
 from fleet.stores.sqlite import SqliteStore
+from keyexpr_schema.facts import AT
 from keyexpr_schema.keyspace import FACT, STORE_JOURNAL
 from keyexpr_schema.payloads.service import StoreAddress, StoreQuery
 from keyexpr_schema.payloads.world import Fact, FactAddress
@@ -75,7 +76,7 @@ def _router(data: Path) -> Iterator[str]:
 
 
 def _fact(value: int) -> Fact:
-    return Fact(subject="cup", relation="at", value=value, source="benchmark")
+    return Fact(subject="cup", relation=AT, value=value, source="benchmark")
 
 
 async def _measured(
@@ -97,7 +98,7 @@ async def _measured(
 
 
 def _at(subject: str) -> FactAddress:
-    return FactAddress(subject, "at")
+    return FactAddress(subject, AT)
 
 
 def _confirm(session: Session) -> Callable[[int], Awaitable[object]]:

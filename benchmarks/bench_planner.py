@@ -21,6 +21,7 @@ from fleet.core.checker.plan_checker import check_plan
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.service.composition import Composition, compose
+from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -97,9 +98,9 @@ def household(goals: int, robots: int, parts: Composition) -> WorldModel:
         for i in range(goals)
     )
     specs = tuple(_robot(i) for i in range(robots))
-    facts = [_fact(cup.object, "at", f"room_{i % PLACES}") for i, cup in enumerate(cups)]
-    facts += [_fact(s.robot, "at", f"room_{i * 2 % PLACES}") for i, s in enumerate(specs)]
-    facts += [_fact(s.robot, "holding", "nothing") for s in specs if "grip" in s.capabilities]
+    facts = [_fact(cup.object, AT, f"room_{i % PLACES}") for i, cup in enumerate(cups)]
+    facts += [_fact(s.robot, AT, f"room_{i * 2 % PLACES}") for i, s in enumerate(specs)]
+    facts += [_fact(s.robot, HOLDING, NOTHING) for s in specs if "grip" in s.capabilities]
     return WorldModel.of(parts.skills, places, cups, specs, facts)
 
 
@@ -130,7 +131,7 @@ def goals_of(count: int) -> tuple[Goal, ...]:
             text=f"bring cup {i}",
             conditions=(
                 Condition(
-                    relation="at",
+                    relation=AT,
                     subject=f"cup_{i}",
                     value=f"room_{(i + 1 + i % (PLACES - 1)) % PLACES}",
                 ),
@@ -199,7 +200,7 @@ def big_plan(tasks: int, parts: Composition) -> tuple[Plan, WorldModel]:
             after = (rows[-1].task,) if number else ()
             rows.append(Task(task=name, skill=skill, args=args, actor=f"a{i}", after=after))
     conditions = tuple(
-        Condition(relation="at", subject=f"cup_{i}", value=f"room_{(i + 1) % PLACES}")
+        Condition(relation=AT, subject=f"cup_{i}", value=f"room_{(i + 1) % PLACES}")
         for i in range(count)
     )
     return Plan(plan="p", goals=(), conditions=conditions, tasks=tuple(rows)), world

@@ -21,10 +21,11 @@ from fleet.core import events
 from fleet.core.dispatch.delays import FACTOR, MARGIN_S
 from fleet.core.effects import MakePlan
 from fleet.core.events import PlanningSucceeded
-from fleet.core.state import OUTSTANDING, PlanBook, Policy, State
+from fleet.core.state import OUTSTANDING, PlanEntry, Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
 from fleet.service.planning_job import carry_out
+from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import PlanChange
 from keyexpr_schema.payloads.requests import PlanRequest, ReplanRequest
@@ -54,13 +55,13 @@ def main() -> None:
         for _ in range(DONE_BEFORE):
             running.succeed()
         each_s = (time.perf_counter() - began_s) / (2 * DONE_BEFORE)
-        before = running.book.allocation
+        before = running.entry.allocation
         happens(running)
-        book, made = running.book, running.made
-        moved = sum(before.get(actor, robot) != robot for actor, robot in book.allocation.items())
-        changed = book.change or PlanChange()
+        entry, made = running.entry, running.made
+        moved = sum(before.get(actor, robot) != robot for actor, robot in entry.allocation.items())
+        changed = entry.change or PlanChange()
         changes = [str(n) for n in (changed.kept, changed.dropped, changed.added)]
-        least = next((n.split(" is ")[-1] for n in book.notes if "least found" in n), "")
+        least = next((n.split(" is ")[-1] for n in entry.notes if "least found" in n), "")
         table.add_row(
             (happens.__doc__ or "").split(".")[0],
             f"{made.planning_time_s:.2f} s",
@@ -97,22 +98,22 @@ class Running:
             )  # fmt: skip
             self.tell(events.RobotRegistered, spec=spec)
             self.tell(events.WorkerConnected, robot=spec.robot, incarnation="i1")
-            self.learn(spec.robot, "holding", "nothing")
-            self.learn(spec.robot, "at", f"room_{number % PLACES}")
+            self.learn(spec.robot, HOLDING, NOTHING)
+            self.learn(spec.robot, AT, f"room_{number % PLACES}")
         for number in range(self.goals):
             self.tell(
                 events.ObjectPut,
                 object=Object(object=f"c{number}", kind="cup", label=f"c{number}"),
             )
-            self.learn(f"c{number}", "at", f"room_{number % PLACES}")
+            self.learn(f"c{number}", AT, f"room_{number % PLACES}")
             wanted = f"room_{(number + 1 + number // PLACES % (PLACES - 1)) % PLACES}"
-            condition = Condition(relation="at", subject=f"c{number}", value=wanted)
+            condition = Condition(relation=AT, subject=f"c{number}", value=wanted)
             goal = Goal(goal=f"g{number}", text="", conditions=(condition,), ordinal=number)
             self.tell(events.GoalPut, goal=goal)
         self.tell(events.PlanRequested, request=PlanRequest(request="r", plan="p"))
 
     @property
-    def book(self) -> PlanBook:
+    def entry(self) -> PlanEntry:
         """What is kept of the plan."""
         return self.state.plans["p"]
 
@@ -136,7 +137,7 @@ class Running:
 
     def outstanding(self) -> list[TaskRecord]:
         """Tasks that robots are at."""
-        return [record for record in self.book.records.values() if record.state in OUTSTANDING]
+        return [record for record in self.entry.records.values() if record.state in OUTSTANDING]
 
     def succeed(self) -> None:
         """Some robot starts its task and ends it."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from cli.errors import TooLate
 from keyexpr_schema.errors import Unreachable
+from keyexpr_schema.facts import FactKey
 from keyexpr_schema.key import Payload
 from keyexpr_schema.keyspace import (
     FACT,
@@ -60,7 +61,7 @@ SYNC_S = 10.0
 class Board:
     """The latest value of every key that matters to a person who watches; by its address.
 
-    `tasks` are by (plan, task), `facts` by (subject, relation), all else by the one id.
+    `tasks` are by (plan, task), all else by the one id.
 
     `changed` is set after each change; whoever waits clears it first (see `until`).
     """
@@ -72,7 +73,7 @@ class Board:
     tasks: dict[tuple[str, str], TaskRecord] = field(default_factory=dict)
     specs: dict[str, RobotSpec] = field(default_factory=dict)
     robots: dict[str, RobotState] = field(default_factory=dict)
-    facts: dict[tuple[str, str], Fact] = field(default_factory=dict)
+    facts: dict[FactKey, Fact] = field(default_factory=dict)
     rejects: dict[tuple[str, str], Reject] = field(default_factory=dict)
     truths: dict[str, Truth] = field(default_factory=dict)
     senses: dict[str, Senses] = field(default_factory=dict)
@@ -90,6 +91,8 @@ class Board:
             fields = change.address.__struct_fields__
             parts = tuple(getattr(change.address, name) for name in fields)
             where = parts if len(parts) > 1 else parts[0]
+            if change.key is FACT:
+                where = change.address.key
             if value is None:
                 shelf.pop(where, None)
             else:

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import msgspec
 
+from keyexpr_schema.facts import AT, HELD, LOCATED, Value
 from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
 from keyexpr_schema.payloads.simulation import Truth
-from keyexpr_schema.payloads.world import Value
 
 
 class Judgement(str, Enum):
@@ -116,17 +116,17 @@ def _condition(condition: Condition, seen: _Seen) -> ConditionVerdict:
 
 def _for_subject(condition: Condition, subject: str, seen: _Seen) -> tuple[Judgement, str]:
     relation, wanted = condition.relation, condition.value
-    if relation == "at" and subject in seen.truths:
+    if relation == AT and subject in seen.truths:
         return _object_at(seen.truths[subject], wanted)
-    if relation == "at" and subject in seen.robot_places:
+    if relation == AT and subject in seen.robot_places:
         place = seen.robot_places[subject]
         aim = "" if place == wanted else f", not in {wanted}"
         return _holds(place == wanted), f"{subject} stands in {place or 'no known place'}{aim}"
-    if relation == "held" and subject in seen.truths:
+    if relation == HELD and subject in seen.truths:
         by = seen.truths[subject].held_by
         where = f"in the hand of {by}" if by else "in nobody's hand"
         return _holds((by is not None) is wanted), f"{subject} is {where}"
-    if relation == "located" and wanted is True and subject in seen.truths:
+    if relation == LOCATED and wanted is True and subject in seen.truths:
         return _located(seen.truths[subject], seen)
     return Judgement.NOT_JUDGED, f"{condition} is not judged by physics"
 

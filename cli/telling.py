@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import math
 import time
 from collections.abc import Iterable
 from contextlib import suppress
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING
 from cli.errors import BadArgument, Unknown, check_known
 from cli.naming import free_name
 from cli.presence import planner_alive
+from keyexpr_schema.facts import AT, parse_value
 from keyexpr_schema.keyspace import (
     FACT,
     GOAL_SPEC,
@@ -39,7 +39,6 @@ from keyexpr_schema.payloads.world import (
     Statement,
     StatementAddress,
     StatementStatus,
-    Value,
 )
 
 if TYPE_CHECKING:
@@ -132,9 +131,8 @@ async def add_fact(session: Session, relation: str, subject: str, written: str) 
     Raises:
         Unknown: `at` of something that is no object or robot, or of a place that is none.
     """
-    address = FactAddress(subject, relation)
     value = parse_value(written)
-    if relation == "at":
+    if relation == AT:
         how = "load a world with `robotctl world load FILE`"
         robots = [a.robot for a in await session.list(ROBOT_SPEC)]
         objects = [a.object for a in await session.list(OBJECT)]
@@ -149,7 +147,7 @@ async def add_fact(session: Session, relation: str, subject: str, written: str) 
         source="person",
         time_s=await fleet_time_s(session),
     )
-    await session.confirm(FACT, address, fact)
+    await session.confirm(FACT, FactAddress.of(fact.key), fact)
     return fact
 
 
@@ -175,20 +173,6 @@ async def fleet_time_s(session: Session) -> float:
         return time.time()
     states = (await session.list(ROBOT_STATE)).values()
     return max((state.time_s for state in states), default=0.0)
-
-
-def parse_value(written: str) -> Value:
-    """`unknown`, `true`, `false`, a number, or the word itself."""
-    words: dict[str, Value] = {"unknown": None, "true": True, "false": False}
-    if written in words:
-        return words[written]
-    try:
-        number = float(written)
-    except ValueError:
-        return written
-    if not math.isfinite(number):  # JSON has no such number
-        return written
-    return int(number) if number.is_integer() and "." not in written else number
 
 
 async def put_goal(

@@ -30,13 +30,13 @@ from sim.embodiment import sim_embodiment
 from workers.context import SkillContext
 from workers.errors import SkillFailed, WorkerError
 from workers.process import run
-from workers.skill import Kind, skill
+from workers.skill import ParameterKind, skill
 from workers.skills.household import HOUSEHOLD
 
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 
 
-@skill("count", parameters={"place": Kind.PLACE})
+@skill("count", parameters={"place": ParameterKind.PLACE})
 async def count(ctx: SkillContext, place: str) -> None:
     """Count the things that lie in a place, kind by kind."""
     kinds = sorted({thing.kind for thing in ctx.world.objects.values()})
@@ -48,8 +48,8 @@ async def count(ctx: SkillContext, place: str) -> None:
     for kind in kinds:
         here = [d for d in seen if d.kind == kind and ctx.world.whereabouts(d) == place]
         ctx.log(f"sees {len(here)} of kind {kind} in {place}")
-        ctx.learn(f"count_{kind}", place, len(here))
-    ctx.learn("counted", place, True)
+        ctx.observe(f"count_{kind}", place, len(here))
+    ctx.observe("counted", place, True)
 
 
 def main() -> None:

@@ -14,6 +14,10 @@ class BadSkillFile(FleetError):
     """A skill model cannot be read; the message says which skill and field, and what is right."""
 
 
+class BadLlmConfig(FleetError):
+    """Configuration or prompts of a language model are wrong; one sentence says where and why."""
+
+
 class NotUnderstood(FleetError):
     """A sentence could not be turned into facts; the message says which words, and the choices."""
 

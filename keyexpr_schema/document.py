@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from keyexpr_schema.key import Key
+from keyexpr_schema.key import Component
 from keyexpr_schema.keyspace import KEYSPACE
 
 DEFAULT_PATH = Path("docs/keyspace.md")
@@ -30,7 +30,10 @@ or `-`, the first a letter or a digit.
 What becomes of a value: *stored* values are kept by the store, the latest by Zenoh timestamp wins,
 and a deletion leaves a tombstone; of *stored, latest matters* values a slow reader may miss all but
 the last; *not stored* values reach whoever listens; a *liveliness token* is there while its owner
-is connected; *query and reply* keys are asked with a payload and answer with another.
+is connected; *query and reply* keys are written by who sends the query, and read by who replies.
+
+A *person* uses the fleet by robotctl or a program of their own; an *own worker* is the worker of
+the robot that the key names, a *worker* that of any robot.
 """
 
 
@@ -38,7 +41,7 @@ def document() -> str:
     """The page, in Markdown."""
     lines = [
         _PREAMBLE,
-        "| key | payload | writer | readers | kept |",
+        "| key | payload | written by | read by | delivery |",
         "| --- | --- | --- | --- | --- |",
     ]
     for key in KEYSPACE:
@@ -46,10 +49,11 @@ def document() -> str:
         if key.reply is not None:
             payload += f" → {_link(key.reply)}"
         lines.append(
-            f"| `{key.template}` | {payload} | {key.writer} | {key.readers} | {key.kept.value} |"
+            f"| `{key.template}` | {payload} | {_named(key.writers)} | {_named(key.readers)} "
+            f"| {key.delivery.value} |"
         )
     lines.append("\n## Keys\n")
-    lines += [f"- `{key.template}` (`{_schema(key)}`): {key.about}" for key in KEYSPACE]
+    lines += [f"- `{key.template}` (`{key.schema}`): {key.about}" for key in KEYSPACE]
     lines.append("\n## Payloads")
     for kind in _payloads():
         lines.append(f"\n### {kind.__name__}\n\n{inspect.cleandoc(kind.__doc__ or '')}\n")
@@ -59,8 +63,10 @@ def document() -> str:
     return "\n".join(lines) + "\n"
 
 
-def _schema(key: Key[Any, Any]) -> str:
-    return key.schema
+def _named(components: Component) -> str:
+    if components == Component.ANYONE:
+        return "anyone"
+    return ", ".join(str(each.name).lower().replace("_", " ") for each in components)
 
 
 def _link(kind: type[Any]) -> str:

@@ -19,6 +19,10 @@ class UndecodablePayload(SchemaError):
     """Bytes on a key are not a payload of the type that the key promises."""
 
 
+class NoConfigFile(SchemaError):
+    """No configuration file has the name that was given."""
+
+
 class Unreachable(SchemaError):
     """No router answers at the configured endpoints."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, Flag, auto
 from typing import Generic, TypeVar
 
 import msgspec
@@ -41,7 +41,23 @@ A = TypeVar("A", bound=Address)
 P = TypeVar("P", bound=Payload)
 
 
-class Kept(Enum):
+class Component(Flag):
+    """Who writes and reads keys; flags, so that `PLANNER | PERSON` is both."""
+
+    PERSON = auto()
+    """Whoever uses the fleet: by robotctl, or by a program of one's own."""
+    PLANNER = auto()
+    WORKER = auto()
+    """The worker of any robot."""
+    OWN_WORKER = auto()
+    """The worker of the robot that the key names, and no other."""
+    SIMULATION = auto()
+    RECORDER = auto()
+    STORE = auto()
+    ANYONE = PERSON | PLANNER | WORKER | SIMULATION | RECORDER
+
+
+class Delivery(Enum):
     """What becomes of a value after it is put."""
 
     STORED = "stored"
@@ -57,16 +73,18 @@ class Key(Generic[A, P]):
     """One row of the key-space.
 
     `template` is a key expression whose `{field}` chunks are the fields of `address`.
-    `reply` is the payload type of the answer where `kept` is `QUERY`.
+    `writers` put or delete values of type `payload`, or hold the token; `readers` get or watch
+    them. Where `delivery` is `QUERY`, writers send `payload` as a query and readers serve it, with
+    a reply of type `reply`.
     """
 
     name: str
     template: str
     address: type[A]
     payload: type[P]
-    writer: str
-    readers: str
-    kept: Kept
+    writers: Component
+    readers: Component
+    delivery: Delivery
     about: str
     version: int = 1
     reply: type[Payload] | None = None
@@ -86,7 +104,7 @@ class Key(Generic[A, P]):
     @property
     def stored(self) -> bool:
         """Whether the store keeps the value."""
-        return self.kept in (Kept.STORED, Kept.LATEST)
+        return self.delivery in (Delivery.STORED, Delivery.LATEST)
 
     def build(self, address: A) -> str:
         """The key expression of `address`, canonical and without wildcards."""

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
-from sim.world_schema import WorldFile
+from sim.files.world_schema import WorldFile
 
 NEEDS: dict[MotionKind, tuple[str, ...]] = {
     MotionKind.GO_TO: ("place",),

@@ -13,7 +13,7 @@ from keyexpr_schema.payloads.motions import Motion, MotionOutcome, MotionState, 
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.simulation import MotionCall, SimRobotAddress
 from keyexpr_schema.transport.session import Session
-from workers.errors import BodyUnreachable
+from workers.errors import RobotUnreachable
 
 POLL_S = 1.0
 """Wall time for which one question is left open at the simulation."""
@@ -27,7 +27,7 @@ class SimEmbodiment(AbstractAsyncContextManager["SimEmbodiment"]):
 
     Every motion is a call with a name of its own: asked as often as it takes until the answer is
     there, carried out once. `patience_s` is how long, in wall time, router or simulation may be
-    away before a method raises `BodyUnreachable`.
+    away before a method raises `RobotUnreachable`.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class SimEmbodiment(AbstractAsyncContextManager["SimEmbodiment"]):
         """Carry out `motion` once; see `workers.embodiment.Embodiment.perform`.
 
         Raises:
-            BodyUnreachable: the simulation did not answer for `patience_s`.
+            RobotUnreachable: the simulation did not answer for `patience_s`.
         """
         call = self._call(motion)
         try:
@@ -78,7 +78,7 @@ class SimEmbodiment(AbstractAsyncContextManager["SimEmbodiment"]):
         """What the robot knows of itself.
 
         Raises:
-            BodyUnreachable: the simulation did not answer for `patience_s`.
+            RobotUnreachable: the simulation did not answer for `patience_s`.
         """
         return (await self._ask(self._call(None))).senses
 
@@ -86,7 +86,7 @@ class SimEmbodiment(AbstractAsyncContextManager["SimEmbodiment"]):
         """Bring the robot to rest, whatever it does.
 
         Raises:
-            BodyUnreachable: the simulation did not answer for `patience_s`.
+            RobotUnreachable: the simulation did not answer for `patience_s`.
         """
         await self._ask(
             MotionCall(call=_name(), incarnation=self._incarnation, stop=True, wait_s=POLL_S)
@@ -97,7 +97,7 @@ class SimEmbodiment(AbstractAsyncContextManager["SimEmbodiment"]):
 
     async def _halt(self, call: MotionCall) -> None:
         stop = MotionCall(call=call.call, incarnation=self._incarnation, stop=True, wait_s=POLL_S)
-        with suppress(BodyUnreachable, TimeoutError):
+        with suppress(RobotUnreachable, TimeoutError):
             async with asyncio.timeout(2 * POLL_S):
                 await self._ask(stop)
 
@@ -113,7 +113,7 @@ class SimEmbodiment(AbstractAsyncContextManager["SimEmbodiment"]):
                 )
             except NoAnswer as error:
                 if loop.time() + pause_s > deadline_s:
-                    raise BodyUnreachable(f"the simulation does not answer: {error}") from None
+                    raise RobotUnreachable(f"the simulation does not answer: {error}") from None
                 await asyncio.sleep(pause_s)
                 pause_s = min(1.0, 2 * pause_s)
             else:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from sim.files.mission_file import Mission
 from sim.mujoco_world.description import load_description
 from sim.mujoco_world.driving import REACH_MARGIN_M
 from sim.navigation.clearance import Clearance
 from sim.navigation.lattice import Lattice
 from sim.navigation.spots import Spots
-from sim.world_schema import Mission
 
 
 def out_of_reach(mission: Mission) -> tuple[str, ...]:
@@ -21,7 +21,7 @@ def out_of_reach(mission: Mission) -> tuple[str, ...]:
     """
     hands = []
     for robot in mission.robots:
-        about = load_description(robot.spec.model).description
+        about = load_description(robot.spec.model, robot.folder).description
         if "pick" in robot.spec.skills and about.arm is not None:
             least, greatest = about.arm.reach_m
             reach_m = (least + REACH_MARGIN_M, greatest - REACH_MARGIN_M)

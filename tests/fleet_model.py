@@ -11,16 +11,17 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.core import events
 from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.state import OUTSTANDING, PlanBook, Policy, State
+from fleet.core.state import OUTSTANDING, PlanEntry, Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
 from fleet.service.planning_job import carry_out
+from keyexpr_schema.facts import Value
 from keyexpr_schema.keyspace import ORDER
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskState
-from keyexpr_schema.payloads.world import Fact, Value
+from keyexpr_schema.payloads.world import Fact
 from tests.household import PLACES, SKILLS, cup
 
 _ALL = compose()
@@ -73,10 +74,10 @@ class FleetModel:
             assert effects == ()
             return
         self.journal.append(encode_event(event))
-        for plan, book in self.state.plans.items():
+        for plan, entry in self.state.plans.items():
             old = before.plans.get(plan)
-            if old is not None and book.plan.revision > old.plan.revision:
-                check_revision(old, book)
+            if old is not None and entry.plan.revision > old.plan.revision:
+                check_revision(old, entry)
         self._take(effects)
 
     def _take(self, effects: tuple[Effect, ...]) -> None:
@@ -101,11 +102,11 @@ class FleetModel:
         assert self.given.setdefault(attempt, order.robot) == order.robot, (
             "an attempt changed hands"
         )
-        book = self.state.plans[order.plan]
-        record = book.records[order.task]
+        entry = self.state.plans[order.plan]
+        record = entry.records[order.task]
         for before in (*record.after, *record.behind):
-            if before in book.records:
-                assert book.records[before].state.value == "succeeded", "ordered before its time"
+            if before in entry.records:
+                assert entry.records[before].state.value == "succeeded", "ordered before its time"
         busy = [
             other
             for other in self.orders()
@@ -227,7 +228,7 @@ class FleetModel:
         self._take(effects_of(self.state))
 
 
-def check_revision(old: PlanBook, new: PlanBook) -> None:
+def check_revision(old: PlanEntry, new: PlanEntry) -> None:
     """What a revision says of itself is so, and what it keeps of running work is left alone."""
     assert new.change is not None
     names = {task.task for task in new.plan.tasks}

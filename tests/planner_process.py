@@ -95,7 +95,7 @@ async def person(endpoint: str) -> AsyncIterator[Session]:
             await session.confirm(PLACE, PlaceAddress(place.place), place)
         await session.confirm(OBJECT, ObjectAddress("cup_1"), cup(1))
         for known in (fact("cup_1", "at", "kitchen"), fact("hsr", "holding", "nothing")):
-            await session.confirm(FACT, FactAddress(known.subject, known.relation), known)
+            await session.confirm(FACT, FactAddress.of(known.key), known)
         yield session
 
 

@@ -12,12 +12,12 @@ from itertools import product
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from fleet.core.model.skills import Action, Variable, skills_from_data
+from fleet.core.model.skills import Action, skills_from_data
 from fleet.core.model.world import WorldModel, condition_holds, first_unmet, room_left
 from fleet.planners.deordering import Strand, tasks_from
+from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan, Task
-from keyexpr_schema.payloads.world import Value
 from tests.household import PLACES, SKILLS, UNLOAD, at, carrier, cup, fact, manipulator
 
 MOST_TASKS = 6
@@ -76,28 +76,28 @@ def _possible(model: WorldModel) -> list[Action]:
 
 WORLD = world()
 POSSIBLE = _possible(WORLD)
-STARTS: tuple[dict[Variable, Value], ...] = (
+STARTS: tuple[dict[FactKey, Value], ...] = (
     {},
     {  # a cup in the hand, and a basket beside it
-        Variable("at", "hsr"): "hallway",
-        Variable("holding", "hsr"): "cup_1",
-        Variable("at", "cup_1"): "hsr",
+        FactKey("at", "hsr"): "hallway",
+        FactKey("holding", "hsr"): "cup_1",
+        FactKey("at", "cup_1"): "hsr",
     },
     {  # the same, and the basket is full
-        Variable("at", "hsr"): "hallway",
-        Variable("holding", "hsr"): "cup_1",
-        Variable("at", "cup_1"): "hsr",
-        Variable("at", "cup_2"): "locobot",
+        FactKey("at", "hsr"): "hallway",
+        FactKey("holding", "hsr"): "cup_1",
+        FactKey("at", "cup_1"): "hsr",
+        FactKey("at", "cup_2"): "locobot",
     },
     {  # a full basket, and an empty hand beside it
-        Variable("at", "hsr"): "hallway",
-        Variable("at", "cup_2"): "locobot",
-        Variable("full", "cup_2"): True,
+        FactKey("at", "hsr"): "hallway",
+        FactKey("at", "cup_2"): "locobot",
+        FactKey("full", "cup_2"): True,
     },
 )
 
 
-def doable(action: Action, facts: dict[Variable, Value]) -> bool:
+def doable(action: Action, facts: dict[FactKey, Value]) -> bool:
     """Whether the action can be done in these facts."""
     return first_unmet(action, facts, WORLD) is None and all(
         room_left(robot, facts, WORLD) > 0 for robot in action.space_in
@@ -108,7 +108,7 @@ def doable(action: Action, facts: dict[Variable, Value]) -> bool:
 def plans(draw: st.DrawFn) -> tuple[Plan, WorldModel]:
     """A plan whose actors are the robots of `ALLOCATION`, right or a little wrong, and a world."""
     start = draw(st.sampled_from(STARTS))
-    facts: dict[Variable, Value] = {**WORLD.facts, **start}
+    facts: dict[FactKey, Value] = {**WORLD.facts, **start}
     walk: list[Action] = []
     for _ in range(draw(st.integers(1, MOST_TASKS))):
         ready = [action for action in POSSIBLE if doable(action, facts)]
@@ -128,7 +128,7 @@ def plans(draw: st.DrawFn) -> tuple[Plan, WorldModel]:
     tasks = [_named(task, {t.actor for t in tasks}) for task in tasks]
     goal = _goal(draw, facts)
     # Where a cup rides along from the start, the plan has to say whom it rides with.
-    riding = [start.get(Variable("at", subject)) for subject in goal.subjects]
+    riding = [start.get(FactKey("at", subject)) for subject in goal.subjects]
     pins = {
         actor: robot
         for actor, robot in ALLOCATION.items()
@@ -188,7 +188,7 @@ def _hurt(draw: st.DrawFn, tasks: list[Task]) -> None:
                 tasks[i] = replace(other, after=tuple(dict.fromkeys((*after, *task.after))))
 
 
-def _goal(draw: st.DrawFn, facts: dict[Variable, Value]) -> Condition:
+def _goal(draw: st.DrawFn, facts: dict[FactKey, Value]) -> Condition:
     """Mostly one that holds after the walk, of all forms that there are."""
     goals = [
         *(at(c, place) for c in WORLD.objects for place in ("kitchen", "hallway", "locobot")),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 
+from keyexpr_schema.facts import AT, HOLDING, NOTHING, ON, FactKey, Value
 from keyexpr_schema.payloads.motions import (
     Detection,
     Motion,
@@ -14,10 +15,10 @@ from keyexpr_schema.payloads.motions import (
     Senses,
 )
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec, RobotState
-from keyexpr_schema.payloads.world import NOTHING, Fact, FactAddress, Value
+from keyexpr_schema.payloads.world import Fact
 from workers.embodiment import Embodiment
 from workers.errors import SkillFailed
-from workers.world_cache import WorldView
+from workers.world_cache import WorldCache
 
 
 class SkillContext:
@@ -27,12 +28,12 @@ class SkillContext:
     and goes out as facts just before the final report.
     """
 
-    def __init__(self, spec: RobotSpec, body: Embodiment, world: WorldView) -> None:
+    def __init__(self, spec: RobotSpec, body: Embodiment, world: WorldCache) -> None:
         self.robot: str = spec.robot
         self.spec = spec
         self.body = body
         self.world = world
-        self._learned: dict[FactAddress, Fact] = {}
+        self._observed: dict[FactKey, Fact] = {}
         self._log = logging.getLogger(f"robotfleet.worker.{spec.robot}")
 
     @property
@@ -41,13 +42,13 @@ class SkillContext:
         return self.body.now_s()
 
     @property
-    def learned(self) -> tuple[Fact, ...]:
+    def observed(self) -> tuple[Fact, ...]:
         """Everything learned in this attempt so far."""
-        return tuple(self._learned.values())
+        return tuple(self._observed.values())
 
-    def learn(self, relation: str, subject: str, value: Value) -> None:
+    def observe(self, relation: str, subject: str, value: Value) -> None:
         """Note that `relation(subject)` is `value` now; `None` says that it is unknown."""
-        self._learned[FactAddress(subject, relation)] = Fact(
+        self._observed[FactKey(relation, subject)] = Fact(
             subject=subject,
             relation=relation,
             value=value,
@@ -55,10 +56,10 @@ class SkillContext:
             time_s=self.now_s,
         )
 
-    def taught(self, failure: SkillFailed) -> None:
+    def observe_failure(self, failure: SkillFailed) -> None:
         """Learn the facts that a failure brought."""
         for relation, subject, value in failure.facts:
-            self.learn(relation, subject, value)
+            self.observe(relation, subject, value)
 
     def log(self, sentence: str) -> None:
         """Tell the person who watches this worker's output."""
@@ -112,23 +113,23 @@ class SkillContext:
         seen = (await self.do(MotionKind.LOOK)).detections
         for detection in seen:
             where = self.world.whereabouts(detection)
-            if where is not None and self._believed(detection.object) != where:
-                self.learn("at", detection.object, where)
+            if where is not None and self._known(detection.object) != where:
+                self.observe(AT, detection.object, where)
             # In a basket it is at the robot, which says all; `on` is of furniture and the floor.
-            if where in self.world.places and self._believed(detection.object, "on") != (
+            if where in self.world.places and self._known(detection.object, ON) != (
                 detection.support
             ):
-                self.learn("on", detection.object, detection.support)
+                self.observe(ON, detection.object, detection.support)
         return seen
 
     async def holding(self) -> str | None:
         """The object in the hand, by the hand's own sensor; what it says is learned."""
         held = (await self.body.senses()).holding
-        self.learn("holding", self.robot, NOTHING if held is None else held)
+        self.observe(HOLDING, self.robot, NOTHING if held is None else held)
         if held is not None:
-            self.learn("at", held, self.robot)
-            if self._believed(held, "on") is not None:
-                self.learn("on", held, None)
+            self.observe(AT, held, self.robot)
+            if self._known(held, ON) is not None:
+                self.observe(ON, held, None)
         return held
 
     async def be_in(self, place: str) -> Senses:
@@ -144,9 +145,9 @@ class SkillContext:
         if senses.place != place:
             self.log(f"is in {senses.place or 'no place'}, not in {place}: goes there first")
             senses = (await self.do(MotionKind.GO_TO, place=place)).senses
-        self.learn("at", self.robot, place)
+        self.observe(AT, self.robot, place)
         return senses
 
-    def _believed(self, object: str, relation: str = "at") -> Value:
-        fact = self._learned.get(FactAddress(object, relation))
-        return fact.value if fact is not None else self.world.belief(relation, object)
+    def _known(self, object: str, relation: str = AT) -> Value:
+        fact = self._observed.get(FactKey(relation, object))
+        return fact.value if fact is not None else self.world.value_of(relation, object)

@@ -46,7 +46,7 @@ class Embodiment(Protocol):
         keeps in its hand what it holds.
 
         Raises:
-            BodyUnreachable: the driver does not answer; whether the robot moved is unknown.
+            RobotUnreachable: the driver does not answer; whether the robot moved is unknown.
         """
         ...
 
@@ -54,7 +54,7 @@ class Embodiment(Protocol):
         """What the robot knows of itself without looking. Callable while a motion runs.
 
         Raises:
-            BodyUnreachable: the driver does not answer.
+            RobotUnreachable: the driver does not answer.
         """
         ...
 
@@ -62,7 +62,7 @@ class Embodiment(Protocol):
         """Bring the robot to rest, whatever it is doing, without opening its hand.
 
         Raises:
-            BodyUnreachable: the driver does not answer.
+            RobotUnreachable: the driver does not answer.
         """
         ...
 

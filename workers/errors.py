@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from keyexpr_schema.payloads.world import Value
+from keyexpr_schema.facts import Value
 
-Learned = tuple[str, str, Value]
+Observation = tuple[str, str, Value]
 """One thing learned: `(relation, subject, value)`, e.g. `("at", "cup_1", None)` for *unknown*."""
 
 
@@ -16,11 +16,11 @@ class SkillFailed(WorkerError):
     """A skill could not do what it was asked to, for a reason that lies in the world.
 
     `reason` is a sentence; `retryable` says whether trying again here and now could help;
-    `facts` is what the failure taught, beside what `SkillContext.learn` was told.
+    `facts` is what the failure taught, beside what `SkillContext.observe` was told.
     """
 
     def __init__(
-        self, reason: str, *, retryable: bool = True, facts: tuple[Learned, ...] = ()
+        self, reason: str, *, retryable: bool = True, facts: tuple[Observation, ...] = ()
     ) -> None:
         super().__init__(reason)
         self.reason = reason
@@ -28,7 +28,7 @@ class SkillFailed(WorkerError):
         self.facts = facts
 
 
-class BodyUnreachable(WorkerError):
+class RobotUnreachable(WorkerError):
     """The driver of the robot does not answer. Raised by embodiments; a try fails of it."""
 
 

@@ -16,7 +16,7 @@ from keyexpr_schema.keyspace import ROBOT_SPEC
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from workers.embodiment import Embodiment, EmbodimentFactory
-from workers.journal import Journal
+from workers.orders.journal import Journal
 from workers.runtime import Worker
 from workers.skill import Skill, SkillRegistry
 from workers.skills.household import HOUSEHOLD

@@ -6,13 +6,14 @@ import asyncio
 import logging
 
 from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.motions import Motion, MotionKind, Senses
 from keyexpr_schema.payloads.tasks import Order, ReportState
 from keyexpr_schema.payloads.world import Fact
 from workers.context import SkillContext
 from workers.embodiment import Embodiment
-from workers.errors import BodyUnreachable, SkillFailed
-from workers.fencing import Ledger, Phase
+from workers.errors import RobotUnreachable, SkillFailed
+from workers.orders.fencing import Ledger, Phase
 
 SAFE_S = 60.0
 """Wall seconds that bringing the body to rest may take before the worker goes on without."""
@@ -37,7 +38,7 @@ async def make_safe(body: Embodiment) -> None:
             outcome = await body.perform(Motion(kind=MotionKind.STOW))
         if outcome.reason is not None:
             _log.info("%s: stow: %s", body.robot, outcome.reason)
-    except (BodyUnreachable, SchemaError, TimeoutError) as error:
+    except (RobotUnreachable, SchemaError, TimeoutError) as error:
         _log.warning("%s could not be brought to rest: %s", body.robot, str(error) or "no answer")
 
 
@@ -47,50 +48,50 @@ async def first_senses(body: Embodiment) -> Senses:
     while True:
         try:
             return await body.senses()
-        except (BodyUnreachable, SchemaError) as error:
+        except (RobotUnreachable, SchemaError) as error:
             if not told:
                 _log.warning("%s waits for the driver of its robot: %s", body.robot, error)
             told = True
             await asyncio.sleep(DRIVER_S)
 
 
-async def self_knowledge(ctx: SkillContext) -> None:
+async def observe_robot(ctx: SkillContext) -> None:
     """Learn what the robot knows of itself: where it is, what is in its hand and its basket."""
     senses = await first_senses(ctx.body)
     if senses.place is not None:
-        ctx.learn("at", ctx.robot, senses.place)
+        ctx.observe(AT, ctx.robot, senses.place)
     await ctx.holding()
     for thing in senses.basket:
-        ctx.learn("at", thing, ctx.robot)
+        ctx.observe(AT, thing, ctx.robot)
 
 
-def stopped_half_way(ledger: Ledger) -> bool:
+def was_interrupted(ledger: Ledger) -> bool:
     """Whether the last attempt ended with its worker, which left the arm wherever it was."""
-    entries = list(ledger.entries.values())
-    if any(entry.phase is Phase.STARTED for entry in entries):
+    attempts = list(ledger.attempts.values())
+    if any(attempt.phase is Phase.STARTED for attempt in attempts):
         return True
-    last = entries[-1].report if entries else None
+    last = attempts[-1].report if attempts else None
     return last is not None and last.state is ReportState.INTERRUPTED
 
 
-async def look_about(ctx: SkillContext, order: Order) -> tuple[Fact, ...]:
+async def observe_after_crash(ctx: SkillContext, order: Order) -> tuple[Fact, ...]:
     """Look around after a crash in the middle of `order`, and learn.
 
     The order's object is where the hand or the eyes say; if neither does, it is unknown.
     """
-    await self_knowledge(ctx)
+    await observe_robot(ctx)
     seen: dict[str, str | None] = {}
     try:
         seen = {d.object: ctx.world.whereabouts(d) for d in await ctx.look()}
-    except (SkillFailed, BodyUnreachable, SchemaError) as error:
+    except (SkillFailed, RobotUnreachable, SchemaError) as error:
         ctx.log(f"could not look around: {error}")
     thing = order.args.get(OBJECT_ARGUMENT)
     senses = await first_senses(ctx.body)
     for name, where in seen.items():
         if where is not None and name != senses.holding:
-            ctx.learn("at", name, where)
+            ctx.observe(AT, name, where)
     if thing is not None and thing != senses.holding and seen.get(thing) is None:
-        believed = ctx.world.belief("at", thing)
+        believed = ctx.world.value_of(AT, thing)
         if believed == ctx.robot or believed == senses.place:
-            ctx.learn("at", thing, None)
-    return ctx.learned
+            ctx.observe(AT, thing, None)
+    return ctx.observed

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.payloads.tasks import ReportState, Try
-from workers.errors import BodyUnreachable, SkillFailed
+from workers.errors import RobotUnreachable, SkillFailed
 
 MOST_TRIES = 3
 CLOCK_S = 0.05
@@ -23,7 +23,7 @@ _log = logging.getLogger("robotfleet.worker.retry")
 
 
 @dataclass(frozen=True)
-class Ended:
+class AttemptResult:
     """How an attempt ended. Times on the fleet's clock; `reason` is `None` where it succeeded."""
 
     state: ReportState
@@ -35,7 +35,7 @@ class Ended:
 
 
 @dataclass(frozen=True)
-class _Failure:
+class _TryFailure:
     state: ReportState
     reason: str
     retryable: bool
@@ -53,7 +53,7 @@ async def run_attempt(
     cancelled: asyncio.Event,
     on_failure: Callable[[SkillFailed], None] = lambda failure: None,
     most_tries: int = MOST_TRIES,
-) -> Ended:
+) -> AttemptResult:
     """Run `once` until it returns, but at most `most_tries` times.
 
     A try ends by returning (success), by `SkillFailed`, by any other exception (a bug in the
@@ -87,10 +87,12 @@ async def run_attempt(
             )
         )
         if failure is None:
-            return Ended(ReportState.SUCCEEDED, tuple(tries), None, True, started_s, ended_s)
+            return AttemptResult(
+                ReportState.SUCCEEDED, tuple(tries), None, True, started_s, ended_s
+            )
         await make_safe()
         if not failure.again or len(tries) >= most_tries:
-            return Ended(
+            return AttemptResult(
                 failure.state, tuple(tries), failure.reason, failure.retryable, started_s, now_s()
             )
 
@@ -104,7 +106,7 @@ async def _one_try(
     deadline_s: float,
     cancelled: asyncio.Event,
     on_failure: Callable[[SkillFailed], None],
-) -> _Failure | None:
+) -> _TryFailure | None:
     running = asyncio.ensure_future(once())
     cancel = asyncio.ensure_future(cancelled.wait())
     late = False
@@ -122,9 +124,9 @@ async def _one_try(
     if not running.cancelled() and (error := running.exception()) is None:
         return None
     if cancelled.is_set():
-        return _Failure(ReportState.CANCELLED, "the order was cancelled", True, again=False)
+        return _TryFailure(ReportState.CANCELLED, "the order was cancelled", True, again=False)
     if late:
-        return _Failure(
+        return _TryFailure(
             ReportState.FAILED,
             f"{name} was not done within its deadline of {deadline_s:g} s",
             True,
@@ -132,18 +134,18 @@ async def _one_try(
         )
     if running.cancelled():
         reason = f"unexpected error in skill {name}: it cancelled itself"
-        return _Failure(ReportState.FAILED, reason, False, again=False)
+        return _TryFailure(ReportState.FAILED, reason, False, again=False)
     return _of(name, error, on_failure)
 
 
 def _of(
     name: str, error: BaseException | None, on_failure: Callable[[SkillFailed], None]
-) -> _Failure:
+) -> _TryFailure:
     if isinstance(error, SkillFailed):
         on_failure(error)
-        return _Failure(ReportState.FAILED, error.reason, error.retryable, again=error.retryable)
-    if isinstance(error, (BodyUnreachable, SchemaError)):
-        return _Failure(ReportState.FAILED, str(error), True, again=True)
+        return _TryFailure(ReportState.FAILED, error.reason, error.retryable, again=error.retryable)
+    if isinstance(error, (RobotUnreachable, SchemaError)):
+        return _TryFailure(ReportState.FAILED, str(error), True, again=True)
     _log.error("unexpected error in skill %s", name, exc_info=error)
     reason = f"unexpected error in skill {name}: {type(error).__name__}: {error}"
-    return _Failure(ReportState.FAILED, reason, False, again=False)
+    return _TryFailure(ReportState.FAILED, reason, False, again=False)

@@ -14,23 +14,23 @@ from keyexpr_schema.transport.session import Session, Watch
 from workers.context import SkillContext
 from workers.embodiment import Embodiment
 from workers.errors import BadArguments, UnknownSkill
-from workers.fencing import Phase
-from workers.journal import Journal
-from workers.order_queue import InTray
-from workers.outbox import Outbox
+from workers.orders.fencing import Phase
+from workers.orders.journal import Journal
+from workers.orders.order_queue import OrderQueue
+from workers.orders.outbox import Outbox
+from workers.orders.reports import make_report
 from workers.recovery import (
     first_senses,
-    look_about,
     make_safe,
-    self_knowledge,
-    stopped_half_way,
+    observe_after_crash,
+    observe_robot,
+    was_interrupted,
 )
-from workers.reports import report_on
 from workers.retry import run_attempt
-from workers.single_instance import no_rivals
+from workers.single_instance import ensure_single_worker
 from workers.skill import SkillRegistry
-from workers.state_publisher import Presence
-from workers.world_cache import WORLD_KEYS, WorldView
+from workers.state_publisher import StatePublisher
+from workers.world_cache import WORLD_KEYS, WorldCache
 
 LAST_WORD_S = 3.0
 """Wall seconds that a worker which is told to end spends on getting its last report out."""
@@ -54,10 +54,10 @@ class Worker:
         self._body = embodiment
         self._journal = journal
         self._registry = registry
-        self._world = WorldView()
-        self._presence = Presence(session, embodiment, incarnation)
+        self._world = WorldCache()
+        self._state_publisher = StatePublisher(session, embodiment, incarnation)
         self._outbox = Outbox(session, journal, embodiment.now_s)
-        self._in_tray = InTray(session, journal, self._outbox, spec.robot, incarnation)
+        self._order_queue = OrderQueue(session, journal, self._outbox, spec.robot, incarnation)
         self._arrived: asyncio.Queue[tuple[OrderAddress, Order | None]] = asyncio.Queue()
         self._ready = asyncio.Event()
         self._log = logging.getLogger(f"robotfleet.worker.{spec.robot}")
@@ -78,7 +78,7 @@ class Worker:
         robot = self.spec.robot
         watched = self._session.watch(*WORLD_KEYS, (ORDER, {"robot": robot}))
         alive = self._session.token(ROBOT_ALIVE, AliveAddress(robot, self.incarnation))
-        await no_rivals(self._session, robot)
+        await ensure_single_worker(self._session, robot)
         sending = asyncio.create_task(self._outbox.run())
         try:
             async with watched as watch, alive:
@@ -97,7 +97,7 @@ class Worker:
     ) -> None:
         group.create_task(self._follow(watch))
         await first_senses(self._body)
-        group.create_task(self._presence.run())
+        group.create_task(self._state_publisher.run())
         await watch.synced()
         await self._recover()
         group.create_task(self._take_in())
@@ -108,7 +108,7 @@ class Worker:
     async def _last_word(self) -> None:
         self._outbox.wake()
         try:
-            self._presence.doing(RobotActivity.STOPPED)
+            self._state_publisher.doing(RobotActivity.STOPPED)
             async with asyncio.timeout(LAST_WORD_S):
                 await self._outbox.emptied()
         except (SchemaError, TimeoutError):
@@ -125,23 +125,23 @@ class Worker:
 
     async def _take_in(self) -> None:
         while True:
-            await self._in_tray.put(*await self._arrived.get())
+            await self._order_queue.put(*await self._arrived.get())
 
     # --- what is done ----------------------------------------------------------------------------
 
     async def _recover(self) -> None:
-        self._presence.doing(RobotActivity.RECOVERING)
+        self._state_publisher.doing(RobotActivity.RECOVERING)
         ledger = self._journal.ledger
         ctx = self._context()
-        if stopped_half_way(ledger):
+        if was_interrupted(ledger):
             await make_safe(self._body)
-        await self_knowledge(ctx)
-        self._journal.send(*ctx.learned)
-        for entry in ledger.phases(Phase.STARTED):
+        await observe_robot(ctx)
+        self._journal.send(*ctx.observed)
+        for attempt in ledger.phases(Phase.STARTED):
             ctx = self._context()
-            facts = await look_about(ctx, entry.order)
+            facts = await observe_after_crash(ctx, attempt.order)
             reason = f"the worker of {self.spec.robot} went down while it did this"
-            self._interrupted(entry.order, reason, facts)
+            self._interrupted(attempt.order, reason, facts)
         self._outbox.wake()
 
     def _context(self) -> SkillContext:
@@ -154,7 +154,7 @@ class Worker:
     def _interrupted(
         self, order: Order, reason: str, facts: tuple[Fact, ...], started_s: float | None = None
     ) -> None:
-        report = report_on(
+        report = make_report(
             order,
             self.incarnation,
             ReportState.INTERRUPTED,
@@ -167,15 +167,15 @@ class Worker:
 
     async def _execute(self) -> None:
         while True:
-            self._presence.doing(RobotActivity.IDLE)
-            await self._carry_out(await self._in_tray.next())
+            self._state_publisher.doing(RobotActivity.IDLE)
+            await self._carry_out(await self._order_queue.next())
 
     async def _carry_out(self, order: Order) -> None:
         try:
             skill = self._registry.get(order.skill, self._latest_spec().skills)
             arguments = skill.bind(order.args, self.spec.robot, self._world)
         except (UnknownSkill, BadArguments) as error:
-            refusal = report_on(
+            refusal = make_report(
                 order,
                 self.incarnation,
                 ReportState.REFUSED,
@@ -186,10 +186,10 @@ class Worker:
             return
         ctx = self._context()
         started_s = self._body.now_s()
-        start = report_on(order, self.incarnation, ReportState.STARTED, started_s=started_s)
+        start = make_report(order, self.incarnation, ReportState.STARTED, started_s=started_s)
         self._journal.started(order, start)  # before anything moves
         self._outbox.wake()
-        self._presence.doing(RobotActivity.BUSY, order)
+        self._state_publisher.doing(RobotActivity.BUSY, order)
         try:
             ended = await run_attempt(
                 order.skill,
@@ -197,19 +197,19 @@ class Worker:
                 now_s=self._body.now_s,
                 make_safe=lambda: make_safe(self._body),
                 deadline_s=order.deadline_s,
-                cancelled=self._in_tray.cancelled,
-                on_failure=ctx.taught,
+                cancelled=self._order_queue.cancelled,
+                on_failure=ctx.observe_failure,
             )
         except asyncio.CancelledError:
             reason = f"the worker of {self.spec.robot} was stopped while it did this"
-            self._interrupted(order, reason, ctx.learned, started_s)
+            self._interrupted(order, reason, ctx.observed, started_s)
             raise
-        report = report_on(
+        report = make_report(
             order,
             self.incarnation,
             ended.state,
             tries=ended.tries,
-            facts=ctx.learned,
+            facts=ctx.observed,
             reason=ended.reason,
             retryable=ended.retryable,
             started_s=ended.started_s,
@@ -217,9 +217,9 @@ class Worker:
         )
         try:
             # Others may go by the robot's state as soon as they have the report.
-            await self._presence.feel()
+            await self._state_publisher.feel()
         finally:
-            self._end(order, report, ctx.learned)
+            self._end(order, report, ctx.observed)
 
     def _end(self, order: Order, report: Report, facts: tuple[Fact, ...] = ()) -> None:
         """Write the end of an attempt into the journal; its facts and report go out from there."""

@@ -18,7 +18,7 @@ GONE_S = 4.0
 """How long the token of a worker that is dead can stay [s]: its lease of 2 s, and as much again."""
 
 
-async def no_rivals(session: Session, robot: str) -> None:
+async def ensure_single_worker(session: Session, robot: str) -> None:
     """Return when no worker of `robot` is connected; one that was killed just now soon is not.
 
     Two workers that start at the same moment do not see each other here.

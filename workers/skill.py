@@ -14,7 +14,7 @@ from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.ids import check_id
 from workers.context import SkillContext
 from workers.errors import BadArguments, BadSkill, UnknownSkill
-from workers.world_cache import WorldView
+from workers.world_cache import WorldCache
 
 ENTRY_POINTS = "robotfleet.skills"
 """Entry-point group: each entry is a `Skill`, or a tuple or list of them."""
@@ -23,7 +23,7 @@ ROBOT_ARGUMENT = "robot"
 """The argument of every order that names the robot itself; skills get it as `ctx.robot`."""
 
 
-class Kind(str, Enum):
+class ParameterKind(str, Enum):
     """What an argument of a skill must be."""
 
     PLACE = "place"
@@ -41,11 +41,13 @@ class Skill:
     """An action a robot can be ordered to do: its name, its typed parameters, and the doing."""
 
     name: str
-    parameters: Mapping[str, Kind]
+    parameters: Mapping[str, ParameterKind]
     function: SkillFunction
     about: str = ""
 
-    def bind(self, args: Mapping[str, str], robot: str, world: WorldView) -> dict[str, str | float]:
+    def bind(
+        self, args: Mapping[str, str], robot: str, world: WorldCache
+    ) -> dict[str, str | float]:
         """The arguments of `function` that an order's `args` mean.
 
         Raises:
@@ -79,7 +81,7 @@ class Skill:
 
 
 def skill(
-    name: str, *, parameters: Mapping[str, Kind] | None = None
+    name: str, *, parameters: Mapping[str, ParameterKind] | None = None
 ) -> Callable[[SkillFunction], Skill]:
     """Make `async def f(ctx, <parameters>) -> None` the skill `name`.
 
@@ -170,10 +172,10 @@ def _load(entry: EntryPoint) -> tuple[Skill, ...]:
     return skills
 
 
-def _argument(what: str, kind: Kind, text: str, world: WorldView) -> str | float:
-    if kind is Kind.TEXT:
+def _argument(what: str, kind: ParameterKind, text: str, world: WorldCache) -> str | float:
+    if kind is ParameterKind.TEXT:
         return text
-    if kind is Kind.NUMBER:
+    if kind is ParameterKind.NUMBER:
         try:
             number = float(text)
         except ValueError:
@@ -181,10 +183,10 @@ def _argument(what: str, kind: Kind, text: str, world: WorldView) -> str | float
         if not math.isfinite(number):
             raise BadArguments(f"{what} must be a number, not {text!r}")
         return number
-    known: dict[Kind, Iterable[str]] = {
-        Kind.PLACE: world.places,
-        Kind.OBJECT: world.objects,
-        Kind.ROBOT: world.specs,
+    known: dict[ParameterKind, Iterable[str]] = {
+        ParameterKind.PLACE: world.places,
+        ParameterKind.OBJECT: world.objects,
+        ParameterKind.ROBOT: world.specs,
     }
     if text not in known[kind]:
         choices = ", ".join(sorted(known[kind])) or f"none: no {kind.value} is registered"

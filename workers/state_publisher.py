@@ -13,7 +13,7 @@ from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotSta
 from keyexpr_schema.payloads.tasks import Order
 from keyexpr_schema.transport.session import Session
 from workers.embodiment import Embodiment
-from workers.errors import BodyUnreachable
+from workers.errors import RobotUnreachable
 
 SENSE_S = 0.2
 """Wall seconds between two readings of the robot's own sensors."""
@@ -26,7 +26,7 @@ PATIENCE_S = 3.0
 STOOD_STILL_M = 0.01
 
 
-class Presence:
+class StatePublisher:
     """What everybody may know of this robot. `activity` and `order` are set by its worker."""
 
     def __init__(self, session: Session, body: Embodiment, incarnation: str) -> None:
@@ -51,7 +51,7 @@ class Presence:
         try:
             async with asyncio.timeout(PATIENCE_S):
                 self._senses = await self._body.senses()
-        except (BodyUnreachable, SchemaError, TimeoutError) as error:
+        except (RobotUnreachable, SchemaError, TimeoutError) as error:
             if not self._silent:
                 self._log.warning("the robot's sensors give nothing: %s", str(error) or "no answer")
             self._silent = True

@@ -6,18 +6,19 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
+from keyexpr_schema.facts import AT, FactKey, Value
 from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, ROBOT_SPEC, ROBOT_STATE
 from keyexpr_schema.payloads.motions import Detection
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
-from keyexpr_schema.payloads.world import Fact, FactAddress, Object, Place, Value
+from keyexpr_schema.payloads.world import Fact, Object, Place
 from keyexpr_schema.transport.session import Change
 
 FLOOR = "floor"
 WORLD_KEYS = (PLACE, OBJECT, FACT, ROBOT_SPEC, ROBOT_STATE)
-"""The keys that `WorldView.apply` takes changes of."""
+"""The keys that `WorldCache.apply` takes changes of."""
 
 
-class WorldView:
+class WorldCache:
     """The latest word on everything, kept up to date by `apply`."""
 
     def __init__(self) -> None:
@@ -25,7 +26,7 @@ class WorldView:
         self.objects: dict[str, Object] = {}
         self.robots: dict[str, RobotState] = {}
         self.specs: dict[str, RobotSpec] = {}
-        self.facts: dict[FactAddress, Fact] = {}
+        self.facts: dict[FactKey, Fact] = {}
         self._changed = asyncio.Event()
 
     def apply(self, change: Change[Any, Any]) -> None:
@@ -36,7 +37,7 @@ class WorldView:
         elif change.key is OBJECT:
             _put(self.objects, address.object, value)
         elif change.key is FACT:
-            _put(self.facts, address, value)
+            _put(self.facts, address.key, value)
         elif change.key is ROBOT_SPEC:
             _put(self.specs, address.robot, value)
         elif change.key is ROBOT_STATE:
@@ -57,14 +58,14 @@ class WorldView:
             return False
         return True
 
-    def belief(self, relation: str, subject: str) -> Value:
+    def value_of(self, relation: str, subject: str) -> Value:
         """The value of the fact `relation(subject)`; `None` if unknown or never told."""
-        fact = self.facts.get(FactAddress(subject, relation))
+        fact = self.facts.get(FactKey(relation, subject))
         return None if fact is None else fact.value
 
-    def believed_at(self, place: str) -> tuple[str, ...]:
+    def objects_at(self, place: str) -> tuple[str, ...]:
         """The known objects of which the facts say that they are at `place`, sorted."""
-        return tuple(sorted(o for o in self.objects if self.belief("at", o) == place))
+        return tuple(sorted(o for o in self.objects if self.value_of(AT, o) == place))
 
     def surface_place(self, surface: str) -> str | None:
         """The place that a surface stands in."""

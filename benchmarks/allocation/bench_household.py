@@ -27,16 +27,14 @@ from benchmarks.allocation.household import (
     scenarios,
     world_of,
 )
-from fleet.allocators.balanced import BalancedAllocator
 from fleet.allocators.base import Allocated, Allocator
 from fleet.allocators.cost_based import CostBasedAllocator
 from fleet.allocators.llm import LlmAllocator
 from fleet.allocators.makespan import DEADLINE_S, MakespanAllocator
-from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.core.schedule.idle_time import predicted_unit, union_s
-from fleet.planners.llm import ModelCaller, load_llm_config
-from fleet.service.allocation_asker import AllocationAsker
+from fleet.llm import LanguageModel, load_llm_config
 
 PAPER = {"3 robots, 5 goals": 0.350, "5 robots, 10 goals": 0.429}
 """Least idle time that the paper reports for any planner and allocator (reference's definition)."""
@@ -64,15 +62,14 @@ def allocators(limit_s: float = DEADLINE_S, llm_file: Path | None = None) -> tup
     """Those that are compared; the language model only where one is configured."""
     own: tuple[Allocator, ...] = (
         MakespanAllocator(limit_s),
-        BalancedAllocator(),
-        MilpAllocator(),
+        MinMaxLoadAllocator(TieBreak.NEXT_LOADS),
+        MinMaxLoadAllocator(TieBreak.TRAVEL),
         CostBasedAllocator(),
         RoundRobinAllocator(),
     )
     if llm_file is None:
         return own
-    asker = AllocationAsker(load_llm_config(llm_file), ModelCaller())
-    return (*own, LlmAllocator(asker, BalancedAllocator()))
+    return (*own, LlmAllocator(LanguageModel(load_llm_config(llm_file)), MinMaxLoadAllocator()))
 
 
 def runs(seeds: int, compared: Sequence[Allocator], console: Console) -> list[Run]:

@@ -21,6 +21,7 @@ from rich.table import Table
 from benchmarks.allocation.alternatives import big_m, in_turn, makespan_s, nearest, papers_milp
 from benchmarks.allocation.shop_files import NAMES, load
 from benchmarks.allocation.shops import random_shop
+from fleet.jobshop.budget import Budget
 from fleet.jobshop.compiled import Compiled
 from fleet.jobshop.list_scheduling import construct
 from fleet.jobshop.portfolio import solve
@@ -37,6 +38,7 @@ LOST, LATE_S = 2, 300.0
 """The robot that is lost, or late by so much [s]."""
 LOSS = (1000, 50)
 PUBLIC_S = 30.0
+MENDING_S = 0.7
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ def size(tasks: int, robots: int, travel: bool, limits_s: Sequence[float], seed:
     for limit_s in limits_s:
         name = f"makespan, {limit_s:g} s"
         began_s = time.perf_counter()
-        found = solve(shop, limit_s)
+        found = solve(shop, Budget(limit_s))
         took[name] = time.perf_counter() - began_s
         assert found is not None
         made[name], how[name] = found.makespan_s, ", ".join(found.notes)
@@ -143,7 +145,7 @@ def coalitions(limit_s: float = 10.0, seeds: int = 10) -> list[tuple[float, floa
     for seed in range(seeds):
         shop = random_shop(8, 3, True, COALITIONS, seed)
         began_s = time.perf_counter()
-        made = solve(shop, limit_s)
+        made = solve(shop, Budget(limit_s))
         assert made is not None
         found.append((made.gap, time.perf_counter() - began_s))
     return found
@@ -156,7 +158,7 @@ def public(limit_s: float, tell: Callable[[str], None]) -> list[Public]:
         tell(name)
         instance = load(name)
         began_s = time.perf_counter()
-        made = solve(instance.shop, limit_s)
+        made = solve(instance.shop, Budget(limit_s))
         took_s = time.perf_counter() - began_s
         assert made is not None and instance.optimum_s is not None
         how = ", ".join(made.notes)
@@ -171,13 +173,13 @@ def mended() -> list[Mended]:
     found = []
     for travel in (False, True):
         shop = random_shop(*LOSS, travel, MEETINGS if travel else 0.0)
-        planned = solve(shop, 2.0, exact=False)
+        planned = solve(shop, Budget(2.0), exact=False)
         assert planned is not None
         for what in ("lost", "late"):
             left = without_machines(shop, frozenset({LOST})) if what == "lost" else _late(shop)
             frozen = under_way(shop, planned.machine_of, planned.order, LOST)
             began_s = time.perf_counter()
-            made = reschedule(left, planned.machine_of, planned.order, frozen)
+            made = reschedule(left, planned.machine_of, planned.order, Budget(MENDING_S), frozen)
             took_s = time.perf_counter() - began_s
             scratch = construct(Compiled(left))
             assert made is not None and scratch is not None

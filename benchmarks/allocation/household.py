@@ -20,6 +20,7 @@ import yaml
 
 from fleet.core.model.skills import skills_from_data
 from fleet.core.model.world import WorldModel
+from keyexpr_schema.facts import AT
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.payloads.plans import Task as PlanTask
@@ -191,7 +192,7 @@ def world_of(home: Household, clock: str) -> WorldModel:
         for chore in home.chores
     }
     facts = [
-        Fact(subject=robot.robot, relation="at", value="hallway", source="household")
+        Fact(subject=robot.robot, relation=AT, value="hallway", source="household")
         for robot in home.robots
     ]
     return WorldModel.of(

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Sequence
 
 from fleet.core.model.skills import Action, Need, SkillModel
 from fleet.core.model.world import WorldModel
+from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Value
 from keyexpr_schema.payloads.goals import Condition
-from keyexpr_schema.payloads.world import NOTHING, Value
 
 Step = tuple[str, tuple[str, ...]]
 """A step of a plan: the action's name and its arguments, as PDDL has them."""
@@ -22,7 +22,8 @@ def domain(world: WorldModel) -> str:
     """The skills as a typed STRIPS domain."""
     skills = [world.skills[name] for name in sorted(world.skills)]
     relations = sorted(
-        {row[0] for skill in skills for row in (*skill.before, *skill.after)} | {"at", "holding"}
+        {row.variable.relation for skill in skills for row in (*skill.before, *skill.after)}
+        | {AT, HOLDING}
     )
     predicates = [f"(is-{relation} ?subject - thing ?value - thing)" for relation in relations]
     predicates += ["(slot ?slot - thing ?robot - thing)", "(empty ?slot - thing)"]
@@ -35,10 +36,10 @@ def domain(world: WorldModel) -> str:
     predicates += [f"(skilled-{skill.name} ?robot - thing)" for skill in skills]
     words = sorted(
         {
-            _word(row[2])
+            _word(row.value)
             for s in skills
             for row in (*s.before, *s.after)
-            if row[2] not in s.parameters
+            if row.value not in s.parameters
         }
     )
     return "\n".join(
@@ -97,8 +98,8 @@ def actions(steps: Sequence[Step], world: WorldModel) -> list[Action]:
 
 def _action(skill: SkillModel) -> str:
     parameters = [f"?{name} - a-{kind}" for name, kind in skill.parameters.items()]
-    known = {(row[0], row[1]): row[2] for row in skill.before}
-    before = [f"(is-{r} ?{s} {_term(v, skill)})" for r, s, v in skill.before]
+    known = dict(skill.before)
+    before = [f"(is-{r} ?{s} {_term(v, skill)})" for (r, s), v in skill.before]
     before += [f"(skilled-{skill.name} ?{skill.actor_parameter})"]
     robots = skill.robot_parameters
     before += [f"(other ?{a} ?{b})" for i, a in enumerate(robots) for b in robots[i + 1 :]]
@@ -106,8 +107,8 @@ def _action(skill: SkillModel) -> str:
         of = f" ?{need.of}" if need.of else ""
         before.append(f"({_static(need)} ?{parameter}{of})")
     after = []
-    for relation, subject, value in skill.after:
-        old = known.get((relation, subject))
+    for (relation, subject), value in skill.after:
+        old = known.get(FactKey(relation, subject))
         if old is None:
             name = f"old-{relation}-{subject}"
             parameters.append(f"?{name} - thing")

@@ -32,9 +32,9 @@ from fleet.core.model.world import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.deordering import Strand, tasks_from
 from fleet.service.composition import Composition, compose
+from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan
-from keyexpr_schema.payloads.world import NOTHING
 
 SIZES = ((2, 2), (5, 3), (10, 5), (20, 10), (50, 20))
 ENGINES = ("fast-downward", "pyperplan", "aries")
@@ -167,16 +167,14 @@ def _strands(actions: Sequence[Action], world: WorldModel) -> list[Strand]:
         mine = open_.setdefault(action.actor, [])
         for helper in action.participants[1:]:
             mine[:0] = open_.pop(helper, [])
-        stands = {
-            row.variable.subject: row.value for row in action.before if row.variable[0] == "at"
-        }
+        stands = {row.variable.subject: row.value for row in action.before if row.variable[0] == AT}
         moved = {before.actor for before in mine if before.skill.name == "navigate"}
         for robot in (robot for robot in action.participants if robot not in moved):
             if place := stands.get(robot):
                 go = world.skills["navigate"].ground({"robot": robot, "to": str(place)})
                 mine.append(go)
         mine.append(action)
-        if any(row.variable.relation == "holding" and row.value == NOTHING for row in action.after):
+        if any(row.variable.relation == HOLDING and row.value == NOTHING for row in action.after):
             strands.append(Strand("g", tuple(open_.pop(action.actor))))
     return strands
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
-from sim.kinematic import KinematicBackend
+from sim.kinematic.backend import KinematicBackend
 
 
 class SharedWorld:

@@ -19,9 +19,10 @@ from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract
 from fleet.core.events import Event
 from fleet.core.state import Policy, State
 from fleet.core.step import step
-from fleet.planners.llm import LlmInterpreter
+from fleet.planners import LlmInterpreter
 from fleet.service.composition import Composition
 from fleet.service.planning_job import carry_out
+from keyexpr_schema.facts import AT, ON
 from keyexpr_schema.keyspace import FACT, OBJECT, ORDER, PLACE, ROBOT_SPEC, ROBOT_STATE
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal
 from keyexpr_schema.payloads.plans import ENDED_PLANS
@@ -30,10 +31,11 @@ from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotSta
 from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Report, ReportState
 from keyexpr_schema.payloads.world import Fact, FactAddress, ObjectAddress, PlaceAddress, Statement
 from keyexpr_schema.transport.watch import Change
-from sim.kinematic import KinematicBackend
+from sim.files.world_payloads import object_payloads
+from sim.kinematic.backend import KinematicBackend
 from workers.skill import SkillRegistry
 from workers.skills.household import HOUSEHOLD
-from workers.world_cache import WorldView
+from workers.world_cache import WorldCache
 
 SEED = 7
 MOST_SIMULATED_S = 7200.0
@@ -79,7 +81,7 @@ class FleetRun:
         self._ended: asyncio.Future[None] = loop.create_future()
         loop.drive(self._go_on, lambda: self._fail(Stuck("everybody waits for somebody else")))
         self._places = {place.place: place for place in mission.places}
-        self._view = WorldView()
+        self._view = WorldCache()
         registry = SkillRegistry(HOUSEHOLD)
         self._robots = {
             spec.robot: Robot(
@@ -115,9 +117,9 @@ class FleetRun:
             task.cancel()
         with suppress(asyncio.CancelledError):
             await asyncio.gather(*working)
-        for book in self.state.plans.values():
-            if book.reason:
-                self.counts.reasons.append(book.reason)
+        for entry in self.state.plans.values():
+            if entry.reason:
+                self.counts.reasons.append(entry.reason)
         return wrong
 
     def witness(self) -> Witness:
@@ -130,7 +132,7 @@ class FleetRun:
             believed={
                 fact.subject: fact.value
                 for fact in self.state.facts.values()
-                if fact.relation == "at"
+                if fact.relation == AT
             },
             looks=[(place, x, y, see_m[robot]) for place, x, y, robot in self.shared.looks],
         )
@@ -190,7 +192,7 @@ class FleetRun:
         for place in self._places.values():
             self._view.apply(Change(PLACE, PlaceAddress(place.place), place, ""))
             self._tell(events.PlacePut, place=place)
-        for thing in self.mission.world.objects():
+        for thing in object_payloads(self.mission.world):
             self._view.apply(Change(OBJECT, ObjectAddress(thing.object), thing, ""))
             self._tell(events.ObjectPut, object=thing)
         for spec, _ in self.mission.robots:
@@ -201,9 +203,9 @@ class FleetRun:
 
     def _tell_beliefs(self) -> None:
         for thing, place in self.mission.told().items():
-            self._learn(Fact(subject=thing, relation="at", value=place, source="person"))
+            self._learn(Fact(subject=thing, relation=AT, value=place, source="person"))
         for thing, surface in self.mission.told_on().items():
-            self._learn(Fact(subject=thing, relation="on", value=surface, source="person"))
+            self._learn(Fact(subject=thing, relation=ON, value=surface, source="person"))
         for number, text in enumerate(self.mission.entry.statements, 1):
             self._tell(
                 events.StatementPut, statement=Statement(statement=f"said_{number}", text=text)
@@ -224,14 +226,14 @@ class FleetRun:
             self._ended.set_result(None)
 
     def _learn(self, fact: Fact) -> None:
-        self._view.apply(Change(FACT, FactAddress(fact.subject, fact.relation), fact, ""))
+        self._view.apply(Change(FACT, FactAddress.of(fact.key), fact, ""))
         self._tell(events.FactPut, fact=fact)
 
     def _done(self) -> bool:
         """Whether nothing more will happen by itself."""
-        books = self.state.plans.values()
-        return all(book.ended or book.state in ENDED_PLANS for book in books) and not any(
-            book.outstanding() for book in books
+        entries = self.state.plans.values()
+        return all(entry.ended or entry.state in ENDED_PLANS for entry in entries) and not any(
+            entry.outstanding() for entry in entries
         )
 
     def goals_ended(self) -> bool:

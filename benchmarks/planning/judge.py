@@ -9,7 +9,7 @@ import msgspec
 from benchmarks.planning.fleet_run import FleetRun
 from benchmarks.planning.missions import Mission
 from benchmarks.planning.simulated_time import SimulatedLoop, run
-from fleet.planners.llm import LlmInterpreter
+from fleet.planners import LlmInterpreter
 from fleet.service.composition import Composition
 from keyexpr_schema.payloads.goals import GoalState
 

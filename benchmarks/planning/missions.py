@@ -14,9 +14,11 @@ from benchmarks.planning.truth import Truth, parse_truth
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.world import Place
 from sim.errors import BadFile
-from sim.world_file import load_robot, load_world
-from sim.world_schema import WorldFile
-from sim.yaml_file import Entry, read_yaml
+from sim.files.mission_file import load_robot
+from sim.files.world_file import load_world
+from sim.files.world_payloads import place_payloads
+from sim.files.world_schema import WorldFile
+from sim.files.yaml_file import FileEntry, read_yaml
 
 HERE = Path(__file__).parent
 CLASSES = ("simple", "compound", "complex", "vague")
@@ -24,7 +26,7 @@ Expected = Literal["done", "refused", "given-up"]
 """`refused`: nothing may be done; `given-up`: tried in vain. Both want a sentence that says why."""
 
 
-class MissionEntry(Entry, frozen=True):
+class MissionEntry(FileEntry, frozen=True):
     """One mission as it is written down.
 
     The planner is told where every object is and what it lies on, but for those in `unknown`, and
@@ -47,21 +49,21 @@ class MissionEntry(Entry, frozen=True):
     expect: Expected = "done"
 
 
-class _File(Entry, frozen=True):
+class _File(FileEntry, frozen=True):
     missions: tuple[MissionEntry, ...]
 
 
-class _RobotEntry(Entry, frozen=True):
+class _RobotEntry(FileEntry, frozen=True):
     spec: str
     at_m: tuple[float, float]
 
 
-class _Setting(Entry, frozen=True):
+class _Setting(FileEntry, frozen=True):
     world: str
     robots: dict[str, _RobotEntry]
 
 
-class _Settings(Entry, frozen=True):
+class _Settings(FileEntry, frozen=True):
     settings: dict[str, _Setting]
 
 
@@ -144,7 +146,7 @@ def _setting(
         for robot, entry in found.robots.items()
     }
     world = load_world(path.parent / found.world)
-    return world, world.places(), robots
+    return world, place_payloads(world), robots
 
 
 def _mission(entry: MissionEntry, kind: str, path: Path) -> Mission:

@@ -13,11 +13,11 @@ from keyexpr_schema.payloads.world import Fact
 from workers.context import SkillContext
 from workers.embodiment import Embodiment
 from workers.errors import BadArguments, UnknownSkill
-from workers.recovery import make_safe, self_knowledge
-from workers.reports import report_on
+from workers.orders.reports import make_report
+from workers.recovery import make_safe, observe_robot
 from workers.retry import run_attempt
 from workers.skill import SkillRegistry
-from workers.world_cache import WorldView
+from workers.world_cache import WorldCache
 
 INCARNATION = "benchmark"
 Say = Callable[[tuple[Fact, ...], Report | None], None]
@@ -31,7 +31,7 @@ class Robot:
         self,
         spec: RobotSpec,
         body: Embodiment,
-        world: WorldView,
+        world: WorldCache,
         registry: SkillRegistry,
         say: Say,
     ) -> None:
@@ -48,8 +48,8 @@ class Robot:
     async def introduce_itself(self) -> None:
         """Say where the robot is and what it holds."""
         ctx = SkillContext(self.spec, self._body, self._world)
-        await self_knowledge(ctx)
-        self._say(ctx.learned, None)
+        await observe_robot(ctx)
+        self._say(ctx.observed, None)
 
     def order(self, order: Order) -> None:
         """Take an order, or the cancellation of one."""
@@ -73,7 +73,7 @@ class Robot:
             name = await self._orders.get()
             order = self._standing[name]
             if order.cancelled:
-                self._say((), report_on(order, INCARNATION, ReportState.CANCELLED))
+                self._say((), make_report(order, INCARNATION, ReportState.CANCELLED))
                 continue
             self._current = name
             self._cancelled.clear()
@@ -85,14 +85,14 @@ class Robot:
             skill = self._registry.get(order.skill, self.spec.skills)
             arguments = skill.bind(order.args, self.spec.robot, self._world)
         except (UnknownSkill, BadArguments) as error:
-            refusal = report_on(
+            refusal = make_report(
                 order, INCARNATION, ReportState.REFUSED, reason=str(error), retryable=False
             )
             self._say((), refusal)
             return
         ctx = SkillContext(self.spec, self._body, self._world)
         started_s = self._body.now_s()
-        started = report_on(order, INCARNATION, ReportState.STARTED, started_s=started_s)
+        started = make_report(order, INCARNATION, ReportState.STARTED, started_s=started_s)
         self._say((), started)
         ended = await run_attempt(
             order.skill,
@@ -101,20 +101,20 @@ class Robot:
             make_safe=lambda: make_safe(self._body),
             deadline_s=order.deadline_s,
             cancelled=self._cancelled,
-            on_failure=ctx.taught,
+            on_failure=ctx.observe_failure,
         )
-        report = report_on(
+        report = make_report(
             order,
             INCARNATION,
             ended.state,
             tries=ended.tries,
-            facts=ctx.learned,
+            facts=ctx.observed,
             reason=ended.reason,
             retryable=ended.retryable,
             started_s=ended.started_s,
             ended_s=ended.ended_s,
         )
-        self._say(ctx.learned, report)
+        self._say(ctx.observed, report)
 
 
 def _cancelled(order: Order) -> Order:

@@ -21,7 +21,8 @@ from rich.table import Table
 from benchmarks.planning.judge import Result, run_mission
 from benchmarks.planning.missions import CLASSES, Mission, load_missions
 from benchmarks.planning.report import HEAD, draw, failures_of, rows_of, write_page
-from fleet.planners.llm import LlmConfig, LlmInterpreter, LlmPlanner, ModelCaller, load_llm_config
+from fleet.llm import LanguageModel, LlmConfig, load_llm_config
+from fleet.planners import LlmInterpreter, LlmPlanner
 from fleet.service.composition import Composition, compose
 
 STRATEGIES = ("per-goal", "big-dag", "monolithic")
@@ -104,11 +105,11 @@ def _run(work: Sequence[Work], options: argparse.Namespace, console: Console) ->
 def _with_model(config: LlmConfig, stack: ExitStack) -> tuple[Composition, LlmInterpreter]:
     """Everything there is, and a planner and an interpreter that ask a language model."""
     parts = compose()
-    caller = ModelCaller()
-    stack.callback(caller.close)
-    planner = LlmPlanner(config, parts.planners["symbolic"], caller)
-    planner.warm()  # LiteLLM's start is no planning time
-    interpreter = LlmInterpreter(config, parts.skills, caller)
+    model = LanguageModel(config)
+    stack.callback(model.close)
+    planner = LlmPlanner(model, parts.planners["symbolic"])
+    model.warm()  # LiteLLM's start is no planning time
+    interpreter = LlmInterpreter(model, parts.skills)
     return changed(parts, planners={**parts.planners, planner.name: planner}), interpreter
 
 

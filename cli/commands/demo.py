@@ -50,8 +50,8 @@ async def demo(
     from cli.demo.mission_run import DemoOptions
     from cli.errors import check_known
     from cli.show.live import Ticker
+    from sim.files.mission_file import load_mission
     from sim.reach import out_of_reach
-    from sim.world_file import load_mission
 
     check_known("backend", backend, BACKENDS, "")
     parse_speed(speed)

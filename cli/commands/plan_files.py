@@ -147,7 +147,7 @@ async def propose(
     from cli.presence import planner_alive
     from cli.show.words import outcome
     from keyexpr_schema.ids import check_id
-    from keyexpr_schema.keyspace import PLAN_SPEC, PLAN_STATUS
+    from keyexpr_schema.keyspace import PLAN_PROPOSAL, PLAN_SPEC, PLAN_STATUS
     from keyexpr_schema.payloads.plans import PlanAddress, PlanState
 
     plan = read_plan(file)
@@ -165,9 +165,8 @@ async def propose(
             raise NotRunning("no planner is running; start one with `robotctl planner`")
         async with following(session, (PLAN_SPEC, of), (PLAN_STATUS, of)) as board:
             if board.plans or board.plan_status:
-                # To put it all the same would overwrite what the planner says of that plan.
                 raise BadArgument(f"there is a plan {plan.plan} already; give yours another --id")
-            await session.confirm(PLAN_SPEC, PlanAddress(plan.plan), plan)
+            await session.confirm(PLAN_PROPOSAL, PlanAddress(plan.plan), plan)
             await board.until(
                 lambda: (
                     plan.plan in board.plan_status

@@ -302,10 +302,15 @@ async def check_plan(session: Session, plan: str) -> None:
 async def _control(call: Call, control: Control, plan: str) -> None:
     from cli.asking import ask_planner
     from cli.naming import request_name
-    from keyexpr_schema.payloads.requests import ControlRequest
+    from keyexpr_schema.keyspace import PLAN_PROPOSAL
+    from keyexpr_schema.payloads.plans import PlanAddress
+    from keyexpr_schema.payloads.requests import Control, ControlRequest
 
     async with call.session() as session:
         await check_plan(session, plan)
+        if control is Control.DELETE:
+            # First: a proposal that still stands when a planner starts is taken up.
+            await session.delete(PLAN_PROPOSAL, PlanAddress(plan))
         answer = await ask_planner(
             session, ControlRequest(request=request_name(), control=control, plan=plan)
         )

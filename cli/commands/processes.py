@@ -173,8 +173,8 @@ def sim(
     if backend != "kinematic" and (spread or failing):
         raise BadArgument("--spread and --failing are for --backend kinematic; physics needs none")
     from cli.running import end_with_parent
-    from sim.kinematic import Durations
-    from sim.process import run
+    from sim.kinematic.backend import MotionModel
+    from sim.server.process import run
 
     end_with_parent()
     run(
@@ -184,7 +184,7 @@ def sim(
         backend=backend,
         speed=pace,
         seed=seed,
-        durations=Durations(spread=spread, failure_chance={"grasp": failing}),
+        motion_model=MotionModel(spread=spread, failure_chance={"grasp": failing}),
     )
 
 

@@ -25,7 +25,7 @@ async def register(
     from cli.telling import check_skills
     from keyexpr_schema.keyspace import ROBOT_SPEC
     from keyexpr_schema.payloads.robots import RobotAddress
-    from sim.world_file import load_robot
+    from sim.files.mission_file import load_robot
 
     specs = [load_robot(file) for file in files]
     async with call.session() as session:

@@ -12,7 +12,6 @@ from cli.parsing import Group
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from keyexpr_schema.payloads.world import Value
     from keyexpr_schema.transport.session import Session
 
 app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, add_completion=False)
@@ -29,17 +28,18 @@ async def load(
 ) -> None:
     """Tell the fleet the places and objects of a world file (not where the objects are)."""
     from cli.telling import put_world
-    from sim.world_file import load_world
+    from sim.files.world_file import load_world
+    from sim.files.world_payloads import object_payloads, place_payloads
 
-    told = load_world(file)
+    world = load_world(file)
     async with call.session() as session:
         # Working out the distances takes a second: only once there is somebody to tell.
-        places, objects = told.places(), told.objects()
+        places, objects = place_payloads(world), object_payloads(world)
         await put_world(session, places, objects)
     call.show(
         {"places": places, "objects": objects},
         lambda: (
-            f"loaded {told.world}: places {', '.join(p.place for p in places)}; "
+            f"loaded {world.world}: places {', '.join(p.place for p in places)}; "
             f"objects {', '.join(o.object for o in objects) or 'none'}"
         ),
     )
@@ -139,9 +139,7 @@ async def add(
             call.show(room, lambda: f"stored place {room.place}: “{room.label}”")
         elif fact:
             said = await add_fact(session, *words)
-            call.show(
-                said, lambda: f"stored {said.relation}({said.subject}) = {_words(said.value)}"
-            )
+            call.show(said, lambda: f"stored {said.literal}")
         else:
             told = await add_statement(session, " ".join(words), name)
             read = await statement_read(session, told.statement)
@@ -149,12 +147,6 @@ async def add(
                 {"statement": told, "status": read},
                 lambda: f"stored statement {told.statement}: “{told.text}”{statement_means(read)}",
             )
-
-
-def _words(value: Value) -> str:
-    from cli.show.words import value as in_words
-
-    return in_words(value)
 
 
 @command(app, "list")
@@ -221,13 +213,15 @@ async def delete(
 
 async def _delete_fact(session: Session, relation: str, subject: str) -> str:
     from cli.errors import check_known
+    from keyexpr_schema.facts import FactKey
     from keyexpr_schema.keyspace import FACT
     from keyexpr_schema.payloads.world import FactAddress
 
-    facts = [f"{a.relation} {a.subject}" for a in await session.list(FACT)]
+    facts = [" ".join(address.key) for address in await session.list(FACT)]
     check_known("fact", f"{relation} {subject}", facts, "see `robotctl world add --fact`")
-    await session.delete(FACT, FactAddress(subject, relation))
-    return f"{relation}({subject})"
+    key = FactKey(relation, subject)
+    await session.delete(FACT, FactAddress.of(key))
+    return str(key)
 
 
 async def _delete_named(session: Session, name: str) -> str:

@@ -12,15 +12,17 @@ from cli.demo.fleet import Fleet
 from cli.errors import TooLate
 from cli.telling import check_skills, put_world
 from keyexpr_schema.errors import NoAnswer, Unreachable
+from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import PLANNER_ALIVE, ROBOT_ALIVE, ROBOT_SPEC, STORE_JOURNAL
 from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.service import StoreAddress, StoreQuery
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from sim.files.world_payloads import object_payloads, place_payloads
 
 if TYPE_CHECKING:
     from cli.demo.mission_run import DemoOptions
-    from sim.world_file import Mission
+    from sim.files.mission_file import Mission
 
 READY_S = 60.0
 """How long a process may take until it shows that it is there; a busy machine starts slowly."""
@@ -73,7 +75,7 @@ async def router_up(fleet: Fleet) -> None:
 
 async def bring_up(fleet: Fleet, session: Session, board: Board, mission: Mission) -> None:
     """Tell the store of the world and the robots, start the rest, wait until all are ready."""
-    await put_world(session, mission.world.places(), mission.world.objects())
+    await put_world(session, place_payloads(mission.world), object_payloads(mission.world))
     for robot in mission.robots:
         await session.confirm(ROBOT_SPEC, RobotAddress(robot.spec.robot), robot.spec)
     for name in fleet.names:
@@ -112,7 +114,7 @@ async def bring_up(fleet: Fleet, session: Session, board: Board, mission: Missio
 
 def _can_be_planned(board: Board, robot: str) -> bool:
     """Whether a planner knows where the robot is and what it holds: else it can do nothing."""
-    return all((robot, relation) in board.facts for relation in ("at", "holding"))
+    return all(FactKey(relation, robot) in board.facts for relation in (AT, HOLDING))
 
 
 async def _token(

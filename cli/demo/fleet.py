@@ -89,7 +89,7 @@ class Fleet:
             raise BadArgument(f"{name} runs already")
         self._ending.discard(name)
         arguments = (
-            *("-m", "cli.main", *self._commands[name]),
+            *("-P", "-m", "cli.main", *self._commands[name]),
             *("--router", self.endpoint, "--realm", self.realm),
         )
         with self.log(name).open("ab") as log:

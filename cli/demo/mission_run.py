@@ -18,10 +18,11 @@ from cli.errors import Refused, TooLate
 from cli.judge import all_agreed, judge
 from cli.naming import request_name
 from cli.telling import add_statement, put_goal
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import GoalState, GoalStatus
 from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
-from sim.world_file import Mission, load_mission
+from sim.files.mission_file import Mission, load_mission
 
 if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Change
@@ -149,7 +150,7 @@ class Demo:
         robots = [robot.spec.robot for robot in self.mission.robots]
         places = {robot: senses.place for robot, senses in board.senses.items()}
         beliefs = {
-            thing: fact.value for (thing, relation), fact in board.facts.items() if relation == "at"
+            thing: fact.value for (relation, thing), fact in board.facts.items() if relation == AT
         }
         verdicts = judge(self._statuses(), board.truths, places, beliefs)
         records = list(board.tasks.values())

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.errors import BadArgument, check_known
 from cli.presence import robots_alive
-from cli.telling import parse_value
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
+from keyexpr_schema.facts import AT, HOLDING, NOTHING, parse_literal
 from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, ROBOT_SPEC
 from keyexpr_schema.payloads.robots import RobotSpec
-from keyexpr_schema.payloads.world import NOTHING, Fact
+from keyexpr_schema.payloads.world import Fact
 
 if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Session
-
-_CALL = re.compile(r"^\s*([\w.-]+)\s*\(\s*([\w.-]+)\s*\)\s*=\s*(\S+)\s*$")
 
 
 async def told_world(
@@ -49,26 +46,26 @@ def world_of_files(
         BadArgument: a fact is not RELATION SUBJECT VALUE.
         Unknown: a fact's subject is nothing that there is.
     """
-    from sim.world_file import load_robot, load_world
+    from sim.files.mission_file import load_robot
+    from sim.files.world_file import load_world
+    from sim.files.world_payloads import object_payloads, place_payloads
 
-    told = load_world(world)
+    loaded = load_world(world)
+    places, objects = place_payloads(loaded), object_payloads(loaded)
     specs = [load_robot(file) for file in robots]
-    places = [place.place for place in told.places()]
-    names = [spec.robot for spec in specs]
+    where = [*(place.place for place in places), *(spec.robot for spec in specs)]
     known = [parse_fact(fact) for fact in facts]
     for fact in known:
-        subjects = [*places, *names, *(thing.object for thing in told.objects())]
+        subjects = [*where, *(thing.object for thing in objects)]
         check_known("place, object or robot", fact.subject, subjects, "name it in a file")
-        if fact.relation == "at" and fact.value is not None:
-            check_known("place or robot", str(fact.value), [*places, *names], "name it in a file")
-    return WorldModel.of(
-        skills, told.places(), told.objects(), specs, [*_empty_hands(specs), *known]
-    )
+        if fact.relation == AT and fact.value is not None:
+            check_known("place or robot", str(fact.value), where, "name it in a file")
+    return WorldModel.of(skills, places, objects, specs, [*_empty_hands(specs), *known])
 
 
 def _empty_hands(specs: Iterable[RobotSpec]) -> list[Fact]:
     return [
-        Fact(subject=spec.robot, relation="holding", value=NOTHING, source="assumed")
+        Fact(subject=spec.robot, relation=HOLDING, value=NOTHING, source="assumed")
         for spec in specs
         if "grip" in spec.capabilities
     ]
@@ -80,11 +77,10 @@ def parse_fact(written: str) -> Fact:
     Raises:
         BadArgument: it is neither.
     """
-    call = _CALL.match(written)
-    words = list(call.groups()) if call else written.split()
-    if len(words) != 3:
+    literal = parse_literal(written)
+    if literal is None:
         raise BadArgument(
             f"a fact is RELATION SUBJECT VALUE, such as 'at cup_1 kitchen'; got {written!r}"
         )
-    relation, subject, value = words
-    return Fact(subject=subject, relation=relation, value=parse_value(value), source="person")
+    (relation, subject), value = literal
+    return Fact(subject=subject, relation=relation, value=value, source="person")

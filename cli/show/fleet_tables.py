@@ -19,7 +19,6 @@ from cli.show.words import (
     seconds,
     spent_s,
     statement_means,
-    value,
 )
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanStatus
@@ -179,7 +178,7 @@ def facts_table(facts: Sequence[Fact]) -> Table:
         ["fact", "source", "time"],
         (
             (
-                f"{fact.relation}({fact.subject}) = {value(fact.value)}",
+                str(fact.literal),
                 fact.source,
                 f"{fact.time_s:.1f} s",
             )
@@ -219,7 +218,7 @@ def reports_table(reports: Iterable[Report]) -> Table:
     """One line a try of each attempt at a task; an attempt without tries has one line too."""
     rows: list[Sequence[object]] = []
     for report in reports:
-        learned = ", ".join(f"{f.relation}({f.subject}) = {value(f.value)}" for f in report.facts)
+        learned = ", ".join(str(fact.literal) for fact in report.facts)
         if not report.tries:
             spent = _between(report.started_s, report.ended_s)
             rows.append(

@@ -9,7 +9,7 @@ from keyexpr_schema.payloads.goals import GoalStatus
 from keyexpr_schema.payloads.plans import PlanStatus
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
-from keyexpr_schema.payloads.world import StatementStatus, Value
+from keyexpr_schema.payloads.world import StatementStatus
 
 STATE_STYLE = {
     "waiting": "dim",
@@ -32,13 +32,6 @@ STATE_STYLE = {
 def seconds(duration_s: float | None) -> str:
     """`12.3 s`; nothing for `None`."""
     return "" if duration_s is None else f"{duration_s:.1f} s"
-
-
-def value(what: Value) -> str:
-    """A fact's value as people say it."""
-    if what is None:
-        return "unknown"
-    return str(what).lower() if isinstance(what, bool) else str(what)
 
 
 def call(skill: str, args: Mapping[str, str], leave_out: str | None = None) -> str:
@@ -76,8 +69,8 @@ def statement_means(status: StatementStatus | None) -> str:
         return ""
     if not status.facts:
         return f", not understood: {status.reason or 'it says nothing of the world'}"
-    facts = (f"{f.relation}({f.subject}) = {value(f.value)}" for f in status.facts)
-    return f", understood as {' and '.join(facts)}"
+    facts = " and ".join(str(fact.literal) for fact in status.facts)
+    return f", understood as {facts}"
 
 
 def carried(state: RobotState | None) -> str:

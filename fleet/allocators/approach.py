@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fleet.allocators.base import AllocationProblem
+from keyexpr_schema.facts import AT
 
 
 def first_destinations(problem: AllocationProblem) -> dict[str, str]:
@@ -20,7 +21,7 @@ def first_destinations(problem: AllocationProblem) -> dict[str, str]:
 def approach_s(problem: AllocationProblem) -> dict[tuple[str, str], float]:
     """By actor and able robot: its way from where it is to where the actor starts to work, s."""
     world, to = problem.world, first_destinations(problem)
-    where = {robot: world.value("at", robot) for robot in world.team} if to else {}
+    where = {robot: world.value(AT, robot) for robot in world.team} if to else {}
     return {
         (actor, robot): world.travel_s(robot, where[robot], to[actor]) if actor in to else 0.0
         for actor, robots in problem.able.items()

@@ -10,8 +10,8 @@ from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotA
 from fleet.allocators.infeasibility import explained
 from fleet.allocators.load_balancing.balance import balance
 from fleet.allocators.load_balancing.problem import NoAssignment
+from keyexpr_schema.facts import AT, Value
 from keyexpr_schema.ids import ACTOR_PREFIX
-from keyexpr_schema.payloads.world import Value
 
 UNABLE_S = 1e9
 """Cost of a robot that cannot be the actor, s: more than any travel, and safe to add up."""
@@ -41,7 +41,7 @@ def assign_in_rounds(problem: AllocationProblem) -> Assignment | NotAllocated:
     conflicting = {names[a]: {names[other] for other in near} for a, near in enumerate(conflicts)}
     destination, last_place = first_destinations(problem), _last_places(problem)
     predecessors = _predecessors(problem)
-    where = {robot: world.value("at", robot) for robot in world.team}
+    where = {robot: world.value(AT, robot) for robot in world.team}
     chosen: dict[str, str] = {}
 
     def costs(actor: str) -> list[float]:
@@ -89,7 +89,7 @@ def _last_places(problem: AllocationProblem) -> dict[str, Value]:
     actor_of = {task.task: task.actor for task in problem.plan.tasks}
     for task in graph.order:
         for literal in problem.checked.actions[task].after:
-            if literal.variable == ("at", ACTOR_PREFIX + actor_of[task]):
+            if literal.variable == (AT, ACTOR_PREFIX + actor_of[task]):
                 places[actor_of[task]] = literal.value
     return places
 

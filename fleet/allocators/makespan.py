@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import time
 
 from fleet.allocators.base import (
     AllocationProblem,
@@ -11,16 +11,17 @@ from fleet.allocators.base import (
     Circumstances,
     NotAllocated,
 )
-from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import assign_with_least_travel
 from fleet.allocators.plan_shop import PlanShop, plan_shop
 from fleet.jobshop.bounds import lower_bound
+from fleet.jobshop.budget import Budget, Clock
 from fleet.jobshop.compiled import Compiled
 from fleet.jobshop.portfolio import solve
 from fleet.jobshop.problem import Timed
 from fleet.jobshop.rescheduling import reschedule
 
 DEADLINE_S = 1.0
-"""Wall time that the search may take, s."""
+"""Time that the search may take, s."""
 RESCHEDULE_SHARE = 0.5
 """Of that time, how much mending a schedule takes: robots wait meanwhile."""
 NOBODY = -1
@@ -38,23 +39,36 @@ class MakespanAllocator(Allocator):
     name = "makespan"
     reschedules = True
 
-    def __init__(self, deadline_s: float = DEADLINE_S, exact: bool = True, seed: int = 0) -> None:
-        """`exact` allows CP-SAT, which may take up to a second more to prove an optimum."""
+    def __init__(
+        self,
+        deadline_s: float = DEADLINE_S,
+        exact: bool = True,
+        seed: int = 0,
+        clock: Clock = time.perf_counter,
+    ) -> None:
+        """`exact` allows CP-SAT, which may take up to a second more to prove an optimum.
+
+        `clock` is what the deadline goes by.
+        """
         self._deadline_s = deadline_s
         self._exact = exact
         self._seed = seed
+        self._clock = clock
 
     def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
         made = plan_shop(problem)
         if problem.circumstances.home:
-            mended = _mended(made, problem.circumstances, self._deadline_s, self._seed)
+            budget = Budget(RESCHEDULE_SHARE * self._deadline_s, self._clock)
+            mended = _mended(made, problem.circumstances, budget, self._seed)
             if mended is not None:
                 return mended
-        found = solve(made.shop, self._deadline_s, self._exact, self._seed)
+        found = solve(made.shop, Budget(self._deadline_s, self._clock), self._exact, self._seed)
         if found is None:
             # Robots are so few that rules run into a dead end: what is left is a matching problem.
-            chosen = MilpAllocator()._assign(problem)
-            return chosen if isinstance(chosen, NotAllocated) else _by_load(chosen)
+            chosen = assign_with_least_travel(problem)
+            if isinstance(chosen, NotAllocated):
+                return chosen
+            return Assignment(chosen.allocation, notes=("load balanced: no rule found an order",))
         return _assignment(made, found, found.lower_bound_s, found.notes)
 
 
@@ -72,7 +86,7 @@ def _assignment(
     )
 
 
-def _mended(made: PlanShop, told: Circumstances, deadline_s: float, seed: int) -> Assignment | None:
+def _mended(made: PlanShop, told: Circumstances, budget: Budget, seed: int) -> Assignment | None:
     """The allocation there was, with few actors in other hands."""
     machine = {robot: i for i, robot in enumerate(made.robots)}
     named = made.shop.blocks[len(made.actors) :]
@@ -80,7 +94,7 @@ def _mended(made: PlanShop, told: Circumstances, deadline_s: float, seed: int) -
     home += [block.machines[0] for block in named]
     block_of = {actor: block for block, actor in enumerate(made.actors)}
     order = [block_of[actor] for actor in told.sequence if actor in block_of]
-    found = reschedule(made.shop, home, order, deadline_s=RESCHEDULE_SHARE * deadline_s, seed=seed)
+    found = reschedule(made.shop, home, order, budget, seed=seed)
     if found is None:
         return None
     moved = sum(block < len(made.actors) for block in found.moved)
@@ -89,8 +103,3 @@ def _mended(made: PlanShop, told: Circumstances, deadline_s: float, seed: int) -
         f"with any number of changes the least found is {found.best_makespan_s:.1f} s"
     )
     return _assignment(made, found.timed, lower_bound(Compiled(made.shop)), (note,))
-
-
-def _by_load(chosen: Mapping[str, str] | Assignment) -> Assignment:
-    allocation = chosen.allocation if isinstance(chosen, Assignment) else chosen
-    return Assignment(allocation, notes=("load balanced: no rule found an order",))

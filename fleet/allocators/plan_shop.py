@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from math import inf
 
 from fleet.allocators.base import AllocationProblem
-from fleet.core.model.skills import Action, Variable
+from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
 from fleet.core.schedule.actor_order import carried_at_end, first_actors
 from fleet.core.schedule.plan_schedule import predicted_duration_s
 from fleet.jobshop.problem import Block, Machine, Operation, Place, Shop
+from keyexpr_schema.facts import AT, FactKey, Value
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.payloads.plans import Plan
-from keyexpr_schema.payloads.world import Value
 
 MOST_PRIORITY = 8
 """Priorities beyond this count as this: weights double with each step."""
@@ -81,7 +81,7 @@ def plan_shop(problem: AllocationProblem) -> PlanShop:
     )
     ready_s = problem.circumstances.ready_s
     machines = tuple(
-        Machine(numbers.kind_of[r], numbers.site(world.value("at", r)), ready_s.get(r, 0.0))
+        Machine(numbers.kind_of[r], numbers.site(world.value(AT, r)), ready_s.get(r, 0.0))
         for r in robots
     )
     shop = Shop(tuple(operations), blocks_of, machines, numbers.travel_s())
@@ -115,7 +115,7 @@ class _Numbers:
         """Where the action's robot drives first, and where it is afterwards, if that is said."""
         travel_to = action.skill.travel_to
         target = None if travel_to is None else self._sites.get(action.args[travel_to])
-        place = Variable("at", action.actor)
+        place = FactKey(AT, action.actor)
         moved = [value for variable, value in action.after if variable == place]
         return target, self.site(moved[-1]) if moved else None
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fleet.core.state import OUTSTANDING, Job, PlanBook, State
+from fleet.core.state import OUTSTANDING, PlanEntry, PlanningJob, State
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
     ANSWER,
@@ -61,7 +61,7 @@ class Retract:
 class MakePlan:
     """Do this planning job, and say how it ended as an event."""
 
-    job: Job
+    job: PlanningJob
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def _documents(old: State, new: State) -> Iterator[Effect]:
 
 
 def _plan_documents(
-    plan: str, before: PlanBook | None, after: PlanBook | None, old_epoch: int, epoch: int
+    plan: str, before: PlanEntry | None, after: PlanEntry | None, old_epoch: int, epoch: int
 ) -> Iterator[Effect]:
     address = PlanAddress(plan)
     yield from _difference(
@@ -162,40 +162,40 @@ def _difference(
             yield Publish(key, address, payload)
 
 
-def status_of(book: PlanBook) -> PlanStatus:
+def status_of(entry: PlanEntry) -> PlanStatus:
     """What is published of a plan."""
     return PlanStatus(
-        plan=book.plan.plan,
-        revision=book.plan.revision,
-        state=book.state,
-        goals=book.plan.goals,
-        allocation=book.allocation,
-        sequence=book.sequence,
-        made_by=book.plan.made_by,
-        allocator=book.plan.allocator,
-        predicted_makespan_s=book.makespan_s,
-        lower_bound_s=book.lower_bound_s,
-        notes=book.notes,
-        planning_time_s=book.planning_time_s,
-        making=book.plan.making,
-        change=book.change,
-        reason=book.replan_reason or book.reason,
-        violations=book.violations,
-        time_s=book.changed_s,
+        plan=entry.plan.plan,
+        revision=entry.plan.revision,
+        state=entry.state,
+        goals=entry.plan.goals,
+        allocation=entry.allocation,
+        sequence=entry.sequence,
+        made_by=entry.plan.made_by,
+        allocator=entry.plan.allocator,
+        predicted_makespan_s=entry.makespan_s,
+        lower_bound_s=entry.lower_bound_s,
+        notes=entry.notes,
+        planning_time_s=entry.planning_time_s,
+        making=entry.plan.making,
+        change=entry.change,
+        reason=entry.replan_reason or entry.reason,
+        violations=entry.violations,
+        time_s=entry.changed_s,
     )
 
 
-def _orders(book: PlanBook | None, epoch: int) -> dict[OrderAddress, Order]:
-    if book is None:
+def _orders(entry: PlanEntry | None, epoch: int) -> dict[OrderAddress, Order]:
+    if entry is None:
         return {}
     return {
-        OrderAddress(record.robot, record.plan, record.task): _order(record, book, epoch)
-        for record in book.records.values()
+        OrderAddress(record.robot, record.plan, record.task): _order(record, entry, epoch)
+        for record in entry.records.values()
         if record.state in OUTSTANDING and record.robot is not None
     }
 
 
-def _order(record: TaskRecord, book: PlanBook, epoch: int) -> Order:
+def _order(record: TaskRecord, entry: PlanEntry, epoch: int) -> Order:
     assert record.robot is not None
     return Order(
         robot=record.robot,
@@ -207,23 +207,23 @@ def _order(record: TaskRecord, book: PlanBook, epoch: int) -> Order:
         skill=record.skill,
         args=record.args,
         deadline_s=DEADLINE_FACTOR * record.duration_s + DEADLINE_MARGIN_S,
-        cancelled=book.cancelling or record.task in book.dropping,
+        cancelled=entry.cancelling or record.task in entry.dropping,
     )
 
 
 def _told_facts(old: State, new: State) -> Iterator[Effect]:
     if old.facts is new.facts:
         return
-    for name, fact in new.facts.items():
-        if fact is not old.facts.get(name) and fact.source.startswith(PLANNER_SOURCE):
-            yield Publish(FACT, FactAddress(fact.subject, fact.relation), fact)
+    for key, fact in new.facts.items():
+        if fact is not old.facts.get(key) and fact.source.startswith(PLANNER_SOURCE):
+            yield Publish(FACT, FactAddress.of(key), fact)
 
 
 def _jobs(old: State, new: State) -> Iterator[Effect]:
-    for plan, book in new.plans.items():
+    for plan, entry in new.plans.items():
         before = old.plans.get(plan)
-        if book.job is not None and (before is None or before.job != book.job):
-            yield MakePlan(book.job)
+        if entry.job is not None and (before is None or before.job != entry.job):
+            yield MakePlan(entry.job)
     for request, job in new.previews.items():
         if request not in old.previews:
             yield MakePlan(job)

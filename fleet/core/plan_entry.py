@@ -5,7 +5,7 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core.handlers.goals import mark_goals
-from fleet.core.state import PlanBook, State, put
+from fleet.core.state import PlanEntry, State, put
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import PlanState, Violation
 from keyexpr_schema.payloads.requests import Answer
@@ -29,48 +29,48 @@ def answer(
     return replace(state, answers=put(state.answers, request, reply))
 
 
-def set_book(state: State, book: PlanBook) -> State:
+def set_entry(state: State, entry: PlanEntry) -> State:
     """Change what is kept of a plan."""
     return replace(
-        state, plans=put(state.plans, book.plan.plan, replace(book, changed_s=state.time_s))
+        state, plans=put(state.plans, entry.plan.plan, replace(entry, changed_s=state.time_s))
     )
 
 
-def set_record(state: State, book: PlanBook, record: TaskRecord) -> State:
+def set_record(state: State, entry: PlanEntry, record: TaskRecord) -> State:
     """Change what is kept of a task."""
-    return set_book(state, replace(book, records=put(book.records, record.task, record)))
+    return set_entry(state, replace(entry, records=put(entry.records, record.task, record)))
 
 
-def next_task(book: PlanBook) -> int:
+def next_task(entry: PlanEntry) -> int:
     """The first number that no task of the plan has had."""
-    return 1 + max((int(name[1:]) for name in book.records if name[1:].isdigit()), default=0)
+    return 1 + max((int(name[1:]) for name in entry.records if name[1:].isdigit()), default=0)
 
 
-def open_goals(state: State, book: PlanBook) -> list[str]:
+def open_goals(state: State, entry: PlanEntry) -> list[str]:
     """The goals of the plan that have not ended."""
     return [
         goal
-        for goal in book.plan.goals
+        for goal in entry.plan.goals
         if goal in state.goal_states and state.goal_states[goal].state not in ENDED_GOALS
     ]
 
 
-def give_up(state: State, book: PlanBook, reason: str) -> State:
+def give_up(state: State, entry: PlanEntry, reason: str) -> State:
     """End a plan as failed, and with it those of its goals that are not reached."""
     records = {
         name: record
         if record.state is not TaskState.WAITING
         else replace(record, state=TaskState.CANCELLED, reason="the plan failed")
-        for name, record in book.records.items()
+        for name, record in entry.records.items()
     }
-    book = replace(
-        book,
+    entry = replace(
+        entry,
         state=PlanState.FAILED,
         reason=reason,
         replan_reason=None,
         records=records,
-        dropping=tuple(record.task for record in book.outstanding()),
+        dropping=tuple(record.task for record in entry.outstanding()),
         job=None,
     )
-    state = set_book(state, book)
-    return mark_goals(state, book.plan.goals, GoalState.FAILED, book.plan.plan, reason)
+    state = set_entry(state, entry)
+    return mark_goals(state, entry.plan.goals, GoalState.FAILED, entry.plan.plan, reason)

@@ -10,7 +10,8 @@ import msgspec
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.language import Vocabulary
-from fleet.language.vocabulary import Deed
+from fleet.language.vocabulary import SkillPhrase
+from keyexpr_schema.facts import AT, HOLDING, ON, FactKey
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.plans import ENDED_PLANS, Plan, PlanChange, PlanState, Task, Violation
@@ -19,6 +20,7 @@ from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
+K = TypeVar("K")
 T = TypeVar("T")
 
 OUTSTANDING = frozenset({TaskState.ORDERED, TaskState.RUNNING})
@@ -30,17 +32,17 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     `approval`: a person has to approve every new plan. `auto_plan`: goals that wait are planned
     without being asked for, into a running plan where there is one. `interpreter`: sentences that
     the grammar refuses go to a language model. `lost_after_s`: a robot whose worker is gone for
-    longer (wall time, s) counts as lost. `deeds` are skills that goals can ask for by name.
+    longer (wall time, s) counts as lost. `skill_phrases` are skills that goals can ask for by name.
     """
 
     approval: bool = False
     auto_plan: bool = False
     interpreter: bool = False
     lost_after_s: float = 30.0
-    deeds: tuple[Deed, ...] = ()
+    skill_phrases: tuple[SkillPhrase, ...] = msgspec.field(default=(), name="deeds")
 
 
-class Job(msgspec.Struct, frozen=True, kw_only=True):
+class PlanningJob(msgspec.Struct, frozen=True, kw_only=True):
     """Planning to be done outside the core: for goals, or of a plan that someone proposed."""
 
     job: int
@@ -72,7 +74,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     """Why the plan is made again."""
 
 
-class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
+class PlanEntry(msgspec.Struct, frozen=True, kw_only=True):
     """A plan with everything the planner keeps about it.
 
     `records` hold the tasks of every revision; `plan` only those of the current one.
@@ -91,7 +93,7 @@ class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
     records: dict[str, TaskRecord] = {}
     allocation: dict[str, str] = {}
     sequence: dict[str, tuple[str, ...]] = {}
-    job: Job | None = None
+    job: PlanningJob | None = None
     replan_reason: str | None = None
     anew_reason: str | None = None
     outside_reason: str | None = None
@@ -128,7 +130,7 @@ class PlanBook(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class State(msgspec.Struct, frozen=True, kw_only=True):
-    """What the planner knows. `facts` are keyed by `subject/relation`."""
+    """What the planner knows."""
 
     epoch: int = 0
     incarnation: str = "none"
@@ -141,17 +143,17 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     places: dict[str, Place] = {}
     objects: dict[str, Object] = {}
     robots: dict[str, RobotSpec] = {}
-    facts: dict[str, Fact] = {}
+    facts: dict[FactKey, Fact] = {}
     durations: dict[str, Durations] = {}
     """Learned from reports, by type of robot."""
     alive: dict[str, tuple[str, ...]] = {}
     gone_since: dict[str, float] = {}
     """Unix time [s] at which the last worker of a robot went away."""
-    plans: dict[str, PlanBook] = {}
+    plans: dict[str, PlanEntry] = {}
     past_plans: tuple[str, ...] = ()
     answers: dict[str, Answer] = {}
     jobs: int = 0
-    previews: dict[str, Job] = {}
+    previews: dict[str, PlanningJob] = {}
     """Planning jobs of dry runs, by request."""
     interpreting: tuple[str, ...] = ()
     """Goals whose sentences a language model reads now."""
@@ -162,19 +164,19 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
         whereabouts = {
             fact.subject: fact.value
             for fact in self.facts.values()
-            if fact.relation == "at" and isinstance(fact.value, str)
+            if fact.relation == AT and isinstance(fact.value, str)
         }
         rooms = {s.surface: p.place for p in self.places.values() for s in p.surfaces}
         rests: dict[str, str] = {}
         for fact in self.facts.values():
             where = whereabouts.get(fact.subject)
             # What it lay on says nothing any more once it was taken to another place.
-            if fact.relation != "on" or where not in self.places:
+            if fact.relation != ON or where not in self.places:
                 continue
             if isinstance(fact.value, str) and rooms.get(fact.value, where) == where:
                 rests[fact.subject] = fact.value
-        deeds = self.policy.deeds
-        return Vocabulary(self.places, self.objects, self.robots, whereabouts, rests, deeds)
+        phrases = self.policy.skill_phrases
+        return Vocabulary(self.places, self.objects, self.robots, whereabouts, rests, phrases)
 
     def world(self, skills: Mapping[str, SkillModel]) -> WorldModel:
         """The world as believed now."""
@@ -197,18 +199,35 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
         spec = self.robots.get(robot)
         if spec is None or not self.alive.get(robot):
             return False
-        return "grip" not in spec.capabilities or self.fact("holding", robot) is not None
+        return "grip" not in spec.capabilities or self.fact(HOLDING, robot) is not None
 
     def fact(self, relation: str, subject: str) -> Fact | None:
         """The fact about a variable, if there is one."""
-        return self.facts.get(f"{subject}/{relation}")
+        return self.facts.get(FactKey(relation, subject))
 
 
-def put(mapping: Mapping[str, T], key: str, value: T) -> dict[str, T]:
+def encode_state(state: State) -> bytes:
+    """The state as JSON, with `subject/relation` for the key of a fact, as in the key-space."""
+    return msgspec.json.encode(state, enc_hook=lambda key: f"{key.subject}/{key.relation}")
+
+
+def decode_state(data: bytes) -> State:
+    """The state that `encode_state` wrote.
+
+    Raises:
+        msgspec.DecodeError: it is none, or one of a version that kept something else.
+    """
+    fields = msgspec.json.decode(data, type=dict[str, msgspec.Raw])
+    facts = msgspec.json.decode(fields.pop("facts", msgspec.Raw(b"{}")), type=dict[str, Fact])
+    state = msgspec.json.decode(msgspec.json.encode(fields), type=State)
+    return msgspec.structs.replace(state, facts={fact.key: fact for fact in facts.values()})
+
+
+def put(mapping: Mapping[K, T], key: K, value: T) -> dict[K, T]:
     """A copy of `mapping` with one entry set."""
     return {**mapping, key: value}
 
 
-def without(mapping: Mapping[str, T], key: str) -> dict[str, T]:
+def without(mapping: Mapping[K, T], key: K) -> dict[K, T]:
     """A copy of `mapping` with one entry left out."""
     return {name: value for name, value in mapping.items() if name != key}

@@ -6,11 +6,11 @@ Kirkpatrick, Gelatt, Vecchi 1983; moves at the critical path as in van Laarhoven
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from math import inf, log
 from random import Random
 
+from fleet.jobshop.budget import Budget
 from fleet.jobshop.compiled import Compiled
 from fleet.jobshop.list_scheduling import Answer
 from fleet.jobshop.timing import rate
@@ -33,7 +33,7 @@ NEAR = 1e-9
 def anneal(
     shop: Compiled,
     begin: Answer,
-    deadline_s: float,
+    budget: Budget,
     bound_s: float = 0.0,
     seed: int = 0,
     move_price_s: float = 0.0,
@@ -41,7 +41,7 @@ def anneal(
     frozen: frozenset[int] = frozenset(),
     stopped: Callable[[], bool] = lambda: False,
 ) -> Answer:
-    """The best found from `begin` until `deadline_s` (on `time.perf_counter`) or the bound is met.
+    """The best found from `begin` until the `budget` is over or the bound is met.
 
     With `home` machines, every block away from home costs `move_price_s`. Blocks in `frozen` keep
     their machine. It ends as soon as `stopped` says so. The answer is never worse than `begin`.
@@ -49,9 +49,8 @@ def anneal(
     random = Random(seed)
     search = _Search(shop, begin, random, move_price_s, home, frozen)
     share = FIRST_COOLING
-    while (now_s := time.perf_counter()) < deadline_s:
-        end_s = now_s + max(share * (deadline_s - now_s), SHORTEST_S)
-        if search.run(min(end_s, deadline_s), bound_s, stopped):
+    while not budget.over:
+        if search.run(budget.part(share, SHORTEST_S), bound_s, stopped):
             break
         search = _Search(shop, search.best, random, move_price_s, home, frozen)
         share = LATER_COOLING
@@ -81,10 +80,9 @@ class _Search:
         self._index(0, len(self.order))
         self._trace()
 
-    def run(self, deadline_s: float, bound_s: float, stopped: Callable[[], bool]) -> bool:
-        """One cooling, until `deadline_s`; whether there is nothing more to look for."""
-        random, began_s = self.random, time.perf_counter()
-        length_s = deadline_s - began_s
+    def run(self, budget: Budget, bound_s: float, stopped: Callable[[], bool]) -> bool:
+        """One cooling; whether there is nothing more to look for."""
+        random = self.random
         scale = self.makespan or 1.0
         tries = 0
         temperature = HOT * scale
@@ -93,7 +91,7 @@ class _Search:
             return True
         while True:
             if tries % 16 == 0:
-                spent = (time.perf_counter() - began_s) / length_s if length_s > 0 else 1.0
+                spent = budget.spent
                 if spent >= 1.0:
                     return False
                 if exact and self.best.rated.makespan_s <= bound_s * (1 + NEAR) + NEAR:

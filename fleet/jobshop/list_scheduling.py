@@ -7,13 +7,13 @@ a large alpha is list scheduling.
 
 from __future__ import annotations
 
-import time
 from bisect import insort
 from collections.abc import Sequence
 from math import inf
 from random import Random
 from typing import NamedTuple
 
+from fleet.jobshop.budget import Budget
 from fleet.jobshop.compiled import Compiled
 from fleet.jobshop.problem import Place
 from fleet.jobshop.timing import Rated, rate
@@ -37,13 +37,13 @@ def construct(
     shop: Compiled,
     alpha: float | None = None,
     at_random: Random | None = None,
-    until_s: float = inf,
+    budget: Budget | None = None,
 ) -> Answer | None:
     """Place one ready knot after the other; without `alpha` the one of highest rank (HEFT).
 
     `at_random` takes any machine that will do, instead of the one where a block ends first.
-    Deterministic. `None` if it leads to where some block finds no machine, or if it is not done at
-    `until_s` (on `time.perf_counter`).
+    Deterministic. `None` if it leads to where some block finds no machine, or if the `budget` is
+    over before it is done.
     """
     board = Board(shop, at_random)
     order: list[int] = []
@@ -54,7 +54,7 @@ def construct(
         if count == 0:
             insort(ready, (shop.knot_place[knot], -shop.knot_rank[knot], knot))
     while ready:
-        if len(order) % 256 == 255 and time.perf_counter() > until_s:
+        if len(order) % 256 == 255 and budget is not None and budget.over:
             return None
         at = 0 if alpha is None else board.choose(ready, guesses, alpha)
         knot = ready.pop(at)[2]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from math import ceil, inf
+from math import ceil
 from random import Random
 
 from fleet.jobshop.annealing import anneal
 from fleet.jobshop.bounds import bound_with_ways, lower_bound
 from fleet.jobshop.branch_and_bound import exhaust
+from fleet.jobshop.budget import Budget
 from fleet.jobshop.compiled import Compiled
 from fleet.jobshop.cpsat import CpSat, installed
 from fleet.jobshop.cpsat_request import helps
@@ -30,8 +31,8 @@ MET = 1e-6
 """Relative difference between makespan and bound that counts as none."""
 
 
-def solve(shop: Shop, deadline_s: float = 1.0, exact: bool = True, seed: int = 0) -> Timed | None:
-    """The best schedule found in `deadline_s` (the list schedule however long that takes).
+def solve(shop: Shop, budget: Budget, exact: bool = True, seed: int = 0) -> Timed | None:
+    """The best schedule found within the `budget` (the list schedule however long that takes).
 
     `exact` allows CP-SAT, where it is installed and the size is right; it then takes up to
     `START_UP_S` longer, unless the schedule was proven optimal before. `None` if no rule finds any
@@ -40,13 +41,11 @@ def solve(shop: Shop, deadline_s: float = 1.0, exact: bool = True, seed: int = 0
     Raises:
         BadShop: the problem contradicts itself.
     """
-    began_s = time.perf_counter()
-    until_s = began_s + deadline_s
     ready = Compiled(shop)
     listed = construct(ready)
-    best = rules(ready, listed, began_s + RULES_SHARE * deadline_s)
+    best = rules(ready, listed, budget.until(RULES_SHARE))
     if best is None:
-        best = persist(ready, until_s, seed)
+        best = persist(ready, budget, seed)
     if best is None:
         return None
     bound_s = lower_bound(ready)
@@ -65,7 +64,7 @@ def solve(shop: Shop, deadline_s: float = 1.0, exact: bool = True, seed: int = 0
             bound_s = max(bound_s, best.rated.makespan_s)
         notes.append("every schedule looked at")
     if not _met(best, bound_s) and (all_tried is None or (exact and installed())):
-        answer, bound_s, how = _search(shop, ready, best, answer, bound_s, until_s, exact, seed)
+        answer, bound_s, how = _search(shop, ready, best, answer, bound_s, budget, exact, seed)
         notes.append(how)
         if ready.travels and answer.makespan_s > bound_s * (1 + NEAR):
             bound_s = max(bound_s, bound_with_ways(ready))
@@ -79,27 +78,27 @@ def solve(shop: Shop, deadline_s: float = 1.0, exact: bool = True, seed: int = 0
     )
 
 
-def rules(shop: Compiled, best: Answer | None, until_s: float) -> Answer | None:
-    """The best of the list schedule `best` and dispatch rules, tried until `until_s`.
+def rules(shop: Compiled, best: Answer | None, budget: Budget) -> Answer | None:
+    """The best of the list schedule `best` and dispatch rules, tried until the `budget` is over.
 
     Those that are tried at small sizes take no time worth counting.
     """
     for alpha in ALPHAS:
         small = len(shop.befores) <= ALWAYS
-        if best is not None and not small and time.perf_counter() > until_s:
+        if best is not None and not small and budget.over:
             break
-        found = construct(shop, alpha, until_s=inf if small or best is None else until_s)
+        found = construct(shop, alpha, budget=None if small or best is None else budget)
         if found is not None and (best is None or found.rated.cost < best.rated.cost):
             best = found
     return best
 
 
-def persist(shop: Compiled, until_s: float, seed: int) -> Answer | None:
+def persist(shop: Compiled, budget: Budget, seed: int) -> Answer | None:
     """Some schedule where rules run into dead ends: blocks of a knot in other orders, machines at
     random for a knot after the other."""
     random = Random(seed)
     tries = 0
-    while tries < AT_LEAST or time.perf_counter() < until_s:
+    while tries < AT_LEAST or not budget.over:
         tries += 1
         for together in shop.knot_blocks:
             random.shuffle(together)
@@ -120,18 +119,18 @@ def _search(
     best: Answer,
     answer: Timed,
     bound_s: float,
-    until_s: float,
+    budget: Budget,
     exact: bool,
     seed: int,
 ) -> tuple[Timed, float, str]:
     """A better answer, the better bound, and who found it."""
     run = None
     if exact and installed() and helps(ready):
-        wall_s = time.time() + (until_s - time.perf_counter()) + START_UP_S
-        run = CpSat(ready, best, bound_s, wall_s, seed)
+        until_s = time.time() + budget.left_s + START_UP_S
+        run = CpSat(ready, best, bound_s, until_s, seed)
     how = "search"
     try:
-        found = anneal(ready, best, until_s, bound_s, seed, stopped=lambda: ended(run))
+        found = anneal(ready, best, budget, bound_s, seed, stopped=lambda: ended(run))
         if found.rated.cost < best.rated.cost:
             better = timed(shop, blocks_in_order(ready, found), found.machine_of)
             if better is not None:

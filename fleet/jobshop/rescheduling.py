@@ -9,12 +9,12 @@ a search with a price on moves.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
 from fleet.jobshop.annealing import anneal
+from fleet.jobshop.budget import Budget
 from fleet.jobshop.compiled import Compiled
 from fleet.jobshop.list_scheduling import Answer, construct
 from fleet.jobshop.portfolio import blocks_in_order
@@ -66,8 +66,8 @@ def reschedule(
     shop: Shop,
     home: Sequence[int],
     order: Sequence[int],
+    budget: Budget,
     frozen: frozenset[int] = frozenset(),
-    deadline_s: float = 0.7,
     seed: int = 0,
 ) -> Rescheduled | None:
     """Mend the schedule `home` (machine of each block) and `order` (of blocks) for the `shop` as
@@ -80,26 +80,21 @@ def reschedule(
     Raises:
         BadShop: a frozen block cannot be done by its machine.
     """
-    began_s = time.perf_counter()
-
-    def at(share: float) -> float:
-        return began_s + share * deadline_s
-
     shop = _pinned(shop, home, frozen)
     ready = Compiled(shop)
     knots = _knots_in_order(ready, order)
     first = [construct(ready), keep(ready, knots, home, inf)]
     found = [answer for answer in first if answer is not None]
-    if not found and (repaired := _repair(ready, home, knots, at(1.0))) is not None:
+    if not found and (repaired := _repair(ready, home, knots, budget)) is not None:
         found.append(repaired)
     if not found:
         return None
     mending = _Mending(ready, home, knots, frozen, found, seed)
-    mending.keep_to_targets(at(TARGETS_SHARE))
-    mending.repair(at(REPAIR_SHARE))
-    mending.shorten(at(SHORTEN_SHARE))
-    mending.keep_to_targets(at(MORE_TARGETS_SHARE))
-    chosen = mending.move_less(at(TAKE_BACK_SHARE), at(1.0))
+    mending.keep_to_targets(budget.until(TARGETS_SHARE))
+    mending.repair(budget.until(REPAIR_SHARE))
+    mending.shorten(budget.until(SHORTEN_SHARE))
+    mending.keep_to_targets(budget.until(MORE_TARGETS_SHARE))
+    chosen = mending.move_less(budget.until(TAKE_BACK_SHARE), budget)
     answer = timed(shop, blocks_in_order(ready, chosen), chosen.machine_of)
     assert answer is not None, "an order of knots has no deadlock"
     return Rescheduled(answer, tuple(_moved(chosen.machine_of, home)), mending.best_s)
@@ -134,12 +129,12 @@ class _Mending:
         """The longest makespan that fewer moves may lead to."""
         return self.best_s * (1 + WITHIN)
 
-    def keep_to_targets(self, until_s: float) -> None:
+    def keep_to_targets(self, budget: Budget) -> None:
         """Everybody stays where the target can be met. That may miss it by a little, where there
         are ways or partners, so that shorter ones are tried, too."""
         tried = 0
         while tried < len(TARGETS):
-            if self.met and time.perf_counter() > until_s:
+            if self.met and budget.over:
                 break
             if self.limit_s != self.targeted_s:
                 # The first time, or one of those before has come out shorter than all others.
@@ -159,27 +154,27 @@ class _Mending:
         limit_s = self.limit_s
         return any(answer.rated.makespan_s <= limit_s for answer in self.kept)
 
-    def repair(self, until_s: float) -> None:
+    def repair(self, budget: Budget) -> None:
         """Only orphans move."""
-        made = _repair(self.shop, self.home, self.knots, until_s)
+        made = _repair(self.shop, self.home, self.knots, budget)
         if made is not None:
             self.found.append(made)
 
-    def shorten(self, until_s: float) -> None:
+    def shorten(self, budget: Budget) -> None:
         """Search for a shorter schedule at any number of moves, from one that has few: what comes
         out of a new one would set a limit that only new ones meet."""
         begin = self.kept if self.met else self.found
         shortest = min(begin, key=lambda answer: answer.rated.makespan_s)
-        self.found.append(anneal(self.shop, shortest, until_s, 0.0, self.seed, frozen=self.frozen))
+        self.found.append(anneal(self.shop, shortest, budget, 0.0, self.seed, frozen=self.frozen))
 
-    def move_less(self, take_back_until_s: float, until_s: float) -> Answer:
+    def move_less(self, take_back: Budget, budget: Budget) -> Answer:
         """The answer with the fewest moves within the limit, and fewer if that can be."""
         chosen = self._chosen()
-        chosen = _taken_back(self.shop, chosen, self.home, self.limit_s, take_back_until_s)
+        chosen = _taken_back(self.shop, chosen, self.home, self.limit_s, take_back)
         self.found.append(chosen)
         price_s = PRICE * self.best_s
         priced = anneal(
-            self.shop, chosen, until_s, 0.0, self.seed + 1, price_s, self.home, self.frozen
+            self.shop, chosen, budget, 0.0, self.seed + 1, price_s, self.home, self.frozen
         )
         self.found.append(priced)
         return self._chosen()
@@ -210,7 +205,7 @@ def _moved(machine_of: Sequence[int], home: Sequence[int]) -> list[int]:
 
 
 def _repair(
-    shop: Compiled, home: Sequence[int], knots: Sequence[int], until_s: float
+    shop: Compiled, home: Sequence[int], knots: Sequence[int], budget: Budget
 ) -> Answer | None:
     """Everything stays but the orphans, the one of highest rank first; they go where there is least
     to do, and while there is time, where the makespan is least."""
@@ -227,7 +222,7 @@ def _repair(
         busy[machine_of[block]] += _length_s(shop, block, machine_of[block])
     best = rate(shop, knots, machine_of)
     for block in orphans:
-        if time.perf_counter() > until_s:
+        if budget.over:
             break
         now = machine_of[block]
         for machine in sorted(blocks[block].machines, key=busy.__getitem__)[:TRIED]:
@@ -277,13 +272,13 @@ def _knots_in_order(shop: Compiled, order: Sequence[int]) -> list[int]:
 
 
 def _taken_back(
-    shop: Compiled, answer: Answer, home: Sequence[int], limit_s: float, until_s: float
+    shop: Compiled, answer: Answer, home: Sequence[int], limit_s: float, budget: Budget
 ) -> Answer:
     """Moves undone one by one, as long as the makespan stays within the limit."""
     machine_of, rated = list(answer.machine_of), answer.rated
     for block in _moved(machine_of, home):
         row = shop.shop.blocks[block]
-        if time.perf_counter() > until_s:
+        if budget.over:
             break
         if home[block] not in row.machines or any(
             machine_of[other] == home[block] for other in row.apart

@@ -9,7 +9,7 @@ from fleet.language.clauses import Clauses
 from fleet.language.refusals import one_of
 from fleet.language.subjects import Subject
 from fleet.language.vocabulary import Vocabulary
-from keyexpr_schema.payloads.world import NOTHING, Value
+from keyexpr_schema.facts import AT, HOLDING, NOTHING, ON, SEARCHED, FactKey, Value
 
 
 class Claims(Clauses):
@@ -17,7 +17,7 @@ class Claims(Clauses):
 
     def __init__(self, text: str, words: Vocabulary) -> None:
         super().__init__(text, words, "a fact")
-        self.facts: dict[tuple[str, str], Value] = {}
+        self.facts: dict[FactKey, Value] = {}
 
     def fact(self, relation: str, subject: str, value: Value) -> None:
         """Keep a fact.
@@ -25,12 +25,10 @@ class Claims(Clauses):
         Raises:
             NotUnderstood: the text said something else of it.
         """
-        before = self.facts.setdefault((relation, subject), value)
+        before = self.facts.setdefault(key := FactKey(relation, subject), value)
         if before != value:
             shown = ["nobody knows where" if v is None else str(v) for v in (before, value)]
-            raise NotUnderstood(
-                f"it says two things of {relation}({subject}): {' and '.join(shown)}"
-            )
+            raise NotUnderstood(f"it says two things of {key}: {' and '.join(shown)}")
 
     def put(
         self, things: Sequence[Subject], target: str | None, surface: str | None = None
@@ -48,9 +46,9 @@ class Claims(Clauses):
             if mention.sort == "robot" and target not in self.words.places:
                 raise NotUnderstood("a robot is at a place, not on a robot: name the place")
             for name in mention.subjects:
-                self.fact("at", name, target)
+                self.fact(AT, name, target)
                 if surface is not None and mention.sort == "object":
-                    self.fact("on", name, surface)
+                    self.fact(ON, name, surface)
         self.subjects.remember(mentions)
 
     def lost(self, things: Sequence[Subject]) -> None:
@@ -60,7 +58,7 @@ class Claims(Clauses):
             if mention.open:
                 raise NotUnderstood(f"it does not say which of {one_of(mention.subjects)}: name it")
             for name in mention.subjects:
-                self.fact("at", name, None)
+                self.fact(AT, name, None)
         self.subjects.remember(mentions)
 
     def holding(
@@ -76,9 +74,9 @@ class Claims(Clauses):
             )
         for name in names:
             if in_hand:
-                self.fact("holding", name, objects[0] if objects else NOTHING)
+                self.fact(HOLDING, name, objects[0] if objects else NOTHING)
             for thing in objects:
-                self.fact("at", thing, name)
+                self.fact(AT, thing, name)
 
     def looked_around(self, places: Sequence[str], value: bool) -> None:
         """Somebody looked around in these places, or nobody did."""
@@ -89,4 +87,4 @@ class Claims(Clauses):
             )
         self.cursor.take("yet")
         for place in places:
-            self.fact("searched", place, value)
+            self.fact(SEARCHED, place, value)

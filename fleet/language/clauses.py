@@ -10,6 +10,7 @@ from fleet.language.mentions import Mention
 from fleet.language.subjects import Subject
 from fleet.language.tidying import Tidying
 from fleet.language.wordlists import ANYWHERE, WHOLE_HOUSE
+from keyexpr_schema.facts import AT, HELD, LOCATED, SEARCHED
 
 _ROBOTS_TELL = "robots say themselves where they are; see their states"
 
@@ -30,7 +31,7 @@ class Clauses(Tidying):
         if not cursor.take_of(ANYWHERE) and (places := self._where_to_look(start)):
             self.searched(places, start)
         for mention in mentions:
-            self.draft.add("located", mention, True)
+            self.draft.add(LOCATED, mention, True)
         self.subjects.remember(mentions)
 
     def _where_to_look(self, start: int) -> tuple[str, ...]:
@@ -72,7 +73,7 @@ class Clauses(Tidying):
             raise NotUnderstood(f'{cursor.said(start)!r}: to move a thing, say "bring"')
         mentions = [self.subjects.settle(s, where.target or where.source) for s in picked]
         for mention in mentions:
-            self.draft.add("held", mention, True)
+            self.draft.add(HELD, mention, True)
         self.subjects.remember(mentions)
 
     def search(self) -> None:
@@ -97,7 +98,7 @@ class Clauses(Tidying):
         for i, place in enumerate(self._route()):
             if i:
                 self.draft.next_stage()
-            self.draft.add("at", mentions[0], place)
+            self.draft.add(AT, mentions[0], place)
             self.last_place = place
         self.subjects.remember(mentions)
 
@@ -123,6 +124,6 @@ class Clauses(Tidying):
 
     def searched(self, places: Sequence[str], key: int) -> None:
         """Wish that somebody looked around in these places."""
-        self.draft.add("searched", Mention(tuple(places), "place", key), True)
+        self.draft.add(SEARCHED, Mention(tuple(places), "place", key), True)
         if len(places) == 1:
             self.last_place = places[0]

@@ -11,7 +11,7 @@ from fleet.language.sentences import Sentences
 from fleet.language.subjects import THINGS, Fact, Subject
 from fleet.language.tokens import SENTENCE_ENDS, words_of
 from fleet.language.verbs import EXAMPLE, IMPERATIVES, longest, verb_next
-from fleet.language.vocabulary import Deed, Vocabulary
+from fleet.language.vocabulary import SkillPhrase, Vocabulary
 from fleet.language.wordlists import (
     ASKING_WHERE,
     CLOSERS,
@@ -180,8 +180,8 @@ class _Goals(Sentences):
             self.declarative(told=True)
         elif cursor.word() in ("clear", "empty") and self._table_next():
             self.clear()
-        elif (deed := self._deed()) is not None:
-            self._done_to(deed)
+        elif (phrase := self._skill_phrase()) is not None:
+            self._done_to(phrase)
         elif verb_next(cursor):
             self.imperative()
         elif cursor.word() in ("can", "could", "would", "will", "should", "may"):
@@ -194,18 +194,18 @@ class _Goals(Sentences):
         else:
             raise self.no_clause()
 
-    def _deed(self) -> Deed | None:
+    def _skill_phrase(self) -> SkillPhrase | None:
         """The skill whose name comes next, unless a verb of ours is as long; past it."""
-        names = {words_of(deed.verb): deed for deed in self.words.deeds}
+        names = {words_of(phrase.verb): phrase for phrase in self.words.skill_phrases}
         verb = longest(self.cursor, names)
         if verb is None or len(longest(self.cursor, IMPERATIVES) or ()) >= len(verb):
             return None
         self.cursor.at += len(verb)
         return names[verb]
 
-    def _done_to(self, deed: Deed) -> None:
+    def _done_to(self, phrase: SkillPhrase) -> None:
         """`vacuum the hallway and the kitchen`, after the verb."""
-        if deed.sort == "place":
+        if phrase.sort == "place":
             names = self.places()
             mentions = [Mention((name,), "place", self.cursor.at) for name in names]
         else:
@@ -213,7 +213,7 @@ class _Goals(Sentences):
             mentions = [self.subjects.settle(subject) for subject in found]
             self.subjects.remember(mentions)
         for mention in mentions:
-            for relation, value in deed.wants:
+            for relation, value in phrase.wants:
                 self.draft.add(relation, mention, value)
 
     def _table_next(self) -> bool:

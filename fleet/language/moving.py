@@ -18,6 +18,7 @@ from fleet.language.subjects import THINGS, Subject, Subjects
 from fleet.language.verbs import PARTICLES
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.wordlists import HOME, RELATIVE
+from keyexpr_schema.facts import AT, HELD
 
 HOME_HINT = 'give it one with the field "home" of the object'
 
@@ -85,7 +86,7 @@ class Moving:
             raise self._no_target()
         mentions = [self._from(self.subjects.movable(s), where) for s in moved]
         for mention in mentions:
-            self.draft.add("held", mention, True, whereto=True)
+            self.draft.add(HELD, mention, True, whereto=True)
         self.subjects.remember(mentions)
 
     def _from(self, subject: Subject, where: Where) -> Mention:
@@ -183,7 +184,7 @@ class Moving:
         for number, place in enumerate(where.each, 1):
             # Each is one of its own: negative keys are those of no word.
             one = replace(mentions[0], key=-(1000 * (mentions[0].key + 1) + number))
-            self.draft.add("at", one, place)
+            self.draft.add(AT, one, place)
         self.moved = []
         self.subjects.remember([])
 
@@ -203,7 +204,7 @@ class Moving:
                 raise NotUnderstood("a robot goes to a place, not to a robot: name the place")
             else:
                 on_robot = where.target_sort == "robot"
-                self.draft.add("at", mention, where.target, on_robot=on_robot)
+                self.draft.add(AT, mention, where.target, on_robot=on_robot)
         self.subjects.remember(mentions)
         if where.target is not None and where.target_sort == "robot":
             receiver = Mention((where.target,), "robot", self.cursor.at)
@@ -235,10 +236,10 @@ class Moving:
             name = homeless[0] if homeless else mention.subjects[0]
             raise NotUnderstood(f"it is not known where {name} belongs: {HOME_HINT}")
         if mention.open:
-            self.draft.add("at", mention, homes[mention.subjects[0]])
+            self.draft.add(AT, mention, homes[mention.subjects[0]])
             return
         for name in mention.subjects:
-            self.draft.add("at", Mention((name,), "object", mention.key), homes[name])
+            self.draft.add(AT, Mention((name,), "object", mention.key), homes[name])
 
     # --- going -----------------------------------------------------------------------------------
     def go(self, who: Sequence[Subject] | None) -> None:
@@ -252,5 +253,5 @@ class Moving:
         if who is not None:
             return self.to_target(who, where, False)
         self.moved = [robot := self.subjects.some_robot()]
-        self.draft.add("at", robot, where.target, means=True)
+        self.draft.add(AT, robot, where.target, means=True)
         return None

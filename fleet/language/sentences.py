@@ -22,7 +22,8 @@ from fleet.language.verbs import (
     verb_next,
 )
 from fleet.language.vocabulary import Vocabulary
-from fleet.language.wordlists import CLOSERS, HOME, LOCATED, MODALS, OPENERS, STANDING
+from fleet.language.wordlists import CLOSERS, HOME, MODALS, OPENERS, SITUATED, STANDING
+from keyexpr_schema.facts import HELD, LOCATED, SEARCHED
 
 _QUESTIONS = frozenset(words_in("is are was were does did has what who why how which whose"))
 
@@ -164,9 +165,9 @@ class Sentences(Clauses):
             relation = next(
                 name
                 for doing, name in (
-                    (Doing.FIND, "located"),
-                    (Doing.PICK, "held"),
-                    (Doing.SEARCH, "searched"),
+                    (Doing.FIND, LOCATED),
+                    (Doing.PICK, HELD),
+                    (Doing.SEARCH, SEARCHED),
                 )
                 if doing in done
             )
@@ -208,7 +209,7 @@ class Sentences(Clauses):
                 if not doing & {Doing.FIND} or self._ends():
                     return doing
                 cursor.at = start
-            if not cursor.take_of(LOCATED):
+            if not cursor.take_of(SITUATED):
                 return frozenset()
 
     def _ends(self) -> bool:
@@ -216,15 +217,15 @@ class Sentences(Clauses):
 
     def _has_been(self, who: Sequence[Subject], relation: str) -> None:
         mentions = [self.subjects.settle(self.subjects.movable(s)) for s in who]
-        wanted = PLACES if relation == "searched" else ("object",)
+        wanted = PLACES if relation == SEARCHED else ("object",)
         for mention in mentions:
             if mention.sort not in wanted:
                 raise NotUnderstood(
                     f"{self.cursor.said(self.began)!r}: {relation} is said of "
-                    f"{'places' if relation == 'searched' else 'objects'} only"
+                    f"{'places' if relation == SEARCHED else 'objects'} only"
                 )
             self.draft.add(relation, mention, True)
-        if relation != "searched":
+        if relation != SEARCHED:
             self.subjects.remember(mentions)
 
     # --- refusals --------------------------------------------------------------------------------

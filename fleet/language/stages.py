@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from fleet.errors import NotUnderstood
 from fleet.language.mentions import Mention
 from fleet.language.refusals import one_of
+from keyexpr_schema.facts import AT, HELD, LOCATED, SEARCHED, Value
 from keyexpr_schema.payloads.goals import Condition
-from keyexpr_schema.payloads.world import Value
 
 _THEN = 'if one is to come after the other, say "then"'
 
@@ -111,7 +111,7 @@ def _check_carried(wishes: Sequence[Wish]) -> None:
     "Pick up the cup and go to the kitchen" would be reached by two robots: one holds, one goes.
     """
     for i, wish in enumerate(wishes):
-        if wish.relation != "held":
+        if wish.relation != HELD:
             continue
         brought = [j for j in range(i + 1, len(wishes)) if _brings(wishes[j], wish)]
         if wish.whereto and not brought:
@@ -127,14 +127,14 @@ def _check_carried(wishes: Sequence[Wish]) -> None:
 
 
 def _brings(wish: Wish, held: Wish) -> bool:
-    return wish.relation == "at" and _same(wish, held)
+    return wish.relation == AT and _same(wish, held)
 
 
 def _on_the_way(stage: Sequence[Wish]) -> list[Wish]:
     """Without going somewhere with what is in hand and put down there later in the stage."""
     kept = []
     for i, wish in enumerate(stage):
-        held = [h for h in stage[:i] if h.relation == "held"]
+        held = [h for h in stage[:i] if h.relation == HELD]
         if wish.means and any(
             _brings(later, h) and later.value == wish.value
             for later in stage[i + 1 :]
@@ -151,7 +151,7 @@ def _apart(stage: Sequence[Wish]) -> list[list[Wish]]:
     for wish in stage:
         last = parts[-1][-1] if parts[-1] else None
         if last is not None and last.means and not wish.means:
-            if wish.relation == "searched" and wish.subjects == (last.value,):
+            if wish.relation == SEARCHED and wish.subjects == (last.value,):
                 parts[-1].pop()
             else:
                 parts.append([])
@@ -176,8 +176,8 @@ def _settled(stage: Sequence[Wish]) -> list[Wish]:
                     f"{wish.value}; {_THEN}"
                 )
     for wish in kept:
-        put_down = [w for w in kept if w.relation == "at" and not w.on_robot]
-        if wish.relation == "held" and any(
+        put_down = [w for w in kept if w.relation == AT and not w.on_robot]
+        if wish.relation == HELD and any(
             w.key == wish.key or (not w.open and w.subjects == wish.subjects) for w in put_down
         ):
             raise NotUnderstood(f"it wants {one_of(wish.subjects)} both held and put down; {_THEN}")
@@ -188,16 +188,16 @@ def _settled(stage: Sequence[Wish]) -> list[Wish]:
 def _implies(wish: Wish, other: Wish, later: bool) -> bool:
     """Whether `other` need not be said beside `wish`."""
     same = wish.subjects == other.subjects or wish.key == other.key
-    if other.relation == "located":
-        return same and wish.relation in ("at", "held")
-    return same and other.relation == "held" and wish.relation == "at" and later
+    if other.relation == LOCATED:
+        return same and wish.relation in (AT, HELD)
+    return same and other.relation == HELD and wish.relation == AT and later
 
 
 def _left_for(wish: Wish, others: Sequence[Wish]) -> Wish:
     """An open wish without those that another one names: "the first cup and another cup"."""
-    if not wish.open or wish.relation != "at":
+    if not wish.open or wish.relation != AT:
         return wish
-    named = {w.subjects[0] for w in others if w.relation == "at" and not w.open}
+    named = {w.subjects[0] for w in others if w.relation == AT and not w.open}
     left = tuple(s for s in wish.subjects if s not in named)
     if not left:
         raise NotUnderstood(f"it wants more of {one_of(wish.subjects)} than there are; {_THEN}")
@@ -209,7 +209,7 @@ def _check_open(kept: Sequence[Wish], fixed: dict[tuple[str, str], Wish]) -> Non
 
     Wishes are matched with subjects by augmenting paths (Kuhn 1955).
     """
-    at = [wish for wish in kept if wish.open and wish.relation == "at"]
+    at = [wish for wish in kept if wish.open and wish.relation == AT]
     for wish in at:
         for other in at:
             if wish.key == other.key and wish.value != other.value:
@@ -223,7 +223,7 @@ def _check_open(kept: Sequence[Wish], fixed: dict[tuple[str, str], Wish]) -> Non
                     f"it wants one of {one_of(wish.subjects)} in {wish.value} more than once: "
                     "say how many, or which ones"
                 )
-    taken = {name: wish for (relation, name), wish in fixed.items() if relation == "at"}
+    taken = {name: wish for (relation, name), wish in fixed.items() if relation == AT}
     open_wishes = list(dict.fromkeys(replace(wish, key=0) for wish in at))
     open_wishes = [
         w

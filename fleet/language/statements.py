@@ -25,15 +25,14 @@ from fleet.language.subjects import THINGS, Subject
 from fleet.language.tokens import SENTENCE_ENDS
 from fleet.language.verbs import verb_next
 from fleet.language.vocabulary import Vocabulary
-from fleet.language.wordlists import ANYWHERE, LOCATED, STANDING, phrases
-from keyexpr_schema.payloads.world import Value
+from fleet.language.wordlists import ANYWHERE, SITUATED, STANDING, phrases
+from keyexpr_schema.facts import Literal
 
-FactRow = tuple[str, str, Value]
 _EXAMPLE = 'say it like "the first cup is in the kitchen" or "nobody knows where the book is"'
 
 
-def statement_facts(text: str, words: Vocabulary) -> tuple[FactRow, ...]:
-    """The facts in a statement, as (relation, subject, value); the value `None` is *unknown*.
+def statement_facts(text: str, words: Vocabulary) -> tuple[Literal, ...]:
+    """The facts in a statement, where the value `None` is *unknown*.
 
     Raises:
         NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
@@ -44,7 +43,7 @@ def statement_facts(text: str, words: Vocabulary) -> tuple[FactRow, ...]:
 class _Statements(Claims):
     """Joins statements, and tells them apart."""
 
-    def read(self) -> tuple[FactRow, ...]:
+    def read(self) -> tuple[Literal, ...]:
         cursor = self.cursor
         if not any(token.word[0].isalnum() for token in cursor.tokens):
             raise NotUnderstood("the sentence is empty: say what holds")
@@ -60,9 +59,7 @@ class _Statements(Claims):
                 pass
             if not (cursor.at_border() or cursor.word() == "and"):
                 raise self._unread()
-        return tuple(
-            (relation, subject, value) for (relation, subject), value in self.facts.items()
-        )
+        return tuple(Literal(key, value) for key, value in self.facts.items())
 
     def _join(self) -> bool:
         cursor, must = self.cursor, False
@@ -179,7 +176,7 @@ class _Statements(Claims):
     def _at(self, things: Sequence[Subject]) -> None:
         """`… in PLACE`, after what stands there."""
         cursor = self.cursor
-        while cursor.take_of(LOCATED):
+        while cursor.take_of(SITUATED):
             pass
         parts, home = self.parts()
         if home or not parts:

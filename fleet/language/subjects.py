@@ -14,6 +14,7 @@ from fleet.language.refusals import one_of
 from fleet.language.verbs import verb_next
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.wordlists import PLURAL_PRONOUNS, PREPOSITIONS, SINGULAR_PRONOUNS
+from keyexpr_schema.facts import AT
 
 THINGS: tuple[Sort, ...] = ("object", "robot")
 Subject = Noun | Mention
@@ -79,7 +80,7 @@ class Subjects:
         else:
             mention = self._at_source(subject, source, surface)
         if source is not None and not mention.open:
-            self.presumed.extend(("at", name, source) for name in mention.subjects)
+            self.presumed.extend((AT, name, source) for name in mention.subjects)
         return mention
 
     def remember(self, mentions: Sequence[Mention]) -> None:

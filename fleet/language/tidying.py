@@ -12,6 +12,7 @@ from fleet.language.moving import HOME_HINT, Moving
 from fleet.language.refusals import one_of
 from fleet.language.verbs import EXAMPLE
 from fleet.language.wordlists import WHOLE_HOUSE
+from keyexpr_schema.facts import AT
 
 
 class Tidying(Moving):
@@ -57,7 +58,7 @@ class Tidying(Moving):
     def _to_their_homes(self, names: Sequence[str], homes: Mapping[str, str]) -> None:
         start = self.began
         for name in names:
-            self.draft.add("at", Mention((name,), "object", start), homes[name])
+            self.draft.add(AT, Mention((name,), "object", start), homes[name])
         self.subjects.remember([Mention(tuple(names), "object", start)])
 
     def _within(self, homes: Mapping[str, str]) -> tuple[str, ...]:

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 
 import msgspec
 
+from keyexpr_schema.facts import Value
 from keyexpr_schema.payloads.robots import RobotSpec
-from keyexpr_schema.payloads.world import Object, Place, Value
+from keyexpr_schema.payloads.world import Object, Place
 
 
-class Deed(msgspec.Struct, frozen=True, kw_only=True):
+class SkillPhrase(msgspec.Struct, frozen=True, kw_only=True):
     """A skill that can be asked for by name: "vacuum the hallway".
 
     `sort` is what it is done to, `object` or `place`; `wants` are the relations and values that
@@ -30,8 +31,8 @@ class Vocabulary:
     `whereabouts` may say at which place (or robot) an object is believed to be; phrases such as
     "the cup in the kitchen" or "all cups from the kitchen" are told apart by it, and "tidy up the
     kitchen" is said of what is believed to be there. `rests` may say on which surface (or `floor`)
-    it is believed to lie there: "everything on the coffee table". `deeds` are skills that can be
-    asked for by name, where the grammar has no verb of that name.
+    it is believed to lie there: "everything on the coffee table". `skill_phrases` are skills that
+    can be asked for by name, where the grammar has no verb of that name.
     """
 
     places: Mapping[str, Place]
@@ -39,4 +40,4 @@ class Vocabulary:
     robots: Mapping[str, RobotSpec]
     whereabouts: Mapping[str, str] = field(default_factory=dict)
     rests: Mapping[str, str] = field(default_factory=dict)
-    deeds: tuple[Deed, ...] = ()
+    skill_phrases: tuple[SkillPhrase, ...] = ()

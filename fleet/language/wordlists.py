@@ -94,7 +94,7 @@ MODALS = phrases(
 STANDING = frozenset(
     words_in("is are be 's stands stand lies lie sits sit rests rest stays stay being standing")
 )
-LOCATED = phrases(
+SITUATED = phrases(
     "located|placed|now|currently|still|already|standing|lying|sitting|both|all|present|found|"
     "right now|somewhere|to be found|kept|stored"
 )

@@ -1,0 +1,22 @@
+"""Language models: asked within a budget, in correction rounds, for structured output."""
+
+from fleet.errors import BadLlmConfig
+from fleet.llm.budget import Budget
+from fleet.llm.client import ModelClient
+from fleet.llm.configuration import LlmConfig, load_llm_config
+from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
+from fleet.llm.structured_output import Answer, read_answer, schema_of
+
+__all__ = [
+    "Answer",
+    "BadLlmConfig",
+    "Budget",
+    "GivenUp",
+    "LanguageModel",
+    "LlmConfig",
+    "ModelClient",
+    "Rejected",
+    "load_llm_config",
+    "read_answer",
+    "schema_of",
+]

@@ -41,12 +41,12 @@ class ModelAnswer(msgspec.Struct, frozen=True, kw_only=True):
     retry_after_s: float | None = None
 
 
-class ModelCaller:
+class ModelClient:
     """Carries out calls, from any thread. Processes are kept for later calls until `close`."""
 
     def __init__(self) -> None:
-        self._idle: list[_Child] = []
-        self._all: set[_Child] = set()
+        self._idle: list[_LiteLlmProcess] = []
+        self._all: set[_LiteLlmProcess] = set()
         self._lock = threading.Lock()
         self._closed = False
         # Also ends the processes if nobody calls `close` before the interpreter ends.
@@ -54,22 +54,22 @@ class ModelCaller:
 
     def call(self, request: dict[str, Any], timeout_s: float) -> ModelAnswer:
         """The answer to one request: LiteLLM's `completion` arguments and `api_key_env`."""
-        child = self._take()
-        if child is None:
+        process = self._take()
+        if process is None:
             return ModelAnswer(kind="closed", error="the planner is being closed")
-        failed = child.start()
+        failed = process.start()
         row = {**request, "timeout": timeout_s, "max_chars": MAX_ANSWER_CHARS}
-        answer = failed or child.ask(row, timeout_s + GRACE_S)
-        self._give_back(child)
+        answer = failed or process.ask(row, timeout_s + GRACE_S)
+        self._give_back(process)
         return answer
 
     def warm(self) -> None:
         """Start a process now, so that the first call need not wait for it. Blocks until then."""
-        child = self._take()
-        if child is None:
+        process = self._take()
+        if process is None:
             return
-        child.start()
-        self._give_back(child)
+        process.start()
+        self._give_back(process)
 
     def close(self) -> None:
         """End all processes; a call that is under way fails at once, and so does any later one."""
@@ -77,37 +77,37 @@ class ModelCaller:
             self._closed = True
             idle, self._idle = self._idle, []
             busy = self._all.difference(idle)
-        for child in idle:
-            self._drop(child)
-        for child in busy:
+        for process in idle:
+            self._drop(process)
+        for process in busy:
             # The thread that waits for it sees its end, and drops it.
-            child.end()
+            process.end()
 
-    def _take(self) -> _Child | None:
+    def _take(self) -> _LiteLlmProcess | None:
         with self._lock:
             if self._closed:
                 return None
             if self._idle:
                 return self._idle.pop()
-            child = _Child()
-            self._all.add(child)
-            return child
+            process = _LiteLlmProcess()
+            self._all.add(process)
+            return process
 
-    def _give_back(self, child: _Child) -> None:
+    def _give_back(self, process: _LiteLlmProcess) -> None:
         with self._lock:
-            if child.running and not self._closed:
-                self._idle.append(child)
+            if process.running and not self._closed:
+                self._idle.append(process)
                 return
-        self._drop(child)
+        self._drop(process)
 
-    def _drop(self, child: _Child) -> None:
-        child.end()
-        child.release()
+    def _drop(self, process: _LiteLlmProcess) -> None:
+        process.end()
+        process.release()
         with self._lock:
-            self._all.discard(child)
+            self._all.discard(process)
 
 
-class _Child:
+class _LiteLlmProcess:
     """One process, used by one thread at a time; any thread may `end` it."""
 
     def __init__(self) -> None:
@@ -207,7 +207,7 @@ class _Child:
             self._stop()
 
 
-def _end_all(children: set[_Child]) -> None:
-    for child in tuple(children):
-        child.end()
-        child.release()
+def _end_all(processes: set[_LiteLlmProcess]) -> None:
+    for process in tuple(processes):
+        process.end()
+        process.release()

@@ -9,9 +9,8 @@ from typing import Annotated, Any
 import msgspec
 import yaml
 
-from fleet.llm.errors import BadLlmConfig
-
-DEFAULT_FILE = Path("planner.yaml")
+from fleet.errors import BadLlmConfig
+from keyexpr_schema.config_files import config_file
 
 Seconds = Annotated[float, msgspec.Meta(gt=0)]
 Count = Annotated[int, msgspec.Meta(ge=0)]
@@ -52,7 +51,7 @@ class LlmConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     retry_wait_s: Seconds = 1.0
     """Before the first retry, doubled for each further one, unless the server says how long."""
     max_repairs: Count = 3
-    """More rounds after a rejected answer, in which the model hears what was wrong with it."""
+    """Correction rounds: after a rejected answer the model hears what was wrong with it."""
     max_tokens_per_plan: Positive = 100_000
     """In and out, over all rounds of a plan."""
     max_usd_per_plan: Usd | None = None
@@ -118,18 +117,12 @@ RESERVED_OPTIONS = frozenset(
 
 
 def load_llm_config(path: Path | None = None) -> LlmConfig:
-    """The `llm` section of the file at `path`.
-
-    With no `path`, that of `configs/planner.yaml` below the working folder, or else beside the
-    packages, or no model if there is none.
+    """The `llm` section of the file at `path`; else of `planner.yaml` (see `config_file`).
 
     Raises:
         BadLlmConfig: the file cannot be read, or a field is not right.
     """
-    if path is None:
-        path = default_file()
-        if path is None:
-            return LlmConfig()
+    path = path or config_file(".", "planner")
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -146,15 +139,8 @@ def load_llm_config(path: Path | None = None) -> LlmConfig:
     try:
         config = msgspec.convert(data["llm"], LlmConfig)
     except msgspec.ValidationError as error:
-        told = str(error).replace("`$.", "`llm.").replace(" - at `$`", "")
-        raise BadLlmConfig(f"{path}: {told}") from None
+        reason = str(error).replace("`$.", "`llm.").replace(" - at `$`", "")
+        raise BadLlmConfig(f"{path}: {reason}") from None
     if config.rules_dir is None:
         return config
     return msgspec.structs.replace(config, rules_dir=str(path.parent / config.rules_dir))
-
-
-def default_file() -> Path | None:
-    """The configuration file that is read when none is named, if it exists."""
-    below = Path("configs") / DEFAULT_FILE
-    beside = Path(__file__).parents[2] / "configs" / DEFAULT_FILE
-    return next((file for file in (below, beside) if file.exists()), None)

@@ -1,24 +1,23 @@
-"""Asking until the answer is right: rounds of repair, retries of calls, and what it may cost."""
+"""Conversations with a language model: correction rounds until the answer is right, and retries."""
 
 from __future__ import annotations
 
 import logging
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from fleet.llm.client import ModelAnswer, ModelCaller
+from fleet.llm.budget import Budget
+from fleet.llm.client import ModelAnswer, ModelClient
 from fleet.llm.configuration import LlmConfig, Structured
-from fleet.llm.prompts import Prompts
+from fleet.llm.prompts import load_prompts
 from fleet.llm.quoting import violations_text
-from keyexpr_schema.payloads.plans import Making, Violation
+from keyexpr_schema.payloads.plans import Violation
 
 log = logging.getLogger(__name__)
 
-CHARS_PER_TOKEN = 3
-"""For estimates before a call; English has about four, JSON and names fewer."""
 MAX_ECHO = 20_000
 """Characters of a rejected answer that are shown to the model again."""
 RETRYABLE = frozenset({"rate-limit", "unavailable"})
@@ -46,116 +45,83 @@ class GivenUp:
     violations: tuple[Violation, ...] = ()
 
 
-@dataclass
-class Ledger:
-    """What one plan has cost so far, and whether more may be spent. Times in s of `clock`."""
+class LanguageModel:
+    """The configured model, if any; planner, allocator and interpreter share one. Thread-safe."""
 
-    config: LlmConfig
-    clock: Callable[[], float] = time.monotonic
-    rounds: int = 0
-    tokens_in: int = 0
-    tokens_out: int = 0
-    usd: float | None = None
-    unpriced: bool = False
-    started: float = field(init=False)
+    def __init__(self, config: LlmConfig, client: ModelClient | None = None) -> None:
+        """`client` can be shared by models of different configurations.
 
-    def __post_init__(self) -> None:
-        self.started = self.clock()
-
-    @property
-    def wall_s(self) -> float:
-        """Seconds since the start."""
-        return self.clock() - self.started
-
-    @property
-    def left_s(self) -> float:
-        """Seconds that are left for the plan."""
-        return self.config.max_wall_s - self.wall_s
-
-    def add(self, answer: ModelAnswer) -> None:
-        """Book an answer."""
-        config = self.config
-        self.rounds += 1
-        self.tokens_in += answer.tokens_in
-        self.tokens_out += answer.tokens_out
-        usd = answer.usd
-        price_in, price_out = config.usd_per_million_tokens_in, config.usd_per_million_tokens_out
-        if price_in is not None and price_out is not None:
-            usd = (answer.tokens_in * price_in + answer.tokens_out * price_out) / 1e6
-        if usd is None:
-            self.unpriced = True
-        else:
-            self.usd = (self.usd or 0.0) + usd
-
-    def why_stop(self, prompt_chars: int) -> str | None:
-        """Why another call with a prompt of that length would go too far, or `None`."""
-        config = self.config
-        if self.left_s <= 0:
-            return f"the {config.max_wall_s:g} s for asking the language model are over"
-        spent = self.tokens_in + self.tokens_out
-        needed = prompt_chars // CHARS_PER_TOKEN + config.max_tokens
-        if spent + needed > config.max_tokens_per_plan:
-            return (
-                f"another round could take {needed} tokens, and of {config.max_tokens_per_plan} "
-                f"for a plan {spent} are spent"
-            )
-        if config.max_usd_per_plan is not None:
-            if self.unpriced:
-                return (
-                    "the price of the language model is not known, so the budget in USD cannot be "
-                    "kept: give usd_per_million_tokens_in and …_out"
-                )
-            if (self.usd or 0.0) >= config.max_usd_per_plan:
-                return f"the {config.max_usd_per_plan:g} USD for a plan are spent"
-        return None
-
-    def making(self, planner: str, prompts: Prompts, fallback: str | None = None) -> Making:
-        """The account, as it stands in a plan."""
-        return Making(
-            planner=planner,
-            model=self.config.model,
-            rounds=self.rounds,
-            tokens_in=self.tokens_in,
-            tokens_out=self.tokens_out,
-            cost_usd=None if self.unpriced else self.usd,
-            wall_s=round(self.wall_s, 3),
-            fallback=fallback,
-            prompts=prompts.version,
-        )
-
-
-class Conversation:
-    """Asks one model; made once, used from any thread."""
-
-    def __init__(self, config: LlmConfig, prompts: Prompts, caller: ModelCaller) -> None:
-        self._config = config
-        self._prompts = prompts
-        self._caller = caller
+        Raises:
+            BadLlmConfig: the prompts that the configuration asks for cannot be used.
+        """
+        self.config = config
+        self._prompts = load_prompts(config)
+        self._client = client or ModelClient()
         self._plain = threading.Event()
         """Set once the server has refused the JSON schema."""
         if config.structured is Structured.PLAIN:
             self._plain.set()
 
+    @property
+    def configured(self) -> bool:
+        """Whether there is a model to ask."""
+        return self.config.not_configured is None
+
+    def warm(self) -> None:
+        """Start what takes seconds to start, if a model is configured. Blocks until it runs."""
+        if self.configured:
+            self._client.warm()
+
+    def close(self) -> None:
+        """Stop asking: a call that is under way ends at once, and so does any later one."""
+        self._client.close()
+
+    def budget(self) -> Budget:
+        """A new budget: that of one plan."""
+        return Budget(self.config, self._prompts.version)
+
     def ask(
         self,
+        *,
         system: str,
         question: str,
-        repair: str,
+        correction: str,
+        values: Mapping[str, str],
         schema: dict[str, Any],
         read: Callable[[str], T | Rejected],
-        ledger: Ledger,
+        budget: Budget | None = None,
     ) -> T | GivenUp:
-        """The answer that `read` takes, or why there is none.
+        """The answer that `read` takes, or why there is none. Blocks, and never raises.
 
-        `repair` names the prompt that tells the model what was wrong with an answer.
+        `system`, `question` and `correction` name prompts; `values` fill the placeholders of the
+        question, `$violations` and `$details` those of the correction, which tells the model what
+        was wrong with its answer. Without a `budget` the call has one of its own.
         """
+        if reason := self.config.not_configured:
+            return GivenUp(reason)
         messages = [
-            {"role": "system", "content": system},
-            {"role": "user", "content": question},
+            {"role": "system", "content": self._prompts.fill(system)},
+            {"role": "user", "content": self._prompts.fill(question, **values)},
         ]
+        try:
+            return self._converse(messages, correction, schema, read, budget or self.budget())
+        except Exception as error:
+            # What a model says must never stop the fleet, whatever it is.
+            log.exception("asking the language model")
+            return GivenUp(f"asking the language model failed: {error or type(error).__name__}")
+
+    def _converse(
+        self,
+        messages: list[dict[str, str]],
+        correction: str,
+        schema: dict[str, Any],
+        read: Callable[[str], T | Rejected],
+        budget: Budget,
+    ) -> T | GivenUp:
+        rounds = 1 + self.config.max_repairs
         violations: tuple[Violation, ...] = ()
-        for _ in range(1 + self._config.max_repairs):
-            answer = self._call(messages, schema, ledger)
+        for _ in range(rounds):
+            answer = self._call(messages, schema, budget)
             if isinstance(answer, str):
                 return GivenUp(answer, violations)
             made = _unusable(answer) or read(answer.text)
@@ -164,41 +130,40 @@ class Conversation:
             violations = made.violations
             log.info("answer rejected: %s", violations[0].sentence)
             sentences, details = violations_text(violations)
-            said = answer.text[:MAX_ECHO] or "(nothing)"
-            told = self._prompts.fill(repair, violations=sentences, details=details)
+            corrected = self._prompts.fill(correction, violations=sentences, details=details)
             messages += [
-                {"role": "assistant", "content": said},
-                {"role": "user", "content": told},
+                {"role": "assistant", "content": answer.text[:MAX_ECHO] or "(nothing)"},
+                {"role": "user", "content": corrected},
             ]
         more = len(violations) - 1
         return GivenUp(
-            f"no answer of the language model in {1 + self._config.max_repairs} rounds was right; "
+            f"no answer of the language model in {rounds} rounds was right; "
             f"of the last: {violations[0].sentence}" + (f" (and {more} more)" if more else ""),
             violations,
         )
 
     def _call(
-        self, messages: list[dict[str, str]], schema: dict[str, Any], ledger: Ledger
+        self, messages: list[dict[str, str]], schema: dict[str, Any], budget: Budget
     ) -> ModelAnswer | str:
         """One answer, after retries; or why there is none."""
-        config = self._config
+        config = self.config
         wait_s = config.retry_wait_s
         tries = 0
         while True:
             chars = sum(len(message["content"]) for message in messages)
-            if stop := ledger.why_stop(chars):
+            if stop := budget.exceeded_by(chars):
                 return stop
             plain = self._plain.is_set()
             request = self._request(messages, None if plain else schema)
-            answer = self._caller.call(request, min(config.timeout_s, ledger.left_s))
+            answer = self._client.call(request, min(config.timeout_s, budget.left_s))
             if answer.kind in ("answer", "oversized"):
-                ledger.add(answer)
+                budget.spend(answer)
             if answer.kind == "form" and not plain and config.structured is Structured.AUTO:
                 log.info("%s does not take a JSON schema: %s", config.model, answer.error)
                 self._plain.set()
                 continue
             pause_s = wait_s if answer.retry_after_s is None else max(answer.retry_after_s, 0.0)
-            if answer.kind not in RETRYABLE or tries >= config.retries or pause_s >= ledger.left_s:
+            if answer.kind not in RETRYABLE or tries >= config.retries or pause_s >= budget.left_s:
                 break
             tries += 1
             time.sleep(pause_s)
@@ -210,7 +175,7 @@ class Conversation:
     def _request(
         self, messages: list[dict[str, str]], schema: dict[str, Any] | None
     ) -> dict[str, Any]:
-        config = self._config
+        config = self.config
         request: dict[str, Any] = {
             **config.options,
             "model": config.model,

@@ -33,16 +33,16 @@ def main() -> None:
     try:
         import litellm
     except Exception as error:
-        _tell(answers, {"kind": "failed", "error": f"LiteLLM cannot be imported: {error}"})
+        _write(answers, {"kind": "failed", "error": f"LiteLLM cannot be imported: {error}"})
         return
     litellm.telemetry = False
     litellm.suppress_debug_info = True
-    _tell(answers, {"kind": "ready"})
+    _write(answers, {"kind": "ready"})
     for line in sys.stdin:
-        _tell(answers, _answer(litellm, json.loads(line)))
+        _write(answers, _answer(litellm, json.loads(line)))
 
 
-def _tell(answers: Any, row: dict[str, Any]) -> None:
+def _write(answers: Any, row: dict[str, Any]) -> None:
     answers.write(json.dumps(row) + "\n")
     answers.flush()
 

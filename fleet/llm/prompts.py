@@ -1,4 +1,4 @@
-"""Prompts: text files beside the planner, by version; a user's rules folder can replace them."""
+"""Prompts: text files, by version; files of the same name in a user's rules folder replace them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from string import Template
 
+from fleet.errors import BadLlmConfig
 from fleet.llm.configuration import LlmConfig
-from fleet.llm.errors import BadLlmConfig
 
-FOLDER = Path(__file__).parent / "prompts"
+PROMPTS_DIR = Path(__file__).parent / "prompts"
 MAX_CHARS = 20_000
 """A longer prompt file is taken for a mistake."""
 
@@ -38,8 +38,8 @@ def load_prompts(config: LlmConfig) -> Prompts:
     Raises:
         BadLlmConfig: there is no such version, or the rules folder does not fit it.
     """
-    folder = FOLDER / config.prompts
-    versions = sorted(path.name for path in FOLDER.iterdir() if path.is_dir())
+    folder = PROMPTS_DIR / config.prompts
+    versions = sorted(path.name for path in PROMPTS_DIR.iterdir() if path.is_dir())
     if config.prompts not in versions:
         raise BadLlmConfig(
             f"there are no prompts {config.prompts!r}; there are {', '.join(versions)}"
@@ -47,14 +47,14 @@ def load_prompts(config: LlmConfig) -> Prompts:
     texts = {path.stem: path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.txt"))}
     if config.rules_dir is None:
         return Prompts(config.prompts, texts)
-    own = _rules(Path(config.rules_dir), texts)
+    own = _user_prompts(Path(config.rules_dir), texts)
     if not own:
         return Prompts(config.prompts, texts)
-    told = hashlib.sha256(repr(sorted(own.items())).encode()).hexdigest()[:8]
-    return Prompts(f"{config.prompts}+rules-{told}", {**texts, **own})
+    digest = hashlib.sha256(repr(sorted(own.items())).encode()).hexdigest()[:8]
+    return Prompts(f"{config.prompts}+rules-{digest}", {**texts, **own})
 
 
-def _rules(folder: Path, texts: Mapping[str, str]) -> dict[str, str]:
+def _user_prompts(folder: Path, texts: Mapping[str, str]) -> dict[str, str]:
     if not folder.is_dir():
         raise BadLlmConfig(f"the rules folder {folder} does not exist")
     own: dict[str, str] = {}

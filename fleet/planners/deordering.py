@@ -6,8 +6,9 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fleet.core.model.skills import Action, Variable
+from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
+from keyexpr_schema.facts import FactKey
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.payloads.plans import Task
 
@@ -73,8 +74,8 @@ def tasks_from(
 
 def _dependencies(rows: Sequence[tuple[str, Action]]) -> dict[str, set[str]]:
     after: dict[str, set[str]] = {}
-    writer: dict[Variable, str] = {}
-    readers: dict[Variable, set[str]] = defaultdict(set)
+    writer: dict[FactKey, str] = {}
+    readers: dict[FactKey, set[str]] = defaultdict(set)
     last: dict[str, str] = {}
     for name, action in rows:
         befores: set[str] = set()

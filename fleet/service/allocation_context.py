@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from fleet.allocators.base import Circumstances
 from fleet.core.dispatch.delays import behind_s
-from fleet.core.state import Job, State
+from fleet.core.state import PlanningJob, State
 
 
-def circumstances_of(job: Job, state: State, busy: frozenset[str]) -> Circumstances:
+def circumstances_of(job: PlanningJob, state: State, busy: frozenset[str]) -> Circumstances:
     """The circumstances of a planning job, in seconds from now; actors in `busy` are under way."""
     goals = [state.goals[goal] for goal in job.goals if goal in state.goals]
     return Circumstances(
@@ -22,11 +22,11 @@ def circumstances_of(job: Job, state: State, busy: frozenset[str]) -> Circumstan
     )
 
 
-def _busy_s(job: Job, state: State, robot: str) -> float:
+def _busy_s(job: PlanningJob, state: State, robot: str) -> float:
     """How long the robot is taken, s; work of the job's own plan is in the new plan once more."""
     late_s = behind_s(state, robot)
-    for plan, book in state.plans.items():
-        for record in book.outstanding():
+    for plan, entry in state.plans.items():
+        for record in entry.outstanding():
             if record.robot == robot and plan != job.plan:
                 begun_s = state.time_s if record.started_s is None else record.started_s
                 return late_s + max(0.0, begun_s + record.duration_s - state.time_s)

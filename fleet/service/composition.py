@@ -14,23 +14,24 @@ from typing import Any
 
 import yaml
 
-from fleet.allocators.balanced import BalancedAllocator
 from fleet.allocators.base import Allocator
 from fleet.allocators.cost_based import CostBasedAllocator
 from fleet.allocators.llm import LlmAllocator
 from fleet.allocators.makespan import MakespanAllocator
-from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.core.model.skills import SkillModel, skills_from_data
 from fleet.errors import BadSkillFile, FleetError
+from fleet.llm.configuration import load_llm_config
+from fleet.llm.conversation import LanguageModel
 from fleet.planners.base import Planner
-from fleet.planners.llm import LlmPlanner, ModelCaller, load_llm_config
+from fleet.planners.llm.interpreter import LlmInterpreter
+from fleet.planners.llm.planner import LlmPlanner
 from fleet.planners.symbolic.planner import SymbolicPlanner
-from fleet.service.allocation_asker import AllocationAsker
+from keyexpr_schema.config_files import config_file
 
 SKILL_MODELS = "robotfleet.skill_models"
 """Entry points to mappings such as the YAML of a skill file holds: `{"skills": {name: model}}`."""
-DEFAULT_SKILLS = Path("skills") / "household.yaml"
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,8 @@ class Composition:
     skills: Mapping[str, SkillModel]
     planners: Mapping[str, Planner]
     allocators: Mapping[str, Allocator]
-    llm: LlmPlanner
+    language_model: LanguageModel
+    interpreter: LlmInterpreter
     judge: Planner
 
     @property
@@ -60,17 +62,17 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
         FleetError: an installed package offers something that is not a planner or an allocator.
     """
     symbolic = SymbolicPlanner()
-    config, caller = load_llm_config(llm_file), ModelCaller()
-    llm = LlmPlanner(config, symbolic, caller)
+    model = LanguageModel(load_llm_config(llm_file))
+    llm = LlmPlanner(model, symbolic)
     planners: dict[str, Planner] = {symbolic.name: symbolic, llm.name: llm}
     own: tuple[Allocator, ...] = (
         MakespanAllocator(),
-        MilpAllocator(),
-        MilpAllocator(fallback_round_robin=True),
-        BalancedAllocator(),
+        MinMaxLoadAllocator(TieBreak.TRAVEL),
+        MinMaxLoadAllocator(TieBreak.TRAVEL, fallback_round_robin=True),
+        MinMaxLoadAllocator(TieBreak.NEXT_LOADS),
         CostBasedAllocator(),
         RoundRobinAllocator(),
-        LlmAllocator(AllocationAsker(config, caller), MakespanAllocator()),
+        LlmAllocator(model, MakespanAllocator()),
     )
     allocators = {allocator.name: allocator for allocator in own}
     for found in _from_packages("robotfleet.planners"):
@@ -81,7 +83,9 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
         if not isinstance(found, Allocator):
             raise FleetError(f"{type(found).__name__}, installed as an allocator, is not one")
         allocators[found.name] = found
-    return Composition(load_all_skills(skill_files), planners, allocators, llm, symbolic)
+    skills = load_all_skills(skill_files)
+    interpreter = LlmInterpreter(model, skills)
+    return Composition(skills, planners, allocators, model, interpreter, symbolic)
 
 
 def load_all_skills(skill_files: tuple[Path, ...] = ()) -> dict[str, SkillModel]:
@@ -104,7 +108,7 @@ def load_all_skills(skill_files: tuple[Path, ...] = ()) -> dict[str, SkillModel]
             if name in added:
                 raise BadSkillFile(f"{where}: skill {name} is already modelled elsewhere")
             added[name] = skill
-    return {**load_skills(default_skill_file()), **added}
+    return {**load_skills(config_file("skills", "household")), **added}
 
 
 def load_skills(path: Path) -> dict[str, SkillModel]:
@@ -120,12 +124,6 @@ def load_skills(path: Path) -> dict[str, SkillModel]:
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise BadSkillFile(f"{path} is not YAML: {' '.join(str(error).split())}") from None
     return skills_from_data(data, str(path))
-
-
-def default_skill_file() -> Path:
-    """`configs/skills/household.yaml` below the working folder, or else beside the packages."""
-    here = Path("configs") / DEFAULT_SKILLS
-    return here if here.exists() else Path(__file__).parents[2] / "configs" / DEFAULT_SKILLS
 
 
 def _from_packages(group: str) -> list[Any]:

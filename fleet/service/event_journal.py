@@ -17,11 +17,20 @@ from typing import TextIO
 import msgspec
 
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.state import State
+from fleet.core.state import State, decode_state, encode_state
 from fleet.errors import FleetError
 
+SNAPSHOT_FORMAT = 2
+"""Counts up whenever a field of the state gets another name or meaning."""
 SNAPSHOT_EVERY = 2000
 """Events between two snapshots; replaying this many takes well under a second."""
+
+
+class _Snapshot(msgspec.Struct, frozen=True, kw_only=True):
+    """A kept state. What was kept before there was a format has none, and so does not decode."""
+
+    format: int
+    state: msgspec.Raw
 
 
 class JournalInUse(FleetError):
@@ -82,7 +91,7 @@ class EventJournal:
             self._db.execute("DELETE FROM snapshots")
             self._db.execute(
                 "INSERT INTO snapshots (number, state) VALUES (?, ?)",
-                (cursor.lastrowid, msgspec.json.encode(state)),
+                (cursor.lastrowid, _snapshot_of(state)),
             )
             self._db.execute("COMMIT")
 
@@ -94,13 +103,16 @@ class EventJournal:
     def snapshot(self) -> tuple[int, State]:
         """The newest kept state and the number of the event that led to it (0: none is kept).
 
-        A snapshot of an older version of the planner that no longer decodes counts as none.
+        A snapshot in another format, by an older version of the planner, counts as none.
         """
         row = self._db.execute("SELECT number, state FROM snapshots").fetchone()
         if row is None:
             return 0, State()
         try:
-            return int(row[0]), msgspec.json.decode(row[1], type=State)
+            kept = msgspec.json.decode(row[1], type=_Snapshot)
+            if kept.format != SNAPSHOT_FORMAT:
+                return 0, State()
+            return int(row[0]), decode_state(kept.state)
         except msgspec.DecodeError:
             return 0, State()
 
@@ -110,3 +122,8 @@ class EventJournal:
             "SELECT event FROM events WHERE number > ? ORDER BY number", (after,)
         ):
             yield decode_event(data)
+
+
+def _snapshot_of(state: State) -> bytes:
+    kept = _Snapshot(format=SNAPSHOT_FORMAT, state=msgspec.Raw(encode_state(state)))
+    return msgspec.json.encode(kept)

@@ -15,8 +15,8 @@ from keyexpr_schema.keyspace import (
     GOAL_SPEC,
     OBJECT,
     PLACE,
+    PLAN_PROPOSAL,
     PLAN_REQUEST,
-    PLAN_SPEC,
     REPLAN_REQUEST,
     REPORT,
     ROBOT_SPEC,
@@ -38,7 +38,7 @@ _PUT: dict[str, Callable[[Any, At], Event]] = {
     PLAN_REQUEST.name: lambda v, at: events.PlanRequested(request=v, **at),
     REPLAN_REQUEST.name: lambda v, at: events.ReplanRequested(request=v, **at),
     CONTROL_REQUEST.name: lambda v, at: events.ControlRequested(request=v, **at),
-    PLAN_SPEC.name: lambda v, at: events.PlanProposed(plan=v, **at),
+    PLAN_PROPOSAL.name: lambda v, at: events.PlanProposed(plan=v, **at),
 }
 _DELETED: dict[str, Callable[[Any, At], Event]] = {
     GOAL_SPEC.name: lambda a, at: events.GoalDeleted(goal=a.goal, **at),
@@ -57,7 +57,7 @@ WATCHED: tuple[Key[Any, Any], ...] = (
     FACT,
     GOAL_SPEC,
     REPORT,
-    PLAN_SPEC,
+    PLAN_PROPOSAL,
     PLAN_REQUEST,
     REPLAN_REQUEST,
     CONTROL_REQUEST,

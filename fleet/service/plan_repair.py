@@ -14,10 +14,10 @@ from dataclasses import replace as changed
 from msgspec.structs import replace
 
 from fleet.core.checker.plan_checker import CheckedPlan, check_plan
-from fleet.core.handlers.goals import SEARCHED
 from fleet.core.schedule.actor_constraints import able_robots
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.service.oversubscription import PartialPlan, plan_what_can_be
+from keyexpr_schema.facts import SEARCHED
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan
 

@@ -17,8 +17,8 @@ from fleet.core.dispatch.delays import SAME_CLOCK_S
 from fleet.core.dispatch.dispatcher import next_timer
 from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event
-from fleet.core.model.spoken_skills import deeds_of
-from fleet.core.state import Job, Policy, State
+from fleet.core.model.skill_phrases import phrases_of
+from fleet.core.state import PlanningJob, Policy, State
 from fleet.core.step import replay, step
 from fleet.errors import Superseded
 from fleet.service.composition import Composition
@@ -32,6 +32,7 @@ from keyexpr_schema.keyspace import (
     DURATIONS,
     GOAL_STATUS,
     ORDER,
+    PLAN_SPEC,
     PLAN_STATUS,
     PLANNER_ALIVE,
     PLANNER_STATUS,
@@ -58,11 +59,11 @@ class PlannerService:
         self._session = session
         self._journal = journal
         self._parts = parts
-        self._interpreter = parts.llm.interpreter(parts.skills)
+        self._interpreter = parts.interpreter
         self._policy = replace(
             policy or Policy(),
             interpreter=self._interpreter.configured,
-            deeds=deeds_of(parts.skills),
+            skill_phrases=phrases_of(parts.skills),
         )
         self._incarnation = uuid.uuid4().hex[:12]
         self._state = State()
@@ -206,7 +207,13 @@ class PlannerService:
             for effect in effects_of(self._state)
             if isinstance(effect, Publish)
         }
-        ours: tuple[Key[Any, Any], ...] = (ORDER, TASK_RECORD, PLAN_STATUS, GOAL_STATUS)
+        ours: tuple[Key[Any, Any], ...] = (
+            ORDER,
+            TASK_RECORD,
+            PLAN_SPEC,
+            PLAN_STATUS,
+            GOAL_STATUS,
+        )
         return [
             Retract(key, address)
             for key in ours
@@ -280,7 +287,7 @@ class PlannerService:
         self._planning.add(task)
         task.add_done_callback(self._planning.discard)
 
-    async def _make_plan(self, job: Job) -> None:
+    async def _make_plan(self, job: PlanningJob) -> None:
         at = self._at()
         try:
             event: Event = await asyncio.to_thread(carry_out, job, self._state, self._parts, at)

@@ -66,7 +66,7 @@ async def _run(
             waiting = asyncio.create_task(ready.wait())
             await asyncio.wait((service, waiting), return_when=asyncio.FIRST_COMPLETED)
             waiting.cancel()
-            warming = asyncio.create_task(asyncio.to_thread(parts.llm.warm))
+            warming = asyncio.create_task(asyncio.to_thread(parts.language_model.warm))
             if ready.is_set():
                 print(f"planner ready in realm {realm}", flush=True)  # noqa: T201
             try:
@@ -75,5 +75,5 @@ async def _run(
                 return
             finally:
                 # Ends calls to a model that are under way, so that no thread keeps the process.
-                parts.llm.close()
+                parts.language_model.close()
                 warming.cancel()

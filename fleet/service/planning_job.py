@@ -11,14 +11,14 @@ from msgspec.structs import replace
 
 from fleet.allocators.base import Allocated, Allocator, NotAllocated
 from fleet.core.events import PlanningFailed, PlanningSucceeded
-from fleet.core.handlers.goals import SEARCHED
 from fleet.core.model.world import WorldModel
-from fleet.core.state import Job, State
+from fleet.core.state import PlanningJob, State
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.service.allocation_context import circumstances_of
 from fleet.service.composition import Composition
 from fleet.service.oversubscription import PartialPlan, plan_what_can_be
 from fleet.service.plan_repair import mended_plan
+from keyexpr_schema.facts import SEARCHED
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan
@@ -34,7 +34,7 @@ class _Made:
 
 
 def carry_out(
-    job: Job, state: State, parts: Composition, at: Mapping[str, float]
+    job: PlanningJob, state: State, parts: Composition, at: Mapping[str, float]
 ) -> PlanningSucceeded | PlanningFailed:
     """Plan, check and allocate; how it ended, as an event stamped with `at`.
 
@@ -71,7 +71,7 @@ def carry_out(
     )
 
 
-def _plan_and_allocate(job: Job, state: State, parts: Composition) -> _Made | NoPlan:
+def _plan_and_allocate(job: PlanningJob, state: State, parts: Composition) -> _Made | NoPlan:
     allocator = parts.allocators.get(job.allocator)
     if allocator is None:
         choices = ", ".join(sorted(parts.allocators))
@@ -82,7 +82,7 @@ def _plan_and_allocate(job: Job, state: State, parts: Composition) -> _Made | No
 
 @dataclass(frozen=True)
 class _Desk:
-    job: Job
+    job: PlanningJob
     state: State
     parts: Composition
     world: WorldModel
@@ -183,16 +183,16 @@ def _wanted(status: GoalStatus, world: WorldModel) -> tuple[Condition, ...]:
 
 
 def _busy_robots(
-    job: Job, plan: Plan, state: State, begun_actors: Set[str] = frozenset()
+    job: PlanningJob, plan: Plan, state: State, begun_actors: Set[str] = frozenset()
 ) -> dict[str, str]:
     """Actors of the new plan whose work a robot has begun already, so that it goes on with it.
 
     Of `begun_actors` that is known; they and what their robots do are left out.
     """
-    book = state.plans.get(job.plan)
+    entry = state.plans.get(job.plan)
     begun: dict[tuple[object, ...], list[str]] = {}
     for name in job.running:
-        record = book.records.get(name) if book is not None else None
+        record = entry.records.get(name) if entry is not None else None
         if record is not None and record.robot and record.actor not in begun_actors:
             work = _work(record.skill, record.args, (record.robot, *state.robots))
             begun.setdefault(work, []).append(record.robot)
@@ -216,12 +216,12 @@ def _work(skill: str, args: Mapping[str, str], robots: Iterable[str | None]) -> 
     )
 
 
-def _searched(job: Job, state: State, parts: Composition) -> frozenset[str]:
+def _searched(job: PlanningJob, state: State, parts: Composition) -> frozenset[str]:
     """Places that a finished task of this plan has searched."""
-    book = state.plans.get(job.plan)
+    entry = state.plans.get(job.plan)
     return frozenset(
         literal.variable.subject
-        for record in (book.records.values() if book else ())
+        for record in (entry.records.values() if entry else ())
         if record.state is TaskState.SUCCEEDED and record.skill in parts.skills
         for literal in parts.skills[record.skill].ground(record.args).after
         if literal.variable.relation == SEARCHED

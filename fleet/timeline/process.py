@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from fleet.timeline import viewer
+from fleet.timeline.drawing.sink import free_port, open_stream
 from fleet.timeline.errors import NoPicture
 from fleet.timeline.recorder import RECORDED, Recorder
-from fleet.timeline.sink import free_port, open_stream
 from keyexpr_schema.transport.session import Change, SessionConfig, Watch, open_session
 
 FLUSH_S = 1.0

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fleet.timeline.drawing.sink import SIM_TIME
 from fleet.timeline.errors import UnreadableRecording
-from fleet.timeline.sink import SIM_TIME
 
 _NANOSECONDS = 1e9
 

@@ -12,16 +12,16 @@ from typing import Any, Protocol
 
 import rerun as rr
 
-from fleet.timeline import sentences
-from fleet.timeline.blueprint import DEFAULT_SPAN_S, blueprint
 from fleet.timeline.clock import Clock, wall_of
-from fleet.timeline.graph import Graphs
-from fleet.timeline.lanes import Lanes, call_text
-from fleet.timeline.palette import Palette
-from fleet.timeline.sink import Sink, entity
-from fleet.timeline.text import drawable
-from fleet.timeline.utilisation import Utilisation
-from fleet.timeline.world import World
+from fleet.timeline.drawing import event_log
+from fleet.timeline.drawing.blueprint import DEFAULT_SPAN_S, blueprint
+from fleet.timeline.drawing.graph import Graphs
+from fleet.timeline.drawing.lanes import Lanes, call_text
+from fleet.timeline.drawing.palette import Palette
+from fleet.timeline.drawing.sink import Sink, entity
+from fleet.timeline.drawing.text import drawable
+from fleet.timeline.drawing.utilisation import Utilisation
+from fleet.timeline.drawing.world import World
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import (
     FACT,
@@ -66,24 +66,24 @@ RECORDED: tuple[Key[Any, Any], ...] = (
 POSES = 64
 """So many poses of one body are worth a piece of the file of their own."""
 
-_TELL: dict[str, tuple[str, Callable[[Any, Any], Iterator[sentences.Line]]]] = {
-    GOAL_SPEC.name: ("goals", sentences.goal),
-    GOAL_STATUS.name: ("goals", sentences.goal_status),
-    PLAN_SPEC.name: ("plans", sentences.plan),
-    PLAN_STATUS.name: ("plans", sentences.plan_status),
-    TASK_RECORD.name: ("tasks", sentences.task_record),
-    ORDER.name: ("orders", sentences.order),
-    FACT.name: ("facts", sentences.fact),
-    ROBOT_SPEC.name: ("robots", sentences.robot_spec),
-    ROBOT_STATE.name: ("robots", sentences.robot_state),
-    SIM_TRUTH.name: ("truth", sentences.truth),
-    REJECT.name: ("rejects", sentences.reject),
+_TELL: dict[str, tuple[str, Callable[[Any, Any], Iterator[event_log.Line]]]] = {
+    GOAL_SPEC.name: ("goals", event_log.goal),
+    GOAL_STATUS.name: ("goals", event_log.goal_status),
+    PLAN_SPEC.name: ("plans", event_log.plan),
+    PLAN_STATUS.name: ("plans", event_log.plan_status),
+    TASK_RECORD.name: ("tasks", event_log.task_record),
+    ORDER.name: ("orders", event_log.order),
+    FACT.name: ("facts", event_log.fact),
+    ROBOT_SPEC.name: ("robots", event_log.robot_spec),
+    ROBOT_STATE.name: ("robots", event_log.robot_state),
+    SIM_TRUTH.name: ("truth", event_log.truth),
+    REJECT.name: ("rejects", event_log.reject),
 }
 
 _COLOURS = {
-    sentences.INFO: (205, 210, 215, 255),
-    sentences.WARN: (240, 190, 80, 255),
-    sentences.ERROR: (245, 105, 95, 255),
+    event_log.INFO: (205, 210, 215, 255),
+    event_log.WARN: (240, 190, 80, 255),
+    event_log.ERROR: (245, 105, 95, 255),
 }
 
 
@@ -103,8 +103,8 @@ class Recorded(Protocol):
 class Recorder:
     """Writes one recording.
 
-    `stream` comes from `fleet.timeline.sink.open_stream`. Call `flush()` every now and then: rows
-    wait for it, at most a few hundred of each body.
+    `stream` comes from `fleet.timeline.drawing.sink.open_stream`. Call `flush()` now and then:
+    rows wait for it, at most a few hundred of each body.
     """
 
     def __init__(self, stream: rr.RecordingStream) -> None:
@@ -248,9 +248,9 @@ class Recorder:
     def _tell(self, key: str, value: Any, before: Any, at_s: float, wall_s: float) -> None:
         if key == REPORT.name:
             what = self._call(value)
-            for ended_s, line in sentences.tries(value, before, what):
+            for ended_s, line in event_log.tries(value, before, what):
                 self._log("reports", line, ended_s, None)
-            topic, lines = "reports", sentences.report(value, before, what)
+            topic, lines = "reports", event_log.report(value, before, what)
         elif key in _TELL:
             topic, tell = _TELL[key]
             lines = tell(value, before)
@@ -259,7 +259,7 @@ class Recorder:
         for line in lines:
             self._log(topic, line, at_s, wall_s)
 
-    def _log(self, topic: str, line: sentences.Line, at_s: float, wall_s: float | None) -> None:
+    def _log(self, topic: str, line: event_log.Line, at_s: float, wall_s: float | None) -> None:
         level, sentence = line
         text = rr.TextLog(drawable(sentence), level=level, color=_COLOURS[level])
         self._sink.log(entity("fleet", "log", topic), text, at_s, wall_s)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from enum import Enum
 
+from keyexpr_schema.facts import Value, render_value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
-from keyexpr_schema.payloads.world import Value
 
 
 class GoalAddress(Address, frozen=True):
@@ -36,8 +36,7 @@ class Condition(Payload, frozen=True, kw_only=True):
         return self.any_of or (self.subject,)
 
     def __str__(self) -> str:
-        value = "unknown" if self.value is None else self.value
-        return f"{self.relation}({' or '.join(self.subjects)}) = {value}"
+        return f"{self.relation}({' or '.join(self.subjects)}) = {render_value(self.value)}"
 
 
 class Goal(Payload, frozen=True, kw_only=True):

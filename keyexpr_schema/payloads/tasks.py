@@ -34,7 +34,7 @@ class ReportAddress(Address, frozen=True):
 
 
 class TaskState(str, Enum):
-    """Where a task stands, in the planner's books."""
+    """Where a task stands, as the planner records it."""
 
     WAITING = "waiting"
     ORDERED = "ordered"

@@ -5,21 +5,26 @@ Lengths are metres in the world frame (x east, y north, z up), angles radians.
 
 from __future__ import annotations
 
+from keyexpr_schema.facts import FactKey, Literal, Value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
 
-Value = str | bool | int | float | None
-"""The value of a fact. `None` is *unknown*: somebody says that nobody knows."""
-
-NOTHING = "nothing"
-"""The value of `holding` for an empty hand."""
-
 
 class FactAddress(Address, frozen=True):
-    """One state variable, written `relation(subject)`."""
+    """The key of one fact."""
 
     subject: str
     relation: str
+
+    @classmethod
+    def of(cls, key: FactKey) -> FactAddress:
+        """Where the fact about this variable stands."""
+        return cls(subject=key.subject, relation=key.relation)
+
+    @property
+    def key(self) -> FactKey:
+        """The variable that the fact there is about."""
+        return FactKey(self.relation, self.subject)
 
 
 class StatementAddress(Address, frozen=True):
@@ -53,6 +58,16 @@ class Fact(Payload, frozen=True, kw_only=True):
     value: Value
     source: str
     time_s: float = 0.0
+
+    @property
+    def key(self) -> FactKey:
+        """The variable that it is about."""
+        return FactKey(self.relation, self.subject)
+
+    @property
+    def literal(self) -> Literal:
+        """What it says: variable and value."""
+        return Literal(self.key, self.value)
 
 
 class Statement(Payload, frozen=True, kw_only=True):

@@ -1,4 +1,4 @@
-"""Questions and answers: the two ends of a `Kept.QUERY` key."""
+"""Questions and answers: the two ends of a `Delivery.QUERY` key."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ async def ask(link: Link, key: Key[A, P], address: A, payload: P, timeout_s: flo
         NoAnswer: nobody serves it, it failed, or it took longer than `timeout_s`.
     """
     if key.reply is None:
-        raise TypeError(f"{key.name} is {key.kept.value}: it cannot be asked")
+        raise TypeError(f"{key.name} is {key.delivery.value}: it cannot be asked")
     keyexpr = key.build(address)
     replies = await link.query(
         keyexpr, timeout_s, key.encode(payload), encoding_of(key.schema), first=True

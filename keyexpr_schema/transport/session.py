@@ -24,13 +24,14 @@ from keyexpr_schema.errors import (
     Unreachable,
 )
 from keyexpr_schema.ids import check_id
-from keyexpr_schema.key import A, Kept, Key, P, Payload
+from keyexpr_schema.key import A, Delivery, Key, P, Payload
 from keyexpr_schema.keyspace import REJECT, STORE_JOURNAL
 from keyexpr_schema.payloads.service import Reject, RejectAddress, StoreAddress, StoreQuery
 from keyexpr_schema.transport.connecting import open_link
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.questions import Service, ask
 from keyexpr_schema.transport.tokens import TokenChange, TokenWatch
+from keyexpr_schema.transport.trace import Operation, Trace
 from keyexpr_schema.transport.watch import Change, Watch
 from keyexpr_schema.transport.wire import Wire, decode_wire, encoding_of, stamp_of_text
 
@@ -87,6 +88,7 @@ class Session:
         self.config = config
         self.link = link
         self._rejects: dict[str, tuple[str, int]] = {}
+        self._trace = Trace(config.component)
 
     @property
     def component(self) -> str:
@@ -116,11 +118,13 @@ class Session:
 
         A stream is dropped when the link is full, anything else waits its turn.
         """
+        keyexpr = key.build(address)
+        self._trace.note(Operation.PUT, key, keyexpr)
         self.link.send_soon(
-            key.build(address),
+            keyexpr,
             key.encode(payload),
             encoding_of(key.schema),
-            block=key.kept is not Kept.STREAM,
+            block=key.delivery is not Delivery.STREAM,
         )
 
     async def confirm(
@@ -148,8 +152,9 @@ class Session:
         self, key: Key[A, Any], address: A, data: bytes | None, timeout_s: float
     ) -> None:
         if not key.stored:
-            raise TypeError(f"{key.name} is {key.kept.value}: it cannot be confirmed")
+            raise TypeError(f"{key.name} is {key.delivery.value}: it cannot be confirmed")
         keyexpr = key.build(address)
+        self._trace.note(Operation.DELETE if data is None else Operation.PUT, key, keyexpr)
         timestamp = self.link.new_timestamp()
         ours = stamp_of_text(str(timestamp))
         try:
@@ -209,7 +214,9 @@ class Session:
             Unreachable: no router and store could be asked within `timeout_s`.
         """
         self._check_stored(key)
-        wires = await self.listing(key.build(address), timeout_s)
+        keyexpr = key.build(address)
+        self._trace.note(Operation.READ, key, keyexpr)
+        wires = await self.listing(keyexpr, timeout_s)
         return self.decode(key, wires[0]) if wires else None
 
     async def list(self, key: Key[A, P], timeout_s: float = 3.0, **fixed: str | int) -> dict[A, P]:
@@ -221,8 +228,10 @@ class Session:
             Unreachable: no router and store could be asked within `timeout_s`.
         """
         self._check_stored(key)
+        pattern = key.pattern(**fixed)
+        self._trace.note(Operation.READ, key, pattern)
         found: dict[A, P] = {}
-        for wire in await self.listing(key.pattern(**fixed), timeout_s):
+        for wire in await self.listing(pattern, timeout_s):
             try:
                 found[key.parse(wire.keyexpr)] = self.decode(key, wire)
             except (ForeignKey, UndecodablePayload) as error:
@@ -231,7 +240,7 @@ class Session:
 
     def _check_stored(self, key: Key[Any, Any]) -> None:
         if not key.stored:
-            raise TypeError(f"{key.name} is {key.kept.value}: there is nothing to get")
+            raise TypeError(f"{key.name} is {key.delivery.value}: there is nothing to get")
 
     async def listing(self, pattern: str, timeout_s: float) -> tuple[Wire, ...]:
         """The newest stored value of every key that matches `pattern`, undecoded.
@@ -270,8 +279,10 @@ class Session:
 
     async def store_answers(self, timeout_s: float) -> bool:
         """Whether a store that keeps a journal answers now; a zenohd storage never does."""
+        keyexpr = STORE_JOURNAL.build(StoreAddress())
+        self._trace.note(Operation.QUERY, STORE_JOURNAL, keyexpr)
         replies = await self.link.query(
-            STORE_JOURNAL.build(StoreAddress()),
+            keyexpr,
             timeout_s,
             STORE_JOURNAL.encode(StoreQuery(limit=0)),
             encoding_of(STORE_JOURNAL.schema),
@@ -313,9 +324,11 @@ class Session:
         patterns = []
         for selection in selections:
             key, fixed = selection if isinstance(selection, tuple) else (selection, {})
-            if key.kept in (Kept.TOKEN, Kept.QUERY):
-                raise TypeError(f"{key.name} is a {key.kept.value}: it cannot be watched")
-            patterns.append((key, key.pattern(**fixed)))
+            if key.delivery in (Delivery.TOKEN, Delivery.QUERY):
+                raise TypeError(f"{key.name} is a {key.delivery.value}: it cannot be watched")
+            pattern = key.pattern(**fixed)
+            self._trace.note(Operation.WATCH, key, pattern)
+            patterns.append((key, pattern))
         async with Watch(self, patterns).running() as watch:
             yield watch
 
@@ -324,7 +337,9 @@ class Session:
     @asynccontextmanager
     async def token(self, key: Key[A, Any], address: A) -> AsyncIterator[None]:
         """Be seen as alive at `address` until the block ends or the link is gone."""
-        async with self.link.token(key.build(address)):
+        keyexpr = key.build(address)
+        self._trace.note(Operation.TOKEN, key, keyexpr)
+        async with self.link.token(keyexpr):
             yield
 
     @asynccontextmanager
@@ -332,7 +347,9 @@ class Session:
         self, key: Key[A, Any], debounce_s: float = 0.5, **fixed: str | int
     ) -> AsyncIterator[TokenWatch[A]]:
         """Watch who is alive; a token counts as lost when it stays away for `debounce_s`."""
-        async with TokenWatch(self.link, key, key.pattern(**fixed), debounce_s).running() as watch:
+        pattern = key.pattern(**fixed)
+        self._trace.note(Operation.WATCH_TOKENS, key, pattern)
+        async with TokenWatch(self.link, key, pattern, debounce_s).running() as watch:
             yield watch
 
     # --- questions -------------------------------------------------------------------------------
@@ -349,7 +366,9 @@ class Session:
         What `handler` raises becomes an error reply; the asker sees its text.
         """
         service = Service(self, key, handler)
-        async with service.running(key.pattern(**fixed)):
+        pattern = key.pattern(**fixed)
+        self._trace.note(Operation.SERVE, key, pattern)
+        async with service.running(pattern):
             yield
 
     async def ask(self, key: Key[A, P], address: A, payload: P, timeout_s: float = 5.0) -> Any:
@@ -358,4 +377,5 @@ class Session:
         Raises:
             NoAnswer: nobody serves it, it failed, or it took longer than `timeout_s`.
         """
+        self._trace.note(Operation.QUERY, key, key.build(address))
         return await ask(self.link, key, address, payload, timeout_s)

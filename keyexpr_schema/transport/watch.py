@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, Protocol
 
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload, Unreachable
-from keyexpr_schema.key import A, Kept, Key, P
+from keyexpr_schema.key import A, Delivery, Key, P
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.wire import Wire, text_of_stamp
 
@@ -118,8 +118,8 @@ class _Selection:
 class Watch:
     """An async iterator of `Change`; made by `Session.watch`.
 
-    Values of `Kept.STREAM` and `Kept.LATEST` keys that were not taken yet are replaced by newer
-    ones of the same key; of other keys every change that was seen is delivered.
+    Values of `STREAM` and `LATEST` keys that were not taken yet are replaced by newer ones of the
+    same key; of other keys every change that was seen is delivered.
     """
 
     def __init__(self, reader: Reader, selections: list[tuple[Key[Any, Any], str]]) -> None:
@@ -154,7 +154,7 @@ class Watch:
     def deliver(self, keyexpr: str, change: Change[Any, Any]) -> None:
         """Queue `change` for the iterator."""
         self._number += 1
-        latest = change.key.kept in (Kept.STREAM, Kept.LATEST)
+        latest = change.key.delivery in (Delivery.STREAM, Delivery.LATEST)
         slot: object = keyexpr if latest else self._number
         self._ready.pop(slot, None)
         self._ready[slot] = change

@@ -14,8 +14,9 @@ from typing import Any
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.errors import BadFile
+from sim.files.solids import Solid, solids
+from sim.files.world_schema import ObjectKind, WorldFile
 from sim.mujoco_world.description import RobotModel
-from sim.world_schema import ObjectKind, Solid, WorldFile
 
 STEP_S = 0.005
 """Physics step. 5 ms carries a grasp by friction with the solver settings below."""
@@ -54,7 +55,7 @@ def compile_world(world: WorldFile, robots: Sequence[tuple[str, RobotModel]]) ->
 
     _add_floor(spec, world)
     walls = spec.worldbody.add_body(name="walls")
-    for solid in world.solids():
+    for solid in solids(world):
         if solid.kind == "wall":
             _add_wall(walls, solid)
         else:

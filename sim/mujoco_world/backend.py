@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +10,7 @@ from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, M
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from sim.backend import Backend
+from sim.files.world_schema import WorldFile
 from sim.mujoco_world.assemble import STEP_S, compile_world
 from sim.mujoco_world.collisions import Collisions
 from sim.mujoco_world.description import load_description
@@ -22,7 +23,6 @@ from sim.mujoco_world.observer import Observer
 from sim.mujoco_world.robot_body import RobotBody
 from sim.mujoco_world.stage import Act, CannotDo, Ending, Stage, Steps
 from sim.navigation import Navigator
-from sim.world_schema import WorldFile
 
 STEPS = round(PERIOD_S / STEP_S)
 WATCH_EVERY = 2
@@ -62,7 +62,7 @@ class MujocoBackend(Backend):
         world: the building and its objects.
         robots: who is in it, each with its start (x [m], y [m], yaw [rad]).
         seed: for the noise of the cameras.
-        model_folders: where to look for robot models before the package's own.
+        model_folders: by robot, where to look for its model before the package's own.
 
     Raises:
         BadFile: a robot's model is missing or wrong.
@@ -73,12 +73,12 @@ class MujocoBackend(Backend):
         world: WorldFile,
         robots: Sequence[tuple[RobotSpec, PoseMRad]],
         seed: int = 0,
-        model_folders: Sequence[Path] = (),
+        model_folders: Mapping[str, Path] = {},
     ) -> None:
         import mujoco
 
         super().__init__(world, tuple(spec.robot for spec, _ in robots))
-        models = [load_description(spec.model, model_folders) for spec, _ in robots]
+        models = [load_description(spec.model, model_folders.get(spec.robot)) for spec, _ in robots]
         self._model = compile_world(
             world, [(spec.robot, found) for (spec, _), found in zip(robots, models, strict=True)]
         )

@@ -6,26 +6,23 @@ Metres, radians; joint, actuator, site, geom and body names are those of the MJC
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import msgspec
 
+from keyexpr_schema.config_files import config_folders
 from sim.errors import BadFile
-from sim.yaml_file import Entry, read_yaml
+from sim.files.yaml_file import FileEntry, read_yaml
 
 MODELS = Path(__file__).resolve().parent.parent / "models"
 """The models that come with this package."""
 
-BESIDE_ROBOTS = Path("configs") / "robots"
-"""Where people keep robot files, and can put models of their own; from the working directory."""
-
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 
 
-class PlanarDrive(Entry, frozen=True, tag_field="kind", tag="planar"):
+class PlanarDrive(FileEntry, frozen=True, tag_field="kind", tag="planar"):
     """Moves in any direction: three joints (x, y, yaw in the world frame) with velocity servos."""
 
     joints: tuple[str, str, str]
@@ -34,7 +31,7 @@ class PlanarDrive(Entry, frozen=True, tag_field="kind", tag="planar"):
     yaw_rate_rad_s: Positive = 1.2
 
 
-class DifferentialDrive(Entry, frozen=True, tag_field="kind", tag="differential"):
+class DifferentialDrive(FileEntry, frozen=True, tag_field="kind", tag="differential"):
     """Two driven wheels under a free body. Joints: the free one, left wheel, right wheel."""
 
     joints: tuple[str, str, str]
@@ -45,14 +42,14 @@ class DifferentialDrive(Entry, frozen=True, tag_field="kind", tag="differential"
     yaw_rate_rad_s: Positive = 1.2
 
 
-class CameraEntry(Entry, frozen=True):
+class CameraEntry(FileEntry, frozen=True):
     """A camera at `site`, looking along the base's x axis."""
 
     site: str
     fov_deg: Positive = 70.0
 
 
-class ArmEntry(Entry, frozen=True):
+class ArmEntry(FileEntry, frozen=True):
     """An arm that reaches down: the hand's x axis (of `grip_site`) points at the floor.
 
     `stow` and `seeds` are joint values in the order of `joints`; `speeds` in m/s or rad/s.
@@ -68,7 +65,7 @@ class ArmEntry(Entry, frozen=True):
     reach_m: tuple[Positive, Positive]
 
 
-class GripperEntry(Entry, frozen=True):
+class GripperEntry(FileEntry, frozen=True):
     """Two fingers that move as one; a position servo whose zero is closed.
 
     `touch` are touch sensors (N) on the finger pads, `pads` the geoms that hold.
@@ -83,14 +80,14 @@ class GripperEntry(Entry, frozen=True):
     finger_depth_m: Positive
 
 
-class BasketEntry(Entry, frozen=True):
+class BasketEntry(FileEntry, frozen=True):
     """`site` is a box: the volume in which the base of a carried object lies."""
 
     site: str
     body: str
 
 
-class Description(Entry, frozen=True):
+class Description(FileEntry, frozen=True):
     """A robot model, for its controllers."""
 
     base: PlanarDrive | DifferentialDrive
@@ -112,23 +109,24 @@ class RobotModel:
     description: Description
 
 
-def load_description(name: str, folders: Sequence[Path] = ()) -> RobotModel:
-    """The model called `name`, looked for in `folders`, `BESIDE_ROBOTS`, then `MODELS`.
+def load_description(name: str, beside: Path | None = None) -> RobotModel:
+    """The model called `name`: from the folder `beside` that a robot's file is in, else from the
+    folders of robot files, else from `MODELS`.
 
     Raises:
         BadFile: there is none, or its description says what cannot be.
     """
-    places = (*folders, BESIDE_ROBOTS, MODELS)
+    places = (*(() if beside is None else (beside,)), *config_folders("robots"), MODELS)
     for folder in places:
-        mjcf, beside = folder / f"{name}.xml", folder / f"{name}.model.yaml"
+        mjcf, described = folder / f"{name}.xml", folder / f"{name}.model.yaml"
         if not mjcf.is_file():
             continue
-        if not beside.is_file():
+        if not described.is_file():
             raise BadFile(
-                f"{mjcf} has no description: write {beside} (see sim/models/hsr.model.yaml)"
+                f"{mjcf} has no description: write {described} (see {MODELS / 'hsr.model.yaml'})"
             )
-        found = read_yaml(beside, Description, "model description")
-        _check(beside, found)
+        found = read_yaml(described, Description, "model description")
+        _check(described, found)
         return RobotModel(name=name, mjcf=mjcf, description=found)
     known = sorted({file.stem for folder in places for file in folder.glob("*.xml")})
     raise BadFile(

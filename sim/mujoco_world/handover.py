@@ -7,6 +7,7 @@ from collections.abc import Generator
 
 from keyexpr_schema.payloads.motions import Motion, PointM
 from keyexpr_schema.payloads.robots import PoseMRad
+from sim.files.solids import Solid, solids
 from sim.mujoco_world.drives import wrap
 from sim.mujoco_world.driving import distance_m
 from sim.mujoco_world.handling import (
@@ -20,7 +21,6 @@ from sim.mujoco_world.handling import (
 )
 from sim.mujoco_world.robot_body import RobotBody
 from sim.mujoco_world.stage import Act, CannotDo, Ending, Stage, Step, Steps, face, stow
-from sim.world_schema import Solid
 
 BASKET_OPENING_M = 0.012
 """In a basket the fingers open only this much, so as not to push against its walls."""
@@ -129,7 +129,7 @@ def _in_the_way(
     for step in range(11):
         share = step / 10
         x, y = (a + share * (b - a) for a, b in zip(start, goal, strict=True))
-        for solid in stage.world.solids():
+        for solid in solids(stage.world):
             if _distance_m(solid, x, y) < room:
                 return solid.name
         for other in stage.robots.values():

@@ -8,8 +8,8 @@ from typing import Any
 
 from keyexpr_schema.payloads.motions import Detection
 from keyexpr_schema.payloads.simulation import Truth
+from sim.files.world_schema import FLOOR, WorldFile
 from sim.mujoco_world.robot_body import RobotBody
-from sim.world_schema import FLOOR, WorldFile
 
 SETTLED_M_S = 0.02
 SETTLED_RAD_S = 0.3

@@ -11,11 +11,11 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 
 from keyexpr_schema.payloads.motions import Detection
+from sim.files.world_schema import WorldFile
 from sim.mujoco_world.drives import PERIOD_S, wrap
 from sim.mujoco_world.observer import Observer
 from sim.mujoco_world.robot_body import RobotBody
 from sim.navigation import Leg, Navigator
-from sim.world_schema import WorldFile
 
 Steps = Generator[None, None, "Ending"]
 Step = Generator[None, None, None]

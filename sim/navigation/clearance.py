@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.world_schema import WorldFile
+from sim.files.solids import solids
+from sim.files.world_schema import WorldFile
 
 Floats = NDArray[np.float64]
 
@@ -21,13 +22,13 @@ class Clearance:
     """
 
     def __init__(self, world: WorldFile) -> None:
-        solids = world.solids()
+        boxes = solids(world)
         self._size = np.asarray(world.size_m)
-        self._centre = np.array([s.center_m for s in solids])  # (n, 2) m
-        self._half = np.array([s.half_m for s in solids])  # (n, 2) m
-        yaw = np.array([s.yaw_rad for s in solids])
+        self._centre = np.array([s.center_m for s in boxes])  # (n, 2) m
+        self._half = np.array([s.half_m for s in boxes])  # (n, 2) m
+        yaw = np.array([s.yaw_rad for s in boxes])
         self._cos, self._sin = np.cos(yaw), np.sin(yaw)  # (n,)
-        self._height = np.array([s.height_m for s in solids])
+        self._height = np.array([s.height_m for s in boxes])
 
     def at(self, points_m: ArrayLike, above_m: float = 0.0) -> Floats:
         """Distance of each point `(…, 2)` to the nearest solid that rises above `above_m`, m.

@@ -9,8 +9,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation.clearance import Clearance, Floats
-from sim.world_schema import LARGEST_RADIUS_M, WorldFile
 
 TRACKING_M = 0.05
 """How far a robot's controller may stray from its line. Twice that lies between two robots."""

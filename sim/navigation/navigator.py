@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.errors import NoPath, NoStance
+from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation.clearance import Clearance, segment_gap
 from sim.navigation.lattice import Lattice
 from sim.navigation.spots import Dock, Spots
 from sim.navigation.steering import Leg, passed, steer
 from sim.navigation.traffic import Traffic, Traveller
-from sim.world_schema import LARGEST_RADIUS_M, WorldFile
 
 PATIENCE_S = 60.0
 """Simulated time after which a robot that cannot get on gives up."""

@@ -10,10 +10,10 @@ from itertools import accumulate, pairwise
 import numpy as np
 
 from keyexpr_schema.payloads.robots import PoseMRad
+from sim.files.world_schema import WorldFile
 from sim.navigation.clearance import Clearance
 from sim.navigation.lattice import Lattice
 from sim.navigation.spots import Spots
-from sim.world_schema import WorldFile
 
 XY = tuple[float, float]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation.clearance import Clearance
 from sim.navigation.lattice import PITCH_M, TRACKING_M, Lattice
-from sim.world_schema import LARGEST_RADIUS_M, WorldFile
 
 DOOR_M = 0.5
 """Waiting robots leave this much free beyond a door's own width, around its centre."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation.clearance import Clearance
-from sim.world_schema import LARGEST_RADIUS_M, WorldFile
 
 CELL_M = 0.1
 

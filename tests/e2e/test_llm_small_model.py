@@ -15,8 +15,10 @@ from typing import Any
 import pytest
 
 from fleet.core.checker.plan_checker import check_plan
+from fleet.llm.configuration import LlmConfig
+from fleet.llm.conversation import LanguageModel
 from fleet.planners.base import PlanningProblem
-from fleet.planners.llm import LlmConfig, LlmPlanner
+from fleet.planners.llm.planner import LlmPlanner
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from keyexpr_schema.payloads.plans import Plan
 from tests.household import bring, home
@@ -96,14 +98,15 @@ def test_a_bad_model_makes_no_bad_plan(strategy: str) -> None:
                 max_repairs=1,
                 retries=0,
             )
-            planner = LlmPlanner(config, SymbolicPlanner())
+            language_model = LanguageModel(config)
+            planner = LlmPlanner(language_model, SymbolicPlanner())
             try:
-                planner.warm()
+                language_model.warm()
                 started = time.perf_counter()
                 plan = planner.plan(PlanningProblem("p", goals, world, strategy=strategy))
                 took_s = time.perf_counter() - started
             finally:
-                planner.close()
+                language_model.close()
     finally:
         model.close()
     assert isinstance(plan, Plan), plan

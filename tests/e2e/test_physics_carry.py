@@ -10,8 +10,8 @@ import pytest
 
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, PointM
 from keyexpr_schema.payloads.simulation import Truth
+from sim.files.mission_file import load_mission
 from sim.mujoco_world import MujocoBackend
-from sim.world_file import load_mission
 
 MISSION = load_mission("two-cups")
 TABLE_M = MISSION.world.start_point_m("cup_1")

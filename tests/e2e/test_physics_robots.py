@@ -9,8 +9,8 @@ import pytest
 
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState
 from keyexpr_schema.payloads.robots import PoseMRad
+from sim.files.mission_file import load_mission
 from sim.mujoco_world import MujocoBackend
-from sim.world_file import load_mission
 
 MISSION = load_mission("two-cups")
 SPECS = {robot.spec.robot: robot.spec for robot in MISSION.robots}

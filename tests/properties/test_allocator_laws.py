@@ -7,11 +7,11 @@ from itertools import product
 from types import SimpleNamespace
 from typing import Any
 
+from fleet.allocators.milp import MilpAllocator
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fleet.allocators.base import AllocationProblem, NotAllocated
-from fleet.allocators.milp import MilpAllocator
 from fleet.core.checker.plan_checker import CheckedPlan
 from keyexpr_schema.payloads.plans import Plan
 

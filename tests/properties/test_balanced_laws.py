@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import product
 
+from fleet.allocators.load_balancing.bits import bits, mask_of, selector
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,7 +18,6 @@ from fleet.allocators.load_balancing import (
     loads_of,
     semi_matching,
 )
-from fleet.allocators.load_balancing.bits import bits, mask_of, selector
 from fleet.allocators.min_max_load import Bound, min_max_load
 
 

@@ -115,12 +115,13 @@ class Undisturbed(RuleBasedStateMachine):
             self.model.return_(robot)
         self.model.finish()
         state = self.model.state
-        for book in state.plans.values():
-            assert book.state in ENDED_PLANS, f"{book.plan.plan} is {book.state}: it never ends"
-            assert not book.outstanding()
+        for entry in state.plans.values():
+            assert entry.state in ENDED_PLANS, f"{entry.plan.plan} is {entry.state}: it never ends"
+            assert not entry.outstanding()
         for goal, status in state.goal_states.items():
             waits = all(
-                goal not in book.plan.goals or book.state in UNDONE for book in state.plans.values()
+                goal not in entry.plan.goals or entry.state in UNDONE
+                for entry in state.plans.values()
             )
             assert status.state in ENDED_GOALS or waits, f"{goal} is {status.state} for ever"
             if self.reaches_everything and not waits:
@@ -132,8 +133,8 @@ class Undisturbed(RuleBasedStateMachine):
     def finished_work_stays_finished(self) -> None:
         if not hasattr(self, "model"):
             return
-        for plan, book in self.model.state.plans.items():
-            for record in book.records.values():
+        for plan, entry in self.model.state.plans.items():
+            for record in entry.records.values():
                 if (plan, record.task) in self.finished:
                     assert record.state is TaskState.SUCCEEDED, "finished work was undone"
                 elif record.state is TaskState.SUCCEEDED:

@@ -7,13 +7,12 @@ from hypothesis import strategies as st
 
 from fleet.allocators.base import Allocated
 from fleet.core.checker.plan_checker import check_plan
-from fleet.core.model.skills import Variable
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import PlanningProblem
 from fleet.service.composition import compose
+from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan
-from keyexpr_schema.payloads.world import Value
 from tests.household import bring, carrier, home, manipulator
 
 PARTS = compose()
@@ -29,9 +28,9 @@ def missions(draw: st.DrawFn) -> tuple[WorldModel, tuple[Goal, ...]]:
     arms = ["hsr", "r2"][: draw(st.integers(1, 2))]
     robots = (*(manipulator(name) for name in arms), carrier("locobot"))
     cups = draw(st.integers(1, 4))
-    facts: dict[Variable, Value] = {}
+    facts: dict[FactKey, Value] = {}
     for spec in robots:
-        facts[Variable("at", spec.robot)] = draw(st.sampled_from((*PLACES, None)))
+        facts[FactKey("at", spec.robot)] = draw(st.sampled_from((*PLACES, None)))
     free_hands = list(arms)
     riding = ""
     goals: list[Goal] = []
@@ -39,14 +38,14 @@ def missions(draw: st.DrawFn) -> tuple[WorldModel, tuple[Goal, ...]]:
         name = f"cup_{number}"
         where = draw(st.sampled_from(("room", "hand", "basket")))
         to = draw(st.sampled_from(PLACES))
-        facts[Variable("at", name)] = draw(st.sampled_from(PLACES))
+        facts[FactKey("at", name)] = draw(st.sampled_from(PLACES))
         if where == "hand" and free_hands:
             hand = free_hands.pop()
-            facts[Variable("holding", hand)] = name
-            facts[Variable("at", name)] = hand
+            facts[FactKey("holding", hand)] = name
+            facts[FactKey("at", name)] = hand
         elif where == "basket" and not riding:
             riding = to
-            facts[Variable("at", name)] = "locobot"
+            facts[FactKey("at", name)] = "locobot"
         goals.append(bring(number, to))
     if len(goals) > 1 and draw(st.booleans()):
         goals.pop(draw(st.integers(0, len(goals) - 1)))

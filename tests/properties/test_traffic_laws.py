@@ -15,9 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.errors import SimError
+from sim.files.mission_file import load_mission
 from sim.navigation import Leg, Navigator
 from sim.navigation.clearance import Clearance
-from sim.world_file import load_mission
 
 PERIOD_S = 0.05
 WORLD = load_mission("two-cups").world

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from keyexpr_schema.payloads.tasks import Order, ReportState
-from workers.fencing import (
+from workers.orders.fencing import (
     Accept,
+    Attempt,
     AttemptName,
     Cancel,
-    Entry,
     Ignore,
     Ledger,
     Phase,
@@ -26,8 +26,8 @@ from workers.fencing import (
     decide,
     superseded,
 )
-from workers.journal import Journal
-from workers.reports import report_on
+from workers.orders.journal import Journal
+from workers.orders.reports import make_report
 
 small = st.integers(1, 3)
 orders = st.builds(
@@ -56,18 +56,18 @@ class Intake:
         self.fences: tuple[int, dict[str, int]] = (0, {})
 
     def end(self, name: AttemptName, state: ReportState) -> None:
-        order = self.ledger.entries[name].order
-        report = report_on(order, "r1", state)
-        self.ledger.put(Entry(order, Phase.ENDED, report))
+        order = self.ledger.attempts[name].order
+        report = make_report(order, "r1", state)
+        self.ledger.put(Attempt(order, Phase.ENDED, report))
 
     def deliver(self, order: Order) -> None:
         name = attempt_name(order)
-        before = self.ledger.entries.get(name)
+        before = self.ledger.attempts.get(name)
         older = order.epoch < self.ledger.epoch or order.revision < self.ledger.revisions.get(
             order.plan, 0
         )
         decision = decide(self.ledger, order)
-        assert self.ledger.entries.get(name) is before, "deciding changes nothing"
+        assert self.ledger.attempts.get(name) is before, "deciding changes nothing"
         if before is not None and before.phase is Phase.ENDED:
             assert decision == Repeat(before.report)
         if older:
@@ -82,7 +82,7 @@ class Intake:
                     if past in self.queue:
                         self.queue.remove(past)
                         self.end(past, ReportState.CANCELLED)
-                self.ledger.put(Entry(order, Phase.QUEUED))
+                self.ledger.put(Attempt(order, Phase.QUEUED))
                 self.queue.append(name)
             case Renew():
                 self.ledger.saw(order)
@@ -96,7 +96,7 @@ class Intake:
                 else:
                     assert before is None
                     self.ledger.put(
-                        Entry(order, Phase.ENDED, report_on(order, "r", ReportState.CANCELLED))
+                        Attempt(order, Phase.ENDED, make_report(order, "r", ReportState.CANCELLED))
                     )
             case Refuse():
                 assert before is None
@@ -104,10 +104,10 @@ class Intake:
                 pass
 
     def deliver_again(self, number: int, cancelled: bool, newer: int) -> None:
-        names = list(self.ledger.entries)
+        names = list(self.ledger.attempts)
         if not names:
             return
-        order = self.ledger.entries[names[-1 - number % len(names)]].order
+        order = self.ledger.attempts[names[-1 - number % len(names)]].order
         epoch = self.ledger.epoch + newer
         revision = self.ledger.revisions[order.plan] + newer
         self.deliver(replace(order, epoch=epoch, revision=revision, cancelled=cancelled))
@@ -119,7 +119,7 @@ class Intake:
             self.running = None
         elif self.queue:
             self.running = self.queue.pop(0)
-            self.ledger.put(Entry(self.ledger.entries[self.running].order, Phase.STARTED))
+            self.ledger.put(Attempt(self.ledger.attempts[self.running].order, Phase.STARTED))
             self.started.append(self.running)
 
     def withdraw(self) -> None:
@@ -128,12 +128,12 @@ class Intake:
 
     def crash_and_restart(self) -> None:
         kept = Ledger(epoch=self.ledger.epoch, revisions=dict(self.ledger.revisions))
-        for entry in self.ledger.entries.values():
-            if entry.phase is not Phase.QUEUED:
-                kept.put(entry)
+        for attempt in self.ledger.attempts.values():
+            if attempt.phase is not Phase.QUEUED:
+                kept.put(attempt)
         self.ledger, self.queue, self.running = kept, [], None
-        for entry in kept.phases(Phase.STARTED):
-            self.end(attempt_name(entry.order), ReportState.INTERRUPTED)
+        for attempt in kept.phases(Phase.STARTED):
+            self.end(attempt_name(attempt.order), ReportState.INTERRUPTED)
 
     def check(self) -> None:
         """One attempt never runs twice; attempts of a task start in order; fences only rise."""
@@ -179,23 +179,23 @@ def test_the_journal_on_disk_is_the_ledger_in_memory(steps: list[tuple[Order, st
         try:
             for order, step in steps:
                 name = attempt_name(order)
-                if step == "queue" and name not in ledger.entries:
+                if step == "queue" and name not in ledger.attempts:
                     journal.queued(order)
-                    ledger.put(Entry(order, Phase.QUEUED))
-                elif step == "start" and name in ledger.entries:
-                    journal.started(order, report_on(order, "r", ReportState.STARTED))
-                    ledger.put(Entry(order, Phase.STARTED))
+                    ledger.put(Attempt(order, Phase.QUEUED))
+                elif step == "start" and name in ledger.attempts:
+                    journal.started(order, make_report(order, "r", ReportState.STARTED))
+                    ledger.put(Attempt(order, Phase.STARTED))
                 elif step == "end":
-                    report = report_on(order, "r", ReportState.SUCCEEDED)
+                    report = make_report(order, "r", ReportState.SUCCEEDED)
                     journal.ended(order, report)
-                    ledger.put(Entry(order, Phase.ENDED, report))
+                    ledger.put(Attempt(order, Phase.ENDED, report))
                 elif step == "open":
                     journal.__exit__(None, None, None)
                     journal = Journal(path).__enter__()
-                    for entry in ledger.phases(Phase.QUEUED):
-                        ledger.drop(attempt_name(entry.order))
+                    for attempt in ledger.phases(Phase.QUEUED):
+                        ledger.drop(attempt_name(attempt.order))
                 assert journal.ledger.epoch == ledger.epoch
                 assert journal.ledger.revisions == ledger.revisions
-                assert journal.ledger.entries == ledger.entries
+                assert journal.ledger.attempts == ledger.attempts
         finally:
             journal.__exit__(None, None, None)

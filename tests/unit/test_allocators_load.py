@@ -6,24 +6,26 @@ import json
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace as changed
+from typing import Any
 
 import pytest
-
 from fleet.allocators.balanced import BalancedAllocator
+from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.solver_run import Found, available_solver, solve
+
 from fleet.allocators.base import Allocated, AllocationProblem, Allocator, Assignment, NotAllocated
 from fleet.allocators.cost_based import CostBasedAllocator
-from fleet.allocators.llm import Choice, LlmAllocator
+from fleet.allocators.llm import LlmAllocator
 from fleet.allocators.load_balancing import Balance, LoadProblem, balance
-from fleet.allocators.milp import MilpAllocator
 from fleet.allocators.min_max_load import Bound, min_max_load
 from fleet.allocators.round_robin import RoundRobinAllocator
-from fleet.allocators.solver_run import Found, available_solver, solve
 from fleet.core.checker.plan_checker import check_plan
 from fleet.core.model.world import WorldModel
+from fleet.llm.client import ModelAnswer, ModelClient
+from fleet.llm.configuration import LlmConfig
+from fleet.llm.conversation import LanguageModel
 from fleet.planners.base import PlanningProblem
-from fleet.planners.llm import LlmConfig, ModelCaller
 from fleet.planners.symbolic.planner import SymbolicPlanner
-from fleet.service.allocation_asker import AllocationAsker
 from fleet.service.composition import compose
 from keyexpr_schema.payloads.plans import Plan, Task, Violation
 from tests.household import bring, carrier, fact, home, manipulator
@@ -272,31 +274,30 @@ def test_many_robots_that_are_alike_do_not_keep_the_milp_busy() -> None:
 
 
 @pytest.fixture(scope="module")
-def caller() -> Iterator[ModelCaller]:
+def client() -> Iterator[ModelClient]:
     """One for all tests: LiteLLM takes seconds to import."""
-    caller = ModelCaller()
-    yield caller
-    caller.close()
+    client = ModelClient()
+    yield client
+    client.close()
 
 
-def by_model(server: LlmServer, caller: ModelCaller) -> LlmAllocator:
+def by_model(server: LlmServer, client: ModelClient) -> LlmAllocator:
     """Through the conversation of the language-model planner, repairs and budget included."""
     config = LlmConfig(
         model="openai/scripted", api_base=server.api_base, timeout_s=20.0, retry_wait_s=0.01
     )
-
-    return LlmAllocator(AllocationAsker(config, caller), BalancedAllocator())
+    return LlmAllocator(LanguageModel(config, client), BalancedAllocator())
 
 
 def answer(**robots: str) -> Reply:
     return Reply({"robots": [{"actor": a, "robot": r} for a, r in robots.items()]})
 
 
-def test_a_language_model_is_told_what_is_wrong_and_mends_it(caller: ModelCaller) -> None:
+def test_a_language_model_is_told_what_is_wrong_and_mends_it(client: ModelClient) -> None:
     world, plan = home(TEAM[:2]), drives("", "r2")
     replies = (Reply("no idea"), answer(a0="r9", a1="r1"), answer(a0="r2", a1="r2"))
     with LlmServer(*replies) as server:
-        made = by_model(server, caller).allocate(plan, world)
+        made = by_model(server, client).allocate(plan, world)
     assert isinstance(made, Allocated)
     assert made.allocation == {"a0": "r2", "a1": "r2"}
     told = json.dumps(server.requests[2]["messages"])
@@ -305,11 +306,11 @@ def test_a_language_model_is_told_what_is_wrong_and_mends_it(caller: ModelCaller
 
 
 def test_a_language_model_that_is_never_right_is_replaced_and_that_is_said(
-    caller: ModelCaller,
+    client: ModelClient,
 ) -> None:
     world, plan = home(TEAM[:2]), drives("", "")
     with LlmServer(answer(a0="r1")) as server:
-        made = by_model(server, caller).allocate(plan, world)
+        made = by_model(server, client).allocate(plan, world)
     assert isinstance(made, Allocated)
     assert set(made.allocation.values()) == {"r1", "r2"}
     (note,) = made.notes
@@ -318,10 +319,12 @@ def test_a_language_model_that_is_never_right_is_replaced_and_that_is_said(
 
 
 def test_a_language_model_that_fails_stops_nothing() -> None:
-    def ask(*_: object, **__: object) -> Choice | str:
-        raise OSError("no network")
+    class Unreachable(ModelClient):
+        def call(self, request: dict[str, Any], timeout_s: float) -> ModelAnswer:
+            raise OSError("no network")
 
-    made = LlmAllocator(ask, RoundRobinAllocator()).allocate(drives(""), home(TEAM[:2]))
+    model = LanguageModel(LlmConfig(model="openai/scripted"), Unreachable())
+    made = LlmAllocator(model, RoundRobinAllocator()).allocate(drives(""), home(TEAM[:2]))
     assert isinstance(made, Allocated)
     assert made.notes[0].endswith("asking the language model failed: no network")
 

@@ -21,6 +21,7 @@ from fleet.allocators.base import Allocated
 from fleet.allocators.makespan import MakespanAllocator
 from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.core.checker.plan_checker import check_plan
+from fleet.jobshop.budget import Budget, StepClock
 from fleet.jobshop.compiled import Compiled
 from fleet.jobshop.portfolio import solve
 
@@ -58,7 +59,8 @@ def test_goals_planned_together_do_once_what_two_need() -> None:
 def test_one_list_of_goals_goes_from_goal_to_goal() -> None:
     home = household("3 robots, 5 goals", 1)
     plan = plan_of(home, "monolithic")
-    made = MakespanAllocator(0.1, exact=False).allocate(plan, world_of(home, REAL))
+    allocator = MakespanAllocator(0.1, exact=False, clock=StepClock())
+    made = allocator.allocate(plan, world_of(home, REAL))
     assert isinstance(made, Allocated)
     start_s, end_s = made.schedule.start_s, made.schedule.end_s
     for one, other in zip(home.goals, home.goals[1:], strict=False):
@@ -67,7 +69,7 @@ def test_one_list_of_goals_goes_from_goal_to_goal() -> None:
 
 
 def test_idle_time_cannot_be_less_than_at_the_bound() -> None:
-    allocators = (MakespanAllocator(0.1), RoundRobinAllocator())
+    allocators = (MakespanAllocator(0.1, exact=False, clock=StepClock()), RoundRobinAllocator())
     for run in compare("3 robots, 5 goals", 2, "per-goal", REAL, allocators):
         assert 0.0 <= run.least_idle <= run.fleet_idle < 1.0
         assert run.bound_s <= run.makespan_s + 1e-6
@@ -82,7 +84,7 @@ def test_idle_time_cannot_be_less_than_at_the_bound() -> None:
 def test_alternatives_are_schedules_and_none_is_below_the_bound(travel: bool) -> None:
     shop = random_shop(12, 3, travel, 0.3 if travel else 0.0)
     ready = Compiled(shop)
-    best = solve(shop, 0.5)
+    best = solve(shop, Budget(0.5, StepClock()), exact=False)
     assert best is not None
     for choose in (nearest, in_turn, papers_milp):
         machine_of = choose(ready)

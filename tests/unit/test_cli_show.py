@@ -17,7 +17,6 @@ from cli.show.live import tell
 from cli.show.page import page, table
 from cli.show.plan_tree import in_order, plan_tree
 from cli.show.words import natural, outcome
-from cli.telling import parse_value
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus, Task, Violation
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -180,22 +179,6 @@ def test_a_change_in_a_line() -> None:
         "goal g is reached",
     )
     assert tell("anything else") is None
-
-
-@pytest.mark.parametrize(
-    ("written", "value"),
-    [
-        ("kitchen", "kitchen"),
-        ("unknown", None),
-        ("true", True),
-        ("3", 3),
-        ("2.5", 2.5),
-        ("nan", "nan"),
-    ],
-)
-def test_values_of_facts(written: str, value: object) -> None:
-    assert parse_value(written) == value
-    assert type(parse_value(written)) is type(value)
 
 
 def test_arguments_of_tasks() -> None:

@@ -9,8 +9,8 @@ import msgspec
 import pytest
 
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState
-from sim.kinematic import Durations, KinematicBackend
-from sim.world_file import load_mission
+from sim.files.mission_file import load_mission
+from sim.kinematic.backend import KinematicBackend, MotionModel
 
 MISSION = load_mission("two-cups")
 ROBOTS = tuple((robot.spec, robot.start_m_rad) for robot in MISSION.robots)
@@ -102,7 +102,7 @@ def test_what_cannot_be_done_fails_with_a_sentence(robot: str, motion: Motion, s
 
 
 def test_scripted_failures_happen_and_are_over() -> None:
-    backend = world(durations=Durations(failures={"hsr": {"grasp": (1, 2)}}))
+    backend = world(motion_model=MotionModel(failures={"hsr": {"grasp": (1, 2)}}))
     assert [pick(backend).state for _ in range(3)] == [
         MotionState.FAILED,
         MotionState.FAILED,
@@ -112,7 +112,9 @@ def test_scripted_failures_happen_and_are_over() -> None:
 
 def test_chance_failures_follow_the_seed() -> None:
     def draws(seed: int) -> list[bool]:
-        backend = world(durations=Durations(failure_chance={"look": 0.5}, spread=0.3), seed=seed)
+        backend = world(
+            motion_model=MotionModel(failure_chance={"look": 0.5}, spread=0.3), seed=seed
+        )
         return [do(backend, "hsr", K.LOOK).state is MotionState.FAILED for _ in range(40)]
 
     assert draws(1) == draws(1) != draws(2)
@@ -152,7 +154,7 @@ def test_a_hundred_robots_make_ten_thousand_motions_in_seconds() -> None:
         (msgspec.structs.replace(ROBOTS[k % 2][0], robot=f"r{k}"), ROBOTS[k % 2][1])
         for k in range(100)
     ]
-    backend = KinematicBackend(MISSION.world, robots, Durations(spread=0.3))
+    backend = KinematicBackend(MISSION.world, robots, MotionModel(spread=0.3))
     places = list(MISSION.world.place_entries)
     began, motions = time.process_time(), 0
     while motions < 10_000:

@@ -6,7 +6,7 @@ import pytest
 
 from fleet.errors import NotUnderstood
 from fleet.language import statement_facts
-from keyexpr_schema.payloads.world import Value
+from keyexpr_schema.facts import Value
 from tests.language_house import WORDS
 
 
@@ -123,7 +123,7 @@ from tests.language_house import WORDS
     ],
 )
 def test_statements_become_facts(text: str, expected: list[tuple[str, str, Value]]) -> None:
-    assert list(statement_facts(text, WORDS)) == expected
+    assert [(*key, value) for key, value in statement_facts(text, WORDS)] == expected
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,12 @@ from hypothesis import strategies as st
 
 from fleet.core.checker.plan_checker import check_plan
 from fleet.llm.quoting import fenced
+from fleet.llm.structured_output import read_answer
 from fleet.planners.base import PlanningProblem
-from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema, read_answer
-from fleet.planners.llm.draft import Draft, draft_of, merged, plan_of
-from fleet.planners.llm.verify import why_not, without_useless
+from fleet.planners.llm.action_elimination import without_redundant_tasks
+from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema
+from fleet.planners.llm.candidate import CandidatePlan, candidate_of, merged, plan_of
+from fleet.planners.llm.verification import violations_of
 from keyexpr_schema.payloads.plans import Plan
 from tests.household import bring, home, manipulator
 
@@ -68,12 +70,12 @@ def consider(answer: dict[str, Any], flat: bool) -> Plan | None:
     if isinstance(read, str):
         return None
     problem = PlanningProblem("p", GOALS, WORLD)
-    plan = plan_of(draft_of(read, WORLD, GOALS), problem, GOALS)
-    if violations := why_not(plan, WORLD):
+    plan = plan_of(candidate_of(read, WORLD, GOALS), problem, GOALS)
+    if violations := violations_of(plan, WORLD):
         assert all(row.sentence for row in violations)
         return None
-    plan = without_useless(plan, WORLD)
-    made = merged([Draft(plan.tasks, plan.pins)], problem, keep_order=not flat)
+    plan = without_redundant_tasks(plan, WORLD)
+    made = merged([CandidatePlan(plan.tasks, plan.pins)], problem, keep_order=not flat)
     assert check_plan(made, WORLD).valid
     # What is stored must be readable again, whatever names the model made up.
     assert msgspec.json.decode(msgspec.json.encode(made), type=Plan) == made

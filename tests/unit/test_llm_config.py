@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import queue
-import shutil
-import subprocess
 import sys
 import threading
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from string import Template
@@ -16,8 +13,10 @@ from typing import Any
 import msgspec
 import pytest
 
-from fleet.llm.prompts import FOLDER, load_prompts
-from fleet.planners.llm import BadLlmConfig, LlmConfig, ModelCaller, load_llm_config
+from fleet.errors import BadLlmConfig
+from fleet.llm.client import ModelClient
+from fleet.llm.configuration import LlmConfig, load_llm_config
+from fleet.llm.prompts import PROMPTS_DIR, load_prompts
 from fleet.planners.llm.answers import StepAnswer, TaskAnswer
 from keyexpr_schema.payloads.plans import Task
 from tests.llm_server import LlmServer, Reply
@@ -27,14 +26,14 @@ KEY = "sk-very-secret"
 
 
 @pytest.fixture(scope="module")
-def caller() -> Iterator[ModelCaller]:
+def client() -> Iterator[ModelClient]:
     """Its processes have a key in their environment, and are started once."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROBOTFLEET_TEST_KEY", KEY)
-        caller = ModelCaller()
-        caller.warm()
-        yield caller
-        caller.close()
+        client = ModelClient()
+        client.warm()
+        yield client
+        client.close()
 
 
 def request(server: LlmServer, key_env: str | None = None) -> dict[str, Any]:
@@ -123,7 +122,7 @@ def test_the_example_rules_fit() -> None:
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
-        ("sistem.txt", "", "replaces no prompt; those are big-dag.txt"),
+        ("sistem.txt", "", "replaces no prompt; those are allocate.txt"),
         ("repair.txt", "$problem", "placeholders are $details, $house_rules, $violations"),
         ("system.txt", "costs $ 5", "write $$ for a dollar sign"),
         ("system.txt", "x" * 20_001, "20000 are allowed"),
@@ -152,7 +151,7 @@ def test_values_in_a_prompt_are_not_expanded() -> None:
 
 def test_every_prompt_has_only_placeholders_that_are_filled() -> None:
     filled = {"skills", "problem", "form", "relations", "violations", "details", "house_rules"}
-    for path in FOLDER.glob("*/*.txt"):
+    for path in PROMPTS_DIR.glob("*/*.txt"):
         assert set(Template(path.read_text(encoding="utf-8")).get_identifiers()) <= filled, path
 
 
@@ -164,30 +163,11 @@ def test_answers_have_the_types_of_tasks() -> None:
             assert field.type == types[field.name]
 
 
-def test_prompts_are_installed_with_the_package(tmp_path: Path) -> None:
-    """A wheel holds them; built from a copy, so that nothing is left in the source tree."""
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, tmp_path / name)
-    shutil.copytree(ROOT / "fleet", tmp_path / "fleet")
-    code = (
-        "from setuptools import build_meta; import sys; "
-        f"print(build_meta.build_wheel({str(tmp_path / 'out')!r}))"
-    )
-    built = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert built.returncode == 0, built.stderr
-    (wheel,) = (tmp_path / "out").glob("*.whl")
-    names = set(zipfile.ZipFile(wheel).namelist())
-    for path in FOLDER.glob("*/*.txt"):
-        assert str(path.relative_to(ROOT)) in names
-
-
-def test_calls_go_on_side_by_side_and_litellm_stays_outside(caller: ModelCaller) -> None:
+def test_calls_go_on_side_by_side_and_litellm_stays_outside(client: ModelClient) -> None:
     kinds: queue.Queue[str] = queue.Queue()
     with LlmServer(Reply(silent=True), Reply("hello")) as server:
         threads = [
-            threading.Thread(target=lambda: kinds.put(caller.call(request(server), 600).kind))
+            threading.Thread(target=lambda: kinds.put(client.call(request(server), 600).kind))
             for _ in range(2)
         ]
         for thread in threads:
@@ -199,26 +179,26 @@ def test_calls_go_on_side_by_side_and_litellm_stays_outside(caller: ModelCaller)
     assert "litellm" not in sys.modules
 
 
-def test_keys_go_to_the_server_and_not_into_messages(caller: ModelCaller) -> None:
+def test_keys_go_to_the_server_and_not_into_messages(client: ModelClient) -> None:
     echo = f'{{"error": {{"message": "bad key {KEY}"}}}}'.encode()
     with LlmServer(Reply(status=401, raw=echo)) as server:
-        answer = caller.call(request(server, "ROBOTFLEET_TEST_KEY"), 30.0)
+        answer = client.call(request(server, "ROBOTFLEET_TEST_KEY"), 30.0)
         assert server.keys == [f"Bearer {KEY}"]
     assert answer.kind == "key"
     assert "bad key ***" in answer.error
 
 
-def test_close_ends_a_call_that_is_under_way(caller: ModelCaller) -> None:
+def test_close_ends_a_call_that_is_under_way(client: ModelClient) -> None:
     """The last one here, since no call follows a close."""
     kinds: list[str] = []
     with LlmServer(Reply(silent=True)) as server:
         thread = threading.Thread(
-            target=lambda: kinds.append(caller.call(request(server), 600).kind)
+            target=lambda: kinds.append(client.call(request(server), 600).kind)
         )
         thread.start()
         assert server.asked.wait(60)
-        caller.close()
+        client.close()
         thread.join(10)
         assert kinds == ["failed"]
-        assert caller.call(request(server), 600).kind == "closed"
+        assert client.call(request(server), 600).kind == "closed"
         assert len(server.requests) == 1

@@ -10,16 +10,19 @@ import pytest
 
 from keyexpr_schema.payloads.robots import RobotSpec
 from sim.errors import BadFile
+from sim.files.mission_file import load_mission, load_robot
+from sim.files.world_file import load_world
 from sim.mujoco_world import MODELS, MujocoBackend, load_description
-from sim.world_file import CONFIGS, load_robot, load_world
+from sim.server.process import make_backend
 
-HOME = load_world(CONFIGS / "worlds" / "home.yaml")
-HSR = load_robot(CONFIGS / "robots" / "hsr.yaml")
-LOCOBOT = load_robot(CONFIGS / "robots" / "locobot.yaml")
+HOME = load_world("home")
+HSR = load_robot("hsr")
+LOCOBOT = load_robot("locobot")
 
 
 def alone(spec: RobotSpec, folder: Path | None = None) -> MujocoBackend:
-    return MujocoBackend(HOME, [(spec, (2.5, 3.0, 0.0))], model_folders=[folder] if folder else [])
+    folders = {spec.robot: folder} if folder else {}
+    return MujocoBackend(HOME, [(spec, (2.5, 3.0, 0.0))], model_folders=folders)
 
 
 def reach_of_shapes(backend: MujocoBackend, robot: str) -> tuple[float, float]:
@@ -89,9 +92,9 @@ def test_an_unknown_model_is_named_with_those_that_exist() -> None:
 def test_a_model_of_ones_own_is_found_first_and_needs_a_description(tmp_path: Path) -> None:
     shutil.copy(MODELS / "locobot.xml", tmp_path / "porter.xml")
     with pytest.raises(BadFile, match=r"porter.xml has no description: write .*porter.model.yaml"):
-        load_description("porter", [tmp_path])
+        load_description("porter", tmp_path)
     shutil.copy(MODELS / "locobot.model.yaml", tmp_path / "porter.model.yaml")
-    assert load_description("porter", [tmp_path]).mjcf == tmp_path / "porter.xml"
+    assert load_description("porter", tmp_path).mjcf == tmp_path / "porter.xml"
     spec = RobotSpec(robot="p", model="porter", skills=("navigate",), capabilities={"drive": 0.4})
     assert alone(spec, tmp_path).senses("p").basket == ()
 
@@ -105,6 +108,22 @@ def test_a_model_beside_the_robot_files_is_found(
     shutil.copy(MODELS / "hsr.model.yaml", folder / "butler.model.yaml")
     monkeypatch.chdir(tmp_path)
     assert load_description("butler").description == load_description("hsr").description
+
+
+def test_a_mission_finds_a_model_beside_the_robot_file_wherever_that_is(tmp_path: Path) -> None:
+    folder = tmp_path / "bots"
+    folder.mkdir()
+    shutil.copy(MODELS / "hsr.xml", folder / "butler.xml")
+    shutil.copy(MODELS / "hsr.model.yaml", folder / "butler.model.yaml")
+    spec = "robot: butler\nmodel: butler\nskills: [navigate]\ncapabilities: {drive: 0.4}\n"
+    (folder / "butler.yaml").write_text(spec)
+    (tmp_path / "mission.yaml").write_text(
+        "mission: m\nworld: home\nrobots: [{spec: bots/butler.yaml, start: {at_m: [2.5, 3.0]}}]\n"
+    )
+    loaded = load_mission(tmp_path / "mission.yaml")
+    assert make_backend(loaded, "mujoco").senses("butler").pose_m_rad == pytest.approx(
+        (2.5, 3.0, 0.0), abs=0.01
+    )
 
 
 def test_a_part_that_the_mjcf_lacks_is_named(tmp_path: Path) -> None:
@@ -137,4 +156,4 @@ def test_joint_values_must_be_as_many_as_joints(tmp_path: Path) -> None:
     )
     (tmp_path / "mine.model.yaml").write_text(text)
     with pytest.raises(BadFile, match=r"arm.speeds has 1 values; arm.joints has 4"):
-        load_description("mine", [tmp_path])
+        load_description("mine", tmp_path)

@@ -8,8 +8,8 @@ import pytest
 
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionState
 from keyexpr_schema.payloads.simulation import ShapeKind
+from sim.files.mission_file import load_mission
 from sim.mujoco_world import MujocoBackend
-from sim.world_file import load_mission
 
 MISSION = load_mission("two-cups")
 

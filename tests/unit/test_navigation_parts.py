@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from sim.errors import NoPath, NoStance
+from sim.files.mission_file import load_mission
+from sim.files.world_schema import WorldFile
 from sim.navigation import Navigator
 from sim.navigation.clearance import Clearance, segment_gap
 from sim.navigation.lattice import PITCH_M, WALL_M, Lattice
 from sim.navigation.routes import Route, Routes
 from sim.navigation.spots import Spots
 from sim.navigation.steering import DECELERATION_M_S2, steer
-from sim.world_file import load_mission
-from sim.world_schema import WorldFile
 
 WORLD = load_mission("two-cups").world
 CLEARANCE = Clearance(WORLD)

@@ -7,7 +7,8 @@ import pytest
 from fleet.core import events
 from fleet.core.dispatch.delays import FACTOR, MARGIN_S, next_lateness
 from fleet.core.dispatch.dispatcher import next_timer
-from fleet.core.state import PlanBook, Policy
+from fleet.core.state import PlanEntry, Policy
+from keyexpr_schema.facts import HOLDING, FactKey
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState, Task
 from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
@@ -25,12 +26,12 @@ def running(robots: int, cups: int, allocator: str = "makespan") -> FleetModel:
     return model
 
 
-def book(model: FleetModel) -> PlanBook:
+def entry(model: FleetModel) -> PlanEntry:
     return model.state.plans["plan-1"]
 
 
 def robot_of(model: FleetModel) -> dict[str, str | None]:
-    return {r.task: r.robot for r in book(model).current() if r.state is not TaskState.FAILED}
+    return {r.task: r.robot for r in entry(model).current() if r.state is not TaskState.FAILED}
 
 
 def order_of(model: FleetModel, robot: str) -> Order:
@@ -45,10 +46,10 @@ def test_only_a_lost_robots_work_changes_hands(allocator: str) -> None:
     begun = {order.task: order.robot for order in model.orders() if order.robot != "r2"}
     model.lose("r2")
     after = robot_of(model)
-    assert book(model).plan.revision == 2
+    assert entry(model).plan.revision == 2
     assert set(after.values()) == {"r1", "r3"}
     assert begun.items() <= after.items()
-    change = book(model).change
+    change = entry(model).change
     assert change is not None
     stayed = {task: robot for task, robot in before.items() if robot != "r2"}
     # Who thinks of the makespan may move one more for it; the others leave everybody alone.
@@ -65,27 +66,27 @@ def test_a_lost_robot_that_had_begun_is_followed_by_one_that_begins_anew() -> No
     undisturbed = order_of(model, "r2")
     model.lose("r1")
     assert order_of(model, "r2") == undisturbed
-    assert {r.robot for r in book(model).current() if r.state is TaskState.WAITING} == {"r2"}
+    assert {r.robot for r in entry(model).current() if r.state is TaskState.WAITING} == {"r2"}
     model.finish()
-    assert book(model).state is PlanState.SUCCEEDED
+    assert entry(model).state is PlanState.SUCCEEDED
 
 
 def test_what_a_lost_robot_had_in_its_hand_fails_that_goal_only() -> None:
     model = running(robots=3, cups=6)
-    while (held := model.state.facts["r1/holding"].value) == "nothing":
+    while (held := model.state.facts[FactKey(HOLDING, "r1")].value) == "nothing":
         model.succeed(order_of(model, "r1"))
     before = robot_of(model)
     model.lose("r1")
     (failed,) = [g for g, s in model.state.goal_states.items() if s.state is GoalState.FAILED]
     assert f"g{str(held).removeprefix('cup_')}" == failed
     assert f"at({held})" in (model.state.goal_states[failed].reason or "")
-    assert any(f"goal {failed} is left out" in note for note in book(model).notes)
+    assert any(f"goal {failed} is left out" in note for note in entry(model).notes)
     begun = {order.task: order.robot for order in model.orders()}
     assert begun.items() <= before.items()
     model.finish()
     others = [s.state for g, s in model.state.goal_states.items() if g != failed]
     assert others == [GoalState.REACHED] * 5
-    assert book(model).state is PlanState.SUCCEEDED
+    assert entry(model).state is PlanState.SUCCEEDED
 
 
 def test_a_goal_that_cannot_be_reached_any_more_does_not_end_the_others() -> None:
@@ -101,7 +102,7 @@ def test_a_goal_that_cannot_be_reached_any_more_does_not_end_the_others() -> Non
 
 def be_late(model: FleetModel, order: Order, more_s: float = 0.0) -> None:
     """The order's robot takes so long that its task is late, and `more_s` longer."""
-    record = book(model).records[order.task]
+    record = entry(model).records[order.task]
     model.start(order)
     model.time_s += FACTOR * record.duration_s + MARGIN_S + more_s
     model.tell(events.TimerFired)
@@ -110,32 +111,32 @@ def be_late(model: FleetModel, order: Order, more_s: float = 0.0) -> None:
 def test_the_waiting_work_of_a_late_robot_goes_to_others_and_what_it_does_goes_on() -> None:
     model = running(robots=2, cups=6)
     order = order_of(model, "r1")
-    waiting = sum(r.robot == "r1" and r.state is TaskState.WAITING for r in book(model).current())
+    waiting = sum(r.robot == "r1" and r.state is TaskState.WAITING for r in entry(model).current())
     be_late(model, order, more_s=200.0)
-    assert book(model).late == (order.task,)
-    assert book(model).plan.revision == 2
+    assert entry(model).late == (order.task,)
+    assert entry(model).plan.revision == 2
     assert order_of(model, "r1") == order
     assert not order_of(model, "r1").cancelled
-    left = sum(r.robot == "r1" and r.state is TaskState.WAITING for r in book(model).current())
+    left = sum(r.robot == "r1" and r.state is TaskState.WAITING for r in entry(model).current())
     assert left < waiting
     model.finish()
-    assert book(model).state is PlanState.SUCCEEDED
+    assert entry(model).state is PlanState.SUCCEEDED
 
 
 def test_lateness_that_nobody_can_make_up_for_changes_nothing() -> None:
     model = running(robots=1, cups=2)
     order = order_of(model, "r1")
     be_late(model, order)
-    assert book(model).plan.revision == 1
-    assert book(model).late == (order.task,)
+    assert entry(model).plan.revision == 1
+    assert entry(model).late == (order.task,)
     model.finish()
-    assert book(model).state is PlanState.SUCCEEDED
+    assert entry(model).state is PlanState.SUCCEEDED
 
 
 def test_a_plan_wakes_up_for_lateness_where_the_fleets_clock_is_unix_time() -> None:
     model = running(robots=2, cups=2)
     model.start(order_of(model, "r1"))
-    record = next(r for r in book(model).current() if r.state is TaskState.RUNNING)
+    record = next(r for r in entry(model).current() if r.state is TaskState.RUNNING)
     assert record.started_s is not None
     due_s = record.started_s + FACTOR * record.duration_s + MARGIN_S
     assert next_timer(model.state) == next_lateness(model.state) == due_s
@@ -155,10 +156,10 @@ def test_a_task_added_to_a_running_plan_leaves_orders_with_the_robots_that_have_
         )  # fmt: skip
         model.tell(events.ControlRequested, request=request)
         assert model.state.answers[name].accepted
-        for record in book(model).current():
-            assert record.robot == book(model).allocation[record.actor]
+        for record in entry(model).current():
+            assert record.robot == entry(model).allocation[record.actor]
     model.finish()
-    assert book(model).state is PlanState.SUCCEEDED
+    assert entry(model).state is PlanState.SUCCEEDED
 
 
 def test_a_robot_that_is_busy_with_another_plan_counts_as_busy() -> None:
@@ -185,14 +186,14 @@ def test_a_late_report_of_the_lost_robot_changes_nothing() -> None:
 def test_the_only_robot_is_planned_with_again_while_its_hand_is_full(strategy: str) -> None:
     model = FleetModel((manipulator("r1"),), cups=3)
     model.plan(*(bring(n, "hallway") for n in (1, 2, 3)), strategy=strategy)
-    while model.state.facts["r1/holding"].value == "nothing":
+    while model.state.facts[FactKey(HOLDING, "r1")].value == "nothing":
         model.succeed(order_of(model, "r1"))
     undisturbed = model.orders()
     model.tell(
         events.ReplanRequested, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
     )
     assert model.orders() == undisturbed
-    assert book(model).plan.revision == 2
+    assert entry(model).plan.revision == 2
     model.finish()
     assert all(status.state is GoalState.REACHED for status in model.state.goal_states.values())
 
@@ -200,7 +201,7 @@ def test_the_only_robot_is_planned_with_again_while_its_hand_is_full(strategy: s
 def test_a_lost_robot_that_had_nothing_else_to_do_takes_its_goal_with_it() -> None:
     model = running(robots=2, cups=2)
     holder, other = (order.robot for order in model.orders())
-    while model.state.facts[f"{holder}/holding"].value == "nothing":
+    while model.state.facts[FactKey(HOLDING, holder)].value == "nothing":
         model.succeed(order_of(model, holder))
     undisturbed = order_of(model, other)
     model.lose(holder)
@@ -208,26 +209,26 @@ def test_a_lost_robot_that_had_nothing_else_to_do_takes_its_goal_with_it() -> No
     states = sorted(status.state.value for status in model.state.goal_states.values())
     assert states == ["failed", "running"]
     model.finish()
-    assert book(model).state is PlanState.SUCCEEDED
-    assert all(record.robot == other for record in book(model).current())
+    assert entry(model).state is PlanState.SUCCEEDED
+    assert all(record.robot == other for record in entry(model).current())
 
 
 def orders_but(model: FleetModel, goal: str) -> list[Order]:
-    records = book(model).records
+    records = entry(model).records
     return [order for order in model.orders() if records[order.task].goal != goal]
 
 
 def test_a_task_that_fails_changes_nothing_about_other_goals() -> None:
     model = running(robots=3, cups=6)
     (order, *_) = model.orders()
-    goal = book(model).records[order.task].goal
+    goal = entry(model).records[order.task].goal
     assert goal is not None
-    others = {r.task for r in book(model).current() if r.goal != goal}
+    others = {r.task for r in entry(model).current() if r.goal != goal}
     undisturbed = orders_but(model, goal)
     model.fail(order)
-    assert book(model).plan.revision == 2
+    assert entry(model).plan.revision == 2
     assert all(order in model.orders() for order in undisturbed)
-    kept = others & {task.task for task in book(model).plan.tasks}
+    kept = others & {task.task for task in entry(model).plan.tasks}
     assert len(kept) >= len(others) - 4, "more than one other actor changed hands"
     model.finish()
     assert all(status.state is GoalState.REACHED for status in model.state.goal_states.values())
@@ -236,35 +237,35 @@ def test_a_task_that_fails_changes_nothing_about_other_goals() -> None:
 def test_a_new_goal_is_planned_alone_and_put_beside_the_rest() -> None:
     model = running(robots=2, cups=4)
     model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(auto_plan=True))
-    before = {task.task for task in book(model).plan.tasks}
+    before = {task.task for task in entry(model).plan.tasks}
     undisturbed = [(o.robot, o.task) for o in model.orders()]
     model.tell(events.ObjectPut, object=cup(5))
     model.learn("cup_5", "at", "living_room")
     model.tell(events.GoalPut, goal=bring(5, "hallway"))
     assert [(o.robot, o.task) for o in model.orders()] == undisturbed
-    change = book(model).change
+    change = entry(model).change
     assert change is not None
     assert change.dropped <= 4
-    assert len(before & {task.task for task in book(model).plan.tasks}) >= len(before) - 4
+    assert len(before & {task.task for task in entry(model).plan.tasks}) >= len(before) - 4
     model.finish()
     assert model.state.goal_states["g5"].state is GoalState.REACHED
 
 
 def test_a_deleted_goal_takes_only_its_own_tasks_with_it() -> None:
     model = running(robots=2, cups=4)
-    gone = {r.task for r in book(model).current() if r.goal == "g4"}
-    rest = {r.task for r in book(model).current()} - gone
+    gone = {r.task for r in entry(model).current() if r.goal == "g4"}
+    rest = {r.task for r in entry(model).current()} - gone
     begun = [order.task for order in orders_but(model, "g4")]
     model.tell(events.GoalDeleted, goal="g4")
     for order in [o for o in model.orders() if o.cancelled]:
         assert order.task in gone
         model.report(order, ReportState.CANCELLED)
-    now = book(model).plan.tasks
+    now = entry(model).plan.tasks
     assert {*begun} <= rest & {task.task for task in now}
     assert "cup_4" not in {task.args.get("object") for task in now}
     model.finish()
-    assert book(model).state is PlanState.SUCCEEDED
-    assert book(model).plan.goals == ("g1", "g2", "g3")
+    assert entry(model).state is PlanState.SUCCEEDED
+    assert entry(model).plan.goals == ("g1", "g2", "g3")
 
 
 def test_one_goal_that_never_works_does_not_use_up_the_patience_for_all() -> None:
@@ -317,7 +318,7 @@ def test_plans_that_keep_robots_from_each_other_do_not_wait_for_ever() -> None:
 def test_work_that_is_being_cancelled_is_not_gone_on_with() -> None:
     model = running(robots=1, cups=2)
     (order,) = model.orders()
-    goal = book(model).records[order.task].goal
+    goal = entry(model).records[order.task].goal
     assert goal is not None
     model.start(order)
     other = {"g1": "g2", "g2": "g1"}[goal]

@@ -23,6 +23,6 @@ def test_a_waiting_task_that_is_so_already_counts_once() -> None:
     model.interrupt(order(0), done=True)
     model.interrupt(order(0), done=False)
     model.fail(order(7))
-    (book,) = model.state.plans.values()
-    assert book.plan.revision == 3
+    (entry,) = model.state.plans.values()
+    assert entry.plan.revision == 3
     model.finish()

@@ -6,8 +6,8 @@ import pytest
 from msgspec.structs import replace
 
 from fleet.core.checker.plan_checker import check_plan
+from fleet.core.model.skill_phrases import phrases_of
 from fleet.core.model.skills import skills_from_data
-from fleet.core.model.spoken_skills import deeds_of
 from fleet.core.model.world import WorldModel
 from fleet.errors import NotUnderstood
 from fleet.language import Vocabulary, read_goal
@@ -39,12 +39,12 @@ OWN = {
     "unload": UNLOAD,
 }
 ALL = {**SKILLS, **skills_from_data({"skills": OWN}, "mine.yaml")}
-DEEDS = deeds_of(ALL)
+PHRASES = phrases_of(ALL)
 STRATEGIES = ("big-dag", "per-goal", "monolithic")
 
 
 def words() -> Vocabulary:
-    return Vocabulary(WORDS.places, WORDS.objects, WORDS.robots, deeds=DEEDS)
+    return Vocabulary(WORDS.places, WORDS.objects, WORDS.robots, skill_phrases=PHRASES)
 
 
 def world(*facts: Fact) -> WorldModel:
@@ -91,8 +91,8 @@ def test_what_it_cannot_be_done_to_is_refused() -> None:
 
 
 def test_what_moves_things_has_sentences_of_its_own() -> None:
-    assert [deed.verb for deed in deeds_of(SKILLS)] == ["search"]
-    assert [deed.verb for deed in DEEDS] == ["search", "tidy floor", "vacuum", "water"]
+    assert [phrase.verb for phrase in phrases_of(SKILLS)] == ["search"]
+    assert [phrase.verb for phrase in PHRASES] == ["search", "tidy floor", "vacuum", "water"]
 
 
 @pytest.mark.parametrize("strategy", STRATEGIES)

@@ -10,12 +10,19 @@ from keyexpr_schema.payloads.world import Object, ObjectAddress, Place, PlaceAdd
 from keyexpr_schema.transport.session import Change
 from workers.context import SkillContext
 from workers.errors import BadArguments, BadSkill, UnknownSkill
-from workers.skill import Kind, Skill, SkillRegistry, skill
+from workers.skill import ParameterKind, Skill, SkillRegistry, skill
 from workers.skills.household import HOUSEHOLD
-from workers.world_cache import WorldView
+from workers.world_cache import WorldCache
 
 
-@skill("pour", parameters={"object": Kind.OBJECT, "place": Kind.PLACE, "litres": Kind.NUMBER})
+@skill(
+    "pour",
+    parameters={
+        "object": ParameterKind.OBJECT,
+        "place": ParameterKind.PLACE,
+        "litres": ParameterKind.NUMBER,
+    },
+)
 async def pour(ctx: SkillContext, object: str, place: str, litres: float) -> None:
     """Pour something out.
 
@@ -24,8 +31,8 @@ async def pour(ctx: SkillContext, object: str, place: str, litres: float) -> Non
 
 
 @pytest.fixture
-def world() -> WorldView:
-    view = WorldView()
+def world() -> WorldCache:
+    view = WorldCache()
     cup = Object(object="cup_1", kind="cup", label="cup")
     spec = RobotSpec(robot="locobot", model="locobot", skills=(), capabilities={})
     view.apply(Change(PLACE, PlaceAddress("kitchen"), Place(place="kitchen", label="K"), "1/1"))
@@ -37,7 +44,7 @@ def world() -> WorldView:
 GOOD = {"robot": "hsr", "object": "cup_1", "place": "kitchen", "litres": "0.2"}
 
 
-def test_arguments_are_bound_by_name_and_type(world: WorldView) -> None:
+def test_arguments_are_bound_by_name_and_type(world: WorldCache) -> None:
     assert pour.bind(GOOD, "hsr", world) == {"object": "cup_1", "place": "kitchen", "litres": 0.2}
     assert pour.about == "Pour something out."
 
@@ -55,7 +62,7 @@ def test_arguments_are_bound_by_name_and_type(world: WorldView) -> None:
     ],
 )
 def test_wrong_arguments_are_told_apart(
-    world: WorldView, change: dict[str, str | None], sentence: str
+    world: WorldCache, change: dict[str, str | None], sentence: str
 ) -> None:
     args = {k: v for k, v in {**GOOD, **change}.items() if v is not None}
     with pytest.raises(BadArguments) as caught:
@@ -95,7 +102,7 @@ def test_what_is_no_skill_is_refused_where_it_is_written() -> None:
 
     with pytest.raises(BadSkill, match=r"takes \(ctx, thing\).*want \(ctx, place\)"):
 
-        @skill("b", parameters={"place": Kind.PLACE})
+        @skill("b", parameters={"place": ParameterKind.PLACE})
         async def other_names(ctx: SkillContext, thing: str) -> None: ...
 
     with pytest.raises(BadSkill, match="not valid"):

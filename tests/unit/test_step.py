@@ -7,6 +7,7 @@ from fleet.core.effects import Interpret, MakePlan, Publish
 from fleet.core.handlers.plan_results import MAX_REPLANS
 from fleet.core.state import Policy, State
 from fleet.core.step import step
+from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.keyspace import PLACE, PLAN_STATUS
 from keyexpr_schema.payloads.goals import Goal, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanChange, PlanState, Task
@@ -50,11 +51,11 @@ def test_a_failed_task_leads_to_a_new_revision_with_finished_work_kept() -> None
     model.succeed(model.orders()[0])
     (pick,) = model.orders()
     model.fail(pick)
-    book = model.state.plans["plan-1"]
-    assert book.plan.revision == 2
-    assert book.records["t1"].state is TaskState.SUCCEEDED
-    assert book.records["t2"].state is TaskState.FAILED
-    assert "it slipped" in (book.records["t2"].reason or "")
+    entry = model.state.plans["plan-1"]
+    assert entry.plan.revision == 2
+    assert entry.records["t1"].state is TaskState.SUCCEEDED
+    assert entry.records["t2"].state is TaskState.FAILED
+    assert "it slipped" in (entry.records["t2"].reason or "")
     model.finish()
     assert goal_state(model, "g1") is GoalState.REACHED
 
@@ -137,8 +138,8 @@ def test_a_fact_that_contradicts_the_plan_leads_to_a_new_one() -> None:
     model.plan(bring(1, "hallway"))
     model.learn("cup_1", "at", "living_room")
     model.succeed(model.orders()[0])
-    book = model.state.plans["plan-1"]
-    assert book.plan.revision == 2
+    entry = model.state.plans["plan-1"]
+    assert entry.plan.revision == 2
     model.finish()
     assert goal_state(model, "g1") is GoalState.REACHED
 
@@ -166,9 +167,9 @@ def test_a_discovery_ends_the_search_and_leads_to_the_goal() -> None:
     while not any(o.robot == "locobot" and o.skill == "search" for o in model.orders()):
         model.succeed(next(o for o in model.orders() if o.robot == "locobot"))
     model.learn("cup_1", "at", "living_room")
-    book = model.state.plans["plan-1"]
-    assert book.plan.revision == 2
-    assert "pick" in {task.skill for task in book.plan.tasks}
+    entry = model.state.plans["plan-1"]
+    assert entry.plan.revision == 2
+    assert "pick" in {task.skill for task in entry.plan.tasks}
     for order in model.orders():
         if order.cancelled:
             model.report(order, ReportState.CANCELLED)
@@ -247,10 +248,10 @@ def test_a_task_can_be_added_to_a_running_plan() -> None:
     )  # fmt: skip
     model.tell(events.ControlRequested, request=request)
     model.finish()
-    book = model.state.plans["plan-1"]
-    assert book.state is PlanState.SUCCEEDED
-    assert book.records["t5"].robot == "locobot"
-    assert book.records["t5"].state is TaskState.SUCCEEDED
+    entry = model.state.plans["plan-1"]
+    assert entry.state is PlanState.SUCCEEDED
+    assert entry.records["t5"].robot == "locobot"
+    assert entry.records["t5"].state is TaskState.SUCCEEDED
 
 
 def test_a_task_that_cannot_be_added_leaves_the_plan_as_it_was() -> None:
@@ -261,8 +262,8 @@ def test_a_task_that_cannot_be_added_leaves_the_plan_as_it_was() -> None:
     )
     model.tell(events.ControlRequested, request=request)
     model.finish()
-    book = model.state.plans["plan-1"]
-    assert book.state is PlanState.SUCCEEDED
+    entry = model.state.plans["plan-1"]
+    assert entry.state is PlanState.SUCCEEDED
     assert "there is no skill fly" in model.state.answers["c"].sentence
     assert not model.state.answers["c"].accepted
 
@@ -307,9 +308,9 @@ def test_a_replan_that_changes_nothing_disturbs_nobody() -> None:
     model.tell(
         events.ReplanRequested, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
     )
-    book = model.state.plans["plan-1"]
-    assert book.plan.revision == 2
-    assert book.change == PlanChange(kept=9, dropped=0, added=0)
+    entry = model.state.plans["plan-1"]
+    assert entry.plan.revision == 2
+    assert entry.change == PlanChange(kept=9, dropped=0, added=0)
     assert model.orders() == before
     model.finish()
     assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
@@ -377,11 +378,11 @@ def test_a_new_robot_is_given_a_share() -> None:
     model.tell(events.RobotRegistered, spec=manipulator("r2"))
     model.tell(events.WorkerConnected, robot="r2", incarnation="i1")
     model.learn("r2", "holding", "nothing")
-    book = model.state.plans["plan-1"]
-    assert book.plan.revision == 2
-    assert {record.robot for record in book.current()} == {"r1", "r2"}
+    entry = model.state.plans["plan-1"]
+    assert entry.plan.revision == 2
+    assert {record.robot for record in entry.current()} == {"r1", "r2"}
     model.finish()
-    assert book.plan.goals == ("g1", "g2")
+    assert entry.plan.goals == ("g1", "g2")
     assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
 
 
@@ -423,7 +424,7 @@ def test_a_goal_in_steps_takes_one_after_the_other() -> None:
     model.plan()
     model.finish()
     assert goal_state(model, "g") is GoalState.REACHED
-    assert model.state.facts["cup_1/at"].value == "living_room"
+    assert model.state.facts[FactKey(AT, "cup_1")].value == "living_room"
     places = [
         record.args["place"]
         for record in model.state.plans["plan-1"].records.values()
@@ -459,9 +460,9 @@ def test_a_deleted_goal_leaves_the_plan() -> None:
     model.plan(*BOTH)
     model.tell(events.GoalDeleted, goal="g2")
     model.finish()
-    book = model.state.plans["plan-1"]
-    assert book.state is PlanState.SUCCEEDED
-    assert book.plan.goals == ("g1",)
+    entry = model.state.plans["plan-1"]
+    assert entry.state is PlanState.SUCCEEDED
+    assert entry.plan.goals == ("g1",)
     assert "goals/g2/status" not in model.documents
 
 

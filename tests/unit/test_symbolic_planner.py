@@ -8,12 +8,13 @@ import msgspec
 import pytest
 
 from fleet.allocators.base import Allocated, NotAllocated
-from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import MinMaxLoadAllocator
 from fleet.core.checker.plan_checker import check_plan
-from fleet.core.model.skills import Variable, skills_from_data
+from fleet.core.model.skills import skills_from_data
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
+from keyexpr_schema.facts import FactKey
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.payloads.world import Surface
@@ -27,7 +28,7 @@ def solve(world: WorldModel, *goals: Goal, **more: object) -> Plan:
 
 
 def allocate(plan: Plan, world: WorldModel) -> Allocated:
-    made = MilpAllocator().allocate(plan, world)
+    made = MinMaxLoadAllocator().allocate(plan, world)
     assert isinstance(made, Allocated), made
     return made
 
@@ -124,7 +125,7 @@ def test_why_there_is_no_plan_is_said() -> None:
 
 def test_the_allocator_refuses_what_no_robot_can_do() -> None:
     plan = solve(home(), bring(1, "hallway"))
-    refused = MilpAllocator().allocate(plan, home((carrier(),)))
+    refused = MinMaxLoadAllocator().allocate(plan, home((carrier(),)))
     assert isinstance(refused, NotAllocated)
     assert "does not have the skill" in refused.violations[0].sentence
 
@@ -256,7 +257,7 @@ def test_goals_that_want_the_same_helper_are_still_planned_one_by_one() -> None:
 def test_the_order_of_work_that_reaches_every_goal_is_taken_even_if_it_is_longer() -> None:
     world = home((manipulator(),), facts=(fact("hsr", "at", "kitchen"),))
     stay = Goal(goal="s", text="", conditions=(at("hsr", "kitchen"),), ordinal=2)
-    world = world.with_facts({Variable("at", "hsr"): "hallway"})
+    world = world.with_facts({FactKey("at", "hsr"): "hallway"})
     plan = solve(world, bring(1, "living_room"), stay)
     made = allocate(plan, world)
     assert check_plan(plan, world, made.allocation, made.schedule.extra_after).valid

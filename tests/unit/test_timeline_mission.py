@@ -9,10 +9,10 @@ import msgspec
 import pytest
 from timeline_mission import END_S, STEPS, WALL_S, Put, mission, plan, put, record, script
 
+from fleet.timeline.drawing.sink import open_stream
 from fleet.timeline.errors import UnreadableRecording, UnwritableRecording
 from fleet.timeline.read import rows, summary
 from fleet.timeline.recorder import Recorder
-from fleet.timeline.sink import open_stream
 from keyexpr_schema import keyspace as keys
 from keyexpr_schema.payloads.plans import PlanAddress
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 from timeline_mission import STEPS, record
 
 from fleet.timeline.clock import Clock, wall_of
-from fleet.timeline.graph import Node, layout
-from fleet.timeline.lanes import Bar, Lane, call_text
-from fleet.timeline.palette import Palette
+from fleet.timeline.drawing.graph import Node, layout
+from fleet.timeline.drawing.lanes import Bar, Lane, call_text
+from fleet.timeline.drawing.palette import Palette
+from fleet.timeline.drawing.sink import Sink, open_stream
+from fleet.timeline.drawing.text import DRAWN, drawable
+from fleet.timeline.drawing.trails import CORNERS, Trail
+from fleet.timeline.drawing.utilisation import Utilisation
 from fleet.timeline.read import rows
-from fleet.timeline.sink import Sink, open_stream
-from fleet.timeline.text import DRAWN, drawable
-from fleet.timeline.trails import CORNERS, Trail
-from fleet.timeline.utilisation import Utilisation
 from keyexpr_schema.payloads.tasks import TaskState
 
 
@@ -120,7 +120,7 @@ def test_busy_time_is_never_counted_twice(
 
 def test_a_task_that_starts_as_another_ends_is_not_hidden(tmp_path: Path) -> None:
     """The planner's word on the next task can come before its word on the last one."""
-    from fleet.timeline.lanes import Lanes
+    from fleet.timeline.drawing.lanes import Lanes
 
     path = tmp_path / "lanes.rrd"
     stream = open_stream(path, "test")

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from timeline_mission import mission, put
 
+from fleet.timeline.drawing.sink import open_stream
+from fleet.timeline.drawing.text import DRAWN
 from fleet.timeline.recorder import Recorder
 from fleet.timeline.screenshot import DRIVER, main
-from fleet.timeline.sink import open_stream
-from fleet.timeline.text import DRAWN
 from keyexpr_schema.keyspace import GOAL_SPEC
 from keyexpr_schema.payloads.goals import Goal, GoalAddress
 

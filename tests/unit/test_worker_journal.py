@@ -12,9 +12,9 @@ import pytest
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState
 from keyexpr_schema.payloads.world import Fact
 from workers.errors import JournalBusy, JournalUnreadable
-from workers.fencing import Phase, attempt_name
-from workers.journal import Journal
-from workers.reports import report_on
+from workers.orders.fencing import Phase, attempt_name
+from workers.orders.journal import Journal
+from workers.orders.reports import make_report
 
 
 def order(task: str = "t1", attempt: int = 1) -> Order:
@@ -46,8 +46,8 @@ def words(journal: Journal) -> list[Fact | Report]:
 def test_facts_go_out_before_the_report_and_a_start_is_overtaken_by_its_end(tmp_path: Path) -> None:
     with Journal(tmp_path / "hsr.journal") as journal:
         journal.queued(order())
-        journal.started(order(), report_on(order(), "r1", ReportState.STARTED))
-        end = report_on(order(), "r1", ReportState.SUCCEEDED)
+        journal.started(order(), make_report(order(), "r1", ReportState.STARTED))
+        end = make_report(order(), "r1", ReportState.SUCCEEDED)
         journal.ended(order(), end, (fact("kitchen"),))
         assert words(journal) == [fact("kitchen"), end]
 
@@ -60,18 +60,19 @@ sys.path.insert(0, {str(Path(__file__).parent)!r})
 from pathlib import Path
 from test_worker_journal import fact, order
 from keyexpr_schema.payloads.tasks import ReportState
-from workers.journal import Journal
-from workers.reports import report_on
+from workers.orders.journal import Journal
+from workers.orders.reports import make_report
 journal = Journal(Path({str(path)!r})).__enter__()
 journal.queued(order("t1")); journal.queued(order("t2")); journal.queued(order("t3"))
-journal.ended(order("t1"), report_on(order("t1"), "r1", ReportState.SUCCEEDED), (fact("hallway"),))
-journal.started(order("t2"), report_on(order("t2"), "r1", ReportState.STARTED))
+end = make_report(order("t1"), "r1", ReportState.SUCCEEDED)
+journal.ended(order("t1"), end, (fact("hallway"),))
+journal.started(order("t2"), make_report(order("t2"), "r1", ReportState.STARTED))
 os.kill(os.getpid(), signal.SIGKILL)
 """
     killed = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True)
     assert killed.returncode == -9, killed.stderr
     with Journal(path) as journal:
-        phases = {name[1]: e.phase for name, e in journal.ledger.entries.items()}
+        phases = {name[1]: e.phase for name, e in journal.ledger.attempts.items()}
         assert phases == {"t1": Phase.ENDED, "t2": Phase.STARTED}
         first = journal.unsent()
         assert first is not None and first.payload == fact("hallway") and first.earlier_run
@@ -126,8 +127,8 @@ def test_a_renewed_order_moves_the_fence_but_not_what_runs(tmp_path: Path) -> No
     )
     with Journal(path) as journal:
         journal.queued(order())
-        journal.started(order(), report_on(order(), "r1", ReportState.STARTED))
+        journal.started(order(), make_report(order(), "r1", ReportState.STARTED))
         journal.renewed(newer)
-        assert journal.ledger.entries[attempt_name(order())].order.skill == "navigate"
+        assert journal.ledger.attempts[attempt_name(order())].order.skill == "navigate"
     with Journal(path) as journal:
         assert (journal.ledger.epoch, journal.ledger.revisions) == (7, {"p": 3})

@@ -11,7 +11,7 @@ import pytest
 from keyexpr_schema.errors import NoAnswer
 from keyexpr_schema.payloads.tasks import ReportState
 from workers.errors import SkillFailed
-from workers.retry import Ended, run_attempt
+from workers.retry import AttemptResult, run_attempt
 
 
 class Bench:
@@ -25,7 +25,9 @@ class Bench:
     async def make_safe(self) -> None:
         self.done.append("safe")
 
-    async def run(self, once: Callable[[], Awaitable[None]], deadline_s: float = 60.0) -> Ended:
+    async def run(
+        self, once: Callable[[], Awaitable[None]], deadline_s: float = 60.0
+    ) -> AttemptResult:
         return await run_attempt(
             "pick",
             once,

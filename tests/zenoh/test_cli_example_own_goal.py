@@ -10,7 +10,8 @@ from cli.demo.bring_up import router_up
 from cli.demo.fleet import Fleet, free_endpoint
 from cli.telling import put_world
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from sim.world_file import load_world
+from sim.files.world_file import load_world
+from sim.files.world_payloads import object_payloads, place_payloads
 
 ROOT = Path(__file__).parents[2]
 
@@ -36,7 +37,7 @@ async def test_a_goal_is_understood_or_refused_with_a_reason(tmp_path: Path) -> 
         await fleet.start("planner")
         world = load_world(ROOT / "configs" / "worlds" / "home.yaml")
         async with open_session(SessionConfig(endpoints=(fleet.endpoint,))) as session:
-            await put_world(session, world.places(), world.objects())
+            await put_world(session, place_payloads(world), object_payloads(world))
         code, out, _ = await fleet.guard(
             example("Bring the first cup to the hallway.", fleet.endpoint)
         )

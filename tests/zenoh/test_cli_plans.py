@@ -18,6 +18,7 @@ from keyexpr_schema.keyspace import (
     ANSWER,
     FACT,
     GOAL_STATUS,
+    PLAN_PROPOSAL,
     PLAN_SPEC,
     PLAN_STATUS,
     SIM_CLOCK,
@@ -121,7 +122,10 @@ async def test_a_plan_is_edited_checked_and_proposed(
             "plan", "propose", str(out), "--id", "yours", "--no-start", "--json"
         )
         again = await robotctl.soon("plan", "propose", str(out), "--id", "yours")
+        yours = PlanAddress("yours")
+        proposal = await session.get(PLAN_PROPOSAL, yours)
         await robotctl.soon("plan", "delete", "yours")
+        assert await session.get(PLAN_PROPOSAL, yours) is None
         runs = await robotctl.soon("plan", "propose", str(out), "--id", "ours")
         order = await next_order(session, set())
     assert good.code == 0, good.err
@@ -142,6 +146,8 @@ async def test_a_plan_is_edited_checked_and_proposed(
     assert ready.code == 0, ready.err
     assert ready.data["status"]["state"] == "ready"
     assert ready.data["plan"]["autostart"] is False
+    assert proposal is not None
+    assert proposal.tasks == plan.tasks
     assert "there is a plan yours already" in again.err
     assert "plan ours is running" in runs.out
     assert (order.plan, order.skill) == ("ours", "navigate")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from keyexpr_schema.keyspace import (
     ANSWER,
@@ -15,7 +16,9 @@ from keyexpr_schema.keyspace import (
     GOAL_SPEC,
     GOAL_STATUS,
     ORDER,
+    PLAN_PROPOSAL,
     PLAN_REQUEST,
+    PLAN_SPEC,
     PLAN_STATUS,
     PLANNER_STATUS,
     REJECT,
@@ -24,7 +27,7 @@ from keyexpr_schema.keyspace import (
     TASK_RECORD,
 )
 from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState
-from keyexpr_schema.payloads.plans import PlanAddress
+from keyexpr_schema.payloads.plans import Plan, PlanAddress, PlanState, Task
 from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
 from keyexpr_schema.payloads.robots import AliveAddress, RobotAddress
 from keyexpr_schema.payloads.service import PlannerAddress
@@ -128,7 +131,7 @@ async def test_what_a_lost_robot_was_to_do_goes_to_another(router: Any, tmp_path
         ):
             await robot.confirm(ROBOT_SPEC, RobotAddress("near"), manipulator("near"))
             for known in (fact("near", "at", "kitchen"), fact("near", "holding", "nothing")):
-                await robot.confirm(FACT, FactAddress(known.subject, known.relation), known)
+                await robot.confirm(FACT, FactAddress.of(known.key), known)
             await ask_for_plan(session)
             await until(lambda: session.list(ORDER, robot="near"), "an order for the nearest")
         # Its worker is gone now, and does not come back.
@@ -194,6 +197,25 @@ async def test_a_goal_deleted_while_no_planner_is_there_is_forgotten(
                 return await session.get(GOAL_STATUS, GoalAddress("g")) is None
 
             await until(gone, "the status of the deleted goal to go")
+
+
+async def test_a_proposal_is_taken_when_a_planner_starts_and_a_spec_of_nobody_goes(
+    router: Any, tmp_path: Path
+) -> None:
+    task = Task(task="t1", skill="navigate", args={"robot": "?a1", "to": "hallway"}, actor="a1")
+    plan = Plan(plan="mine", goals=(), conditions=(), tasks=(task,), autostart=False)
+    async with person(router.endpoint) as session:
+        await session.confirm(PLAN_PROPOSAL, PlanAddress("mine"), plan)
+        await session.confirm(PLAN_SPEC, PlanAddress("old"), replace(plan, plan="old"))
+        async with planner(router.endpoint, tmp_path):
+            status = await value(session, PLAN_STATUS, PlanAddress("mine"), state=PlanState.READY)
+            assert status.allocation == {"a1": "hsr"}
+
+            async def gone() -> bool:
+                return await session.get(PLAN_SPEC, PlanAddress("old")) is None
+
+            await until(gone, "the deletion of a plan that no planner made")
+            assert await session.get(PLAN_STATUS, PlanAddress("old")) is None
 
 
 async def test_a_planner_may_start_before_its_router(tmp_path: Path) -> None:

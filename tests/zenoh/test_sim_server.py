@@ -19,11 +19,11 @@ from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, M
 from keyexpr_schema.payloads.simulation import MotionCall, SimAddress, SimRobotAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.embodiment import SimEmbodiment
-from sim.kinematic import Durations, KinematicBackend
-from sim.server import SimServer
-from sim.world_file import load_mission
+from sim.files.mission_file import load_mission
+from sim.kinematic.backend import KinematicBackend, MotionModel
+from sim.server.sim_server import SimServer
 from workers.embodiment import Embodiment
-from workers.errors import BodyUnreachable
+from workers.errors import RobotUnreachable
 
 Make = Callable[..., SessionConfig]
 HSR = SimRobotAddress("hsr")
@@ -38,7 +38,7 @@ async def served(
     """The two-cups world without physics on a session of its own, and another session to ask."""
     mission = load_mission("two-cups")
     robots = [(robot.spec, robot.start_m_rad) for robot in mission.robots]
-    backend = KinematicBackend(mission.world, robots, Durations(), step_s=step_s)
+    backend = KinematicBackend(mission.world, robots, MotionModel(), step_s=step_s)
     async with open_session(make(component="sim")) as session, open_session(make()) as asker:
         server = SimServer(session, backend, speed, **options)
         running = asyncio.create_task(server.run())
@@ -228,13 +228,13 @@ async def test_a_router_that_goes_away_ends_neither_world_nor_motion(
 async def test_without_a_simulation_the_body_is_unreachable(session_config: Make) -> None:
     async with open_session(session_config()) as session:
         body = SimEmbodiment(session, "hsr", "i1", patience_s=0.3)
-        with pytest.raises(BodyUnreachable, match="the simulation does not answer: nobody serves"):
+        with pytest.raises(RobotUnreachable, match="the simulation does not answer: nobody serves"):
             await body.perform(LOOK)
 
 
 async def test_the_process_says_when_it_is_ready_and_ends_on_sigterm(router: Any) -> None:
     code = (
-        "from sim.process import run; "
+        "from sim.server.process import run; "
         f"run('two-cups', ({router.endpoint!r},), backend='kinematic', speed=None)"
     )
     process = await asyncio.create_subprocess_exec(

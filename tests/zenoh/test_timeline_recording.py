@@ -171,8 +171,8 @@ async def test_a_viewer_can_look_on_while_it_records(router, session_config, tmp
 
 
 def test_without_a_router_the_recorder_says_so(tmp_path):
+    from fleet.timeline.drawing.sink import free_port
     from fleet.timeline.process import run
-    from fleet.timeline.sink import free_port
     from keyexpr_schema.errors import Unreachable
 
     endpoint = f"tcp/127.0.0.1:{free_port()}"

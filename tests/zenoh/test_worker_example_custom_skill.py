@@ -15,9 +15,9 @@ from keyexpr_schema.keyspace import ROBOT_SPEC
 from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.tasks import ReportState
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from sim.kinematic import KinematicBackend
-from sim.server import SimServer
-from sim.world_file import load_mission
+from sim.files.mission_file import load_mission
+from sim.kinematic.backend import KinematicBackend
+from sim.server.sim_server import SimServer
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "custom_skill.py"
 

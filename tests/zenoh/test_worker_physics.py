@@ -11,8 +11,8 @@ from worker_world import Fleet, running_fleet
 from keyexpr_schema.payloads.tasks import Report, ReportState
 from keyexpr_schema.transport.session import SessionConfig
 from sim.backend import Backend
+from sim.files.mission_file import Mission
 from sim.mujoco_world import MujocoBackend
-from sim.world_file import Mission
 
 
 def physics(mission: Mission) -> Backend:

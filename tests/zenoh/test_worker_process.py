@@ -14,16 +14,16 @@ import pytest
 from conftest import RouterProcess
 from worker_world import DEADLINE_S, Planner
 
+from keyexpr_schema.facts import NOTHING
 from keyexpr_schema.keyspace import ROBOT_STATE
 from keyexpr_schema.payloads.robots import RobotActivity
 from keyexpr_schema.payloads.tasks import ReportState
-from keyexpr_schema.payloads.world import NOTHING
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from sim.world_file import load_mission
+from sim.files.mission_file import load_mission
 
 SIM = """
 import sys
-from sim.process import run
+from sim.server.process import run
 endpoint, speed = sys.argv[1], float(sys.argv[2])
 run("two-cups", (endpoint,), backend="kinematic", speed=speed)
 """

@@ -13,15 +13,16 @@ from conftest import RouterProcess
 from msgspec.structs import replace
 from worker_world import DEADLINE_S, Fleet, running_fleet
 
+from keyexpr_schema.facts import NOTHING
 from keyexpr_schema.keyspace import FACT, ORDER, REJECT, REPORT, ROBOT_ALIVE, ROBOT_STATE
 from keyexpr_schema.payloads.motions import MotionKind
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.payloads.tasks import OrderAddress, Report, ReportAddress, ReportState
-from keyexpr_schema.payloads.world import NOTHING, Fact, FactAddress
+from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.session import SessionConfig
 from sim.backend import Backend
-from sim.kinematic import Durations, KinematicBackend
-from sim.world_file import Mission
+from sim.files.mission_file import Mission
+from sim.kinematic.backend import KinematicBackend, MotionModel
 from workers.context import SkillContext
 from workers.skill import skill
 
@@ -37,9 +38,9 @@ def fleet_of(session_config: Callable[..., SessionConfig], tmp_path: Path) -> Ma
         failures: dict[str, dict[str, tuple[int, ...]]] | None = None,
     ) -> AsyncIterator[Fleet]:
         def backend(mission: Mission) -> Backend:
-            durations = Durations(failures=failures or {})
+            motion_model = MotionModel(failures=failures or {})
             robots = [(r.spec, r.start_m_rad) for r in mission.robots]
-            return KinematicBackend(mission.world, robots, durations, step_s=0.05)
+            return KinematicBackend(mission.world, robots, motion_model, step_s=0.05)
 
         async with running_fleet(session_config, tmp_path / "workers", backend) as fleet:
             yield fleet
@@ -303,8 +304,8 @@ async def test_rubbish_on_the_key_of_a_fact_is_written_over(fleet_of: MakeFleet)
 @skill("gossip")
 async def gossip(ctx: SkillContext) -> None:
     """Sees a cup at once, and needs the robot's while to come back and tell."""
-    ctx.learn("at", "cup_1", "kitchen")
-    ctx.learn("at", "cup_2", "kitchen")
+    ctx.observe("at", "cup_1", "kitchen")
+    ctx.observe("at", "cup_2", "kitchen")
     await ctx.do(MotionKind.GO_TO, place="kitchen")
 
 

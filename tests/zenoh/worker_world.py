@@ -20,8 +20,9 @@ from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Order, OrderAddress, Re
 from keyexpr_schema.payloads.world import Fact, FactAddress, ObjectAddress, PlaceAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.backend import Backend
-from sim.world_file import Mission, load_mission
-from workers.journal import Journal
+from sim.files.mission_file import Mission, load_mission
+from sim.files.world_payloads import object_payloads, place_payloads
+from workers.orders.journal import Journal
 from workers.runtime import Worker
 from workers.skill import Skill, SkillRegistry
 from workers.skills.household import HOUSEHOLD
@@ -105,9 +106,9 @@ class Planner:
 
     async def register(self) -> None:
         """Put places, objects and robots on their keys."""
-        for place in self.mission.world.places():
+        for place in place_payloads(self.mission.world):
             await self.session.confirm(PLACE, PlaceAddress(place.place), place)
-        for thing in self.mission.world.objects():
+        for thing in object_payloads(self.mission.world):
             await self.session.confirm(OBJECT, ObjectAddress(thing.object), thing)
         for robot in self.mission.robots:
             await self.session.confirm(ROBOT_SPEC, RobotAddress(robot.spec.robot), robot.spec)

@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.motions import MotionKind
 from workers.context import SkillContext
 from workers.errors import SkillFailed
-from workers.skill import Kind, skill
+from workers.skill import ParameterKind, skill
 
 DOORWAY_M = 0.6
 """A robot less than this far inside a place's border may stand in a doorway and block it."""
 
 
-@skill("navigate", parameters={"to": Kind.PLACE})
+@skill("navigate", parameters={"to": ParameterKind.PLACE})
 async def navigate(ctx: SkillContext, to: str) -> None:
     """Drive to a free spot in a place."""
     senses = await ctx.body.senses()
     x_m, y_m, _ = senses.pose_m_rad
     place = ctx.world.places[to]
     if senses.place == to and inner_distance_m(place.region_m, x_m, y_m) >= DOORWAY_M:
-        ctx.learn("at", ctx.robot, to)
+        ctx.observe(AT, ctx.robot, to)
         return
     senses = (await ctx.do(MotionKind.GO_TO, place=to)).senses
     if senses.place is not None:
-        ctx.learn("at", ctx.robot, senses.place)
+        ctx.observe(AT, ctx.robot, senses.place)
     if senses.place != to:
         raise SkillFailed(
             f"{ctx.robot} drove off to {to} but stands in {senses.place or 'no place'}"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from contextlib import aclosing
 
+from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.payloads.motions import Detection, MotionKind
-from keyexpr_schema.payloads.world import NOTHING
 from workers.context import SkillContext
 from workers.errors import SkillFailed
-from workers.skill import Kind, skill
+from workers.skill import ParameterKind, skill
 from workers.skills.finding import looks
 from workers.skills.viewing import Viewing
 
@@ -16,7 +16,7 @@ LEAST_LOOKS = 2
 """A thing is not to be seen only after looks from two spots: furniture hides things."""
 
 
-@skill("pick", parameters={"object": Kind.OBJECT, "place": Kind.PLACE})
+@skill("pick", parameters={"object": ParameterKind.OBJECT, "place": ParameterKind.PLACE})
 async def pick(ctx: SkillContext, object: str, place: str) -> None:
     """Take an object into the hand."""
     held = await ctx.holding()
@@ -34,10 +34,10 @@ async def pick(ctx: SkillContext, object: str, place: str) -> None:
     await ctx.do(MotionKind.GRASP, object=object, point_m=near.point_m)
     await ctx.do(MotionKind.STOW)
     if await ctx.holding() != object:
-        ctx.learn("at", object, None)
+        ctx.observe(AT, object, None)
         raise SkillFailed(f"{object} was grasped in {place} but slipped out of the hand")
-    ctx.learn("holding", ctx.robot, object)
-    ctx.learn("at", object, ctx.robot)
+    ctx.observe(HOLDING, ctx.robot, object)
+    ctx.observe(AT, object, ctx.robot)
 
 
 async def _find(ctx: SkillContext, object: str, place: str) -> Detection:
@@ -52,12 +52,12 @@ async def _find(ctx: SkillContext, object: str, place: str) -> Detection:
                 raise SkillFailed(
                     f"{object} is at {where}, not in {place}",
                     retryable=False,
-                    facts=(("at", object, where),),
+                    facts=((AT, object, where),),
                 )
             if viewing.complete and viewing.looks >= LEAST_LOOKS:
                 break
     raise SkillFailed(
         f"{object} is not to be seen in {place}",
         retryable=False,
-        facts=(("at", object, None), ("holding", ctx.robot, NOTHING)),
+        facts=((AT, object, None), (HOLDING, ctx.robot, NOTHING)),
     )

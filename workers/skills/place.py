@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import dist
 
+from keyexpr_schema.facts import AT, NOTHING
 from keyexpr_schema.payloads.motions import Detection, MotionKind, PointM
-from keyexpr_schema.payloads.world import NOTHING
 from workers.context import SkillContext
 from workers.errors import SkillFailed
-from workers.skill import Kind, skill
+from workers.skill import ParameterKind, skill
 from workers.skills.spots import away_from, candidates
 
 MOST_SPOTS = 4
@@ -18,7 +18,7 @@ NEAR_M = 0.25
 """A released object that lies within this of the spot is where it was put."""
 
 
-@skill("place", parameters={"object": Kind.OBJECT, "place": Kind.PLACE})
+@skill("place", parameters={"object": ParameterKind.OBJECT, "place": ParameterKind.PLACE})
 async def place(ctx: SkillContext, object: str, place: str) -> None:
     """Put the held object down in a place, on furniture if there is any."""
     held = await ctx.holding()
@@ -33,7 +33,7 @@ async def place(ctx: SkillContext, object: str, place: str) -> None:
     await ctx.do(MotionKind.STOW)
     if still == object:
         raise SkillFailed(f"the hand was opened in {place} but still holds {object}")
-    ctx.learn("at", object, None if seen is None else ctx.world.whereabouts(seen))
+    ctx.observe(AT, object, None if seen is None else ctx.world.whereabouts(seen))
     if seen is None:
         raise SkillFailed(f"{object} was put down in {place} but is not to be seen there now")
     where = ctx.world.whereabouts(seen)
@@ -44,14 +44,14 @@ async def place(ctx: SkillContext, object: str, place: str) -> None:
     off_m = dist(seen.point_m, spot)
     if off_m > NEAR_M:
         ctx.log(f"{object} lies {off_m:.2f} m from where it was put, still in {place}")
-    ctx.learn("at", object, place)
+    ctx.observe(AT, object, place)
 
 
 async def _lies_there_already(ctx: SkillContext, object: str, place: str, held: str | None) -> None:
     """Done if an earlier try put the object down; a failure for good if it is not in the hand."""
     for seen in await ctx.look():
         if seen.object == object and ctx.world.whereabouts(seen) == place:
-            ctx.learn("at", object, place)
+            ctx.observe(AT, object, place)
             return
     raise SkillFailed(
         f"{ctx.robot} holds {held or NOTHING}, not {object}, so it cannot put it down in {place}",

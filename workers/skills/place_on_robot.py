@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import dist
 
+from keyexpr_schema.facts import AT, NOTHING
 from keyexpr_schema.payloads.motions import MotionKind, PointM
-from keyexpr_schema.payloads.world import NOTHING
 from workers.context import SkillContext
 from workers.errors import SkillFailed
-from workers.skill import Kind, skill
+from workers.skill import ParameterKind, skill
 
 WORD_S = 10.0
 """Wall seconds to wait for the carrier's worker to say where it stands or what it carries."""
@@ -20,14 +20,18 @@ MOST_APPROACHES = 3
 
 @skill(
     "place_on_robot",
-    parameters={"object": Kind.OBJECT, "carrier": Kind.ROBOT, "place": Kind.PLACE},
+    parameters={
+        "object": ParameterKind.OBJECT,
+        "carrier": ParameterKind.ROBOT,
+        "place": ParameterKind.PLACE,
+    },
 )
 async def place_on_robot(ctx: SkillContext, object: str, carrier: str, place: str) -> None:
     """Put the held object into the basket of a robot that stands in the same place."""
     held = await ctx.holding()
     if held != object:
         if _in_basket(ctx, object, carrier):  # an earlier try let it down
-            ctx.learn("at", object, carrier)
+            ctx.observe(AT, object, carrier)
             return
         raise SkillFailed(
             f"{ctx.robot} holds {held or NOTHING}, not {object}, so it cannot give it to {carrier}",
@@ -42,7 +46,7 @@ async def place_on_robot(ctx: SkillContext, object: str, carrier: str, place: st
         raise SkillFailed(f"the hand was opened over {carrier} but still holds {object}")
     if not await _arrived(ctx, object, carrier):
         raise SkillFailed(f"{object} was let down over {carrier} but is not in its basket")
-    ctx.learn("at", object, carrier)
+    ctx.observe(AT, object, carrier)
 
 
 async def _stand_beside(ctx: SkillContext, carrier: str, place: str) -> None:
@@ -70,7 +74,7 @@ async def _stands_at(ctx: SkillContext, carrier: str, place: str) -> PointM:
         where = state.place
         raise SkillFailed(
             f"{carrier} is in {where or 'no place'}, not in {place}",
-            facts=() if where is None else (("at", carrier, where),),
+            facts=() if where is None else ((AT, carrier, where),),
         )
     pose = ctx.robot_pose(carrier)
     assert pose is not None  # `there` held, and nothing has run since
@@ -84,11 +88,11 @@ async def _arrived(ctx: SkillContext, object: str, carrier: str) -> bool:
     seen = {d.object: d for d in await ctx.look()}.get(object)
     if seen is not None:
         where = ctx.world.whereabouts(seen)
-        ctx.learn("at", object, where)
+        ctx.observe(AT, object, where)
         return where == carrier
     if await ctx.world.until(lambda: _in_basket(ctx, object, carrier), WORD_S):
         return True
-    ctx.learn("at", object, None)
+    ctx.observe(AT, object, None)
     return False
 
 

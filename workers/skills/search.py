@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from contextlib import aclosing
 
+from keyexpr_schema.facts import AT, SEARCHED
 from workers.context import SkillContext
-from workers.skill import Kind, skill
+from workers.skill import ParameterKind, skill
 from workers.skills.finding import looks
 from workers.skills.viewing import Viewing
 
 
-@skill("search", parameters={"place": Kind.PLACE})
+@skill("search", parameters={"place": ParameterKind.PLACE})
 async def search(ctx: SkillContext, place: str) -> None:
     """Look all over a place and learn what lies in it.
 
@@ -19,7 +20,7 @@ async def search(ctx: SkillContext, place: str) -> None:
     """
     await ctx.be_in(place)
     viewing = Viewing.of(ctx.world.places[place], ctx.spec)
-    believed = set(ctx.world.believed_at(place))
+    believed = set(ctx.world.objects_at(place))
     found: dict[str, str | None] = {}
     async with aclosing(looks(ctx, viewing)) as every:
         async for seen in every:
@@ -28,9 +29,9 @@ async def search(ctx: SkillContext, place: str) -> None:
                 break
     for thing, where in found.items():
         if where is not None:
-            ctx.learn("at", thing, where)
+            ctx.observe(AT, thing, where)
     if viewing.complete:
         for missing in sorted(believed - set(found)):
-            ctx.learn("at", missing, None)
+            ctx.observe(AT, missing, None)
     await ctx.be_in(place)
-    ctx.learn("searched", place, True)
+    ctx.observe(SEARCHED, place, True)

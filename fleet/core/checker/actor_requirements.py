@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from fleet.core.model.skills import Action, Variable
+from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, known_value, room_left
-from keyexpr_schema.payloads.world import Value
+from keyexpr_schema.facts import FactKey, Value
 
 Left = tuple[str, Value]
 """A relation and its value, as an actor leaves them of its robot."""
@@ -20,7 +20,7 @@ class Requirement:
     roles: list[tuple[Action, str]] = field(default_factory=list)
     facts: dict[str, tuple[Value, str]] = field(default_factory=dict)
     """By relation: the value needed, and the task that needs it first."""
-    valued: dict[Variable, str] = field(default_factory=dict)
+    valued: dict[FactKey, str] = field(default_factory=dict)
     """Variables whose value at the start must be this robot, and the task that needs it first."""
     space: int = 0
     """Room needed in its basket, in objects."""
@@ -88,7 +88,7 @@ class Candidates:
                 continue
             for relation in self._unmet(robot, requirement):
                 value, task = requirement.facts[relation]
-                has = known_value(Variable(relation, robot), self._world.facts, self._world)
+                has = known_value(FactKey(relation, robot), self._world.facts, self._world)
                 told = "unknown" if has is None else has
                 yield f"{task} needs {relation}({robot}) = {value}, and it is {told}"
                 break
@@ -143,5 +143,5 @@ class Candidates:
     def _unmet(self, robot: str, requirement: Requirement) -> Iterator[str]:
         """Relations that do not hold of the robot now as the actor needs them."""
         for relation, (value, _) in requirement.facts.items():
-            if known_value(Variable(relation, robot), self._world.facts, self._world) != value:
+            if known_value(FactKey(relation, robot), self._world.facts, self._world) != value:
                 yield relation

@@ -6,13 +6,13 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 
 from fleet.core.checker.actor_requirements import Requirement
-from fleet.core.model.skills import Action, Literal, Variable
+from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel, capacity, condition_holds, known_value
+from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan, Violation
-from keyexpr_schema.payloads.world import Value
 
 
 class PlanFlow:
@@ -24,14 +24,14 @@ class PlanFlow:
         self.violations: list[Violation] = []
         self.requirements: dict[str, Requirement] = defaultdict(Requirement)
         self._plan, self._world, self._graph, self._actions = plan, world, graph, actions
-        self._writers: dict[Variable, list[tuple[str, Value]]] = defaultdict(list)
+        self._writers: dict[FactKey, list[tuple[str, Value]]] = defaultdict(list)
         for task in graph.order:
             for literal in actions[task].after:
                 self._writers[literal.variable].append((task, literal.value))
         self._positions = {
             thing: rows
             for thing in world.objects
-            if (rows := self._writers.get(Variable("at", thing)))
+            if (rows := self._writers.get(FactKey(AT, thing)))
         }
 
     def check(self) -> None:
@@ -132,7 +132,7 @@ class PlanFlow:
         own = {
             literal.variable.subject
             for literal in self._actions[task].after
-            if literal.variable.relation == "at" and literal.value == carrier
+            if literal.variable.relation == AT and literal.value == carrier
         }
         for thing in self._world.objects:
             if thing in own:
@@ -150,8 +150,8 @@ class PlanFlow:
             ):
                 planned += 1
             elif (
-                self._world.value("at", thing) == carrier
-                and self._world.value("holding", carrier) != thing
+                self._world.value(AT, thing) == carrier
+                and self._world.value(HOLDING, carrier) != thing
                 and not any(graph.precedes(writer, task) for writer, _ in rows)
             ):
                 initial += 1
@@ -169,22 +169,22 @@ class PlanFlow:
                 )
             )
 
-    def _leaves(self, variable: Variable, task: str) -> bool:
+    def _leaves(self, variable: FactKey, task: str) -> bool:
         """Whether what an actor has in its basket at the start is out of it before the task."""
-        if variable.relation != "at":
+        if variable.relation != AT:
             return False
-        holder = self._world.value("at", variable.subject)
-        in_hand = self._world.value("holding", str(holder)) == variable.subject
+        holder = self._world.value(AT, variable.subject)
+        in_hand = self._world.value(HOLDING, str(holder)) == variable.subject
         rows = self._positions.get(variable.subject, ())
         return not in_hand and any(self._graph.precedes(writer, task) for writer, _ in rows)
 
-    def _final_facts(self) -> dict[Variable, Value]:
+    def _final_facts(self) -> dict[FactKey, Value]:
         """Every variable at the end; unknown where the order of its last writers is open."""
-        final: dict[Variable, Value] = dict(self._world.facts)
+        final: dict[FactKey, Value] = dict(self._world.facts)
         # What is required of an actor at the start holds of the robot that will be it.
         for actor, requirement in self.requirements.items():
             for relation, (value, _) in requirement.facts.items():
-                final[Variable(relation, actor)] = value
+                final[FactKey(relation, actor)] = value
         for variable, rows in self._writers.items():
             final[variable] = _agreed(
                 [
@@ -199,7 +199,7 @@ class PlanFlow:
             if isinstance(value, str) and value in pinned:
                 value = final[variable] = pinned[value]
             if variable.subject in pinned:
-                final[Variable(variable.relation, pinned[variable.subject])] = value
+                final[FactKey(variable.relation, pinned[variable.subject])] = value
         return final
 
 

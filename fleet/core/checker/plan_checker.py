@@ -23,9 +23,9 @@ from fleet.core.checker.form import PlanForm
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import Cycle, TaskGraph
 from fleet.core.model.world import WorldModel
+from keyexpr_schema.facts import Value
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.payloads.plans import Plan, Violation
-from keyexpr_schema.payloads.world import Value
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fleet.core.state import PlanBook, State
+from fleet.core.state import PlanEntry, State
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 FACTOR = 2.0
@@ -20,9 +20,9 @@ def late_at_s(record: TaskRecord) -> float | None:
     return record.started_s + FACTOR * record.duration_s + MARGIN_S
 
 
-def late_task(state: State, book: PlanBook) -> TaskRecord | None:
+def late_task(state: State, entry: PlanEntry) -> TaskRecord | None:
     """A task that is late now, was not yet reacted to, and whose robot has more to do."""
-    for record in _that_matter(book):
+    for record in _that_matter(entry):
         at_s = late_at_s(record)
         if at_s is not None and at_s <= state.time_s:
             return record
@@ -35,9 +35,9 @@ def next_lateness(state: State) -> float | None:
         return None
     times = [
         at_s
-        for book in state.plans.values()
-        if not book.ended and book.job is None and book.replan_reason is None
-        for record in _that_matter(book)
+        for entry in state.plans.values()
+        if not entry.ended and entry.job is None and entry.replan_reason is None
+        for record in _that_matter(entry)
         if (at_s := late_at_s(record)) is not None
     ]
     return min(times, default=None)
@@ -48,16 +48,16 @@ def behind_s(state: State, robot: str) -> float:
 
     A task that is late is expected to take as long again as it has taken so far.
     """
-    for book in state.plans.values():
-        for record in book.outstanding():
+    for entry in state.plans.values():
+        for record in entry.outstanding():
             if record.robot == robot and record.started_s is not None:
                 return max(0.0, state.time_s - record.started_s - record.duration_s)
     return 0.0
 
 
-def _that_matter(book: PlanBook) -> list[TaskRecord]:
+def _that_matter(entry: PlanEntry) -> list[TaskRecord]:
     """Tasks that run and were not reacted to, of robots that have more to do."""
-    current = list(book.current())
-    running = [r for r in current if r.state is TaskState.RUNNING and r.task not in book.late]
+    current = list(entry.current())
+    running = [r for r in current if r.state is TaskState.RUNNING and r.task not in entry.late]
     waiting = {r.robot for r in current if r.state is TaskState.WAITING} if running else set()
     return [record for record in running if record.robot in waiting]

@@ -11,8 +11,9 @@ from fleet.core.handlers.plan_results import plan_again
 from fleet.core.handlers.requests import take_waiting_goals
 from fleet.core.model.preconditions import Skills, action_of, unmet_before
 from fleet.core.model.skills import Action
-from fleet.core.plan_entry import give_up, set_book, set_record
-from fleet.core.state import OUTSTANDING, PlanBook, State
+from fleet.core.plan_entry import give_up, set_entry, set_record
+from fleet.core.state import OUTSTANDING, PlanEntry, State
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
@@ -24,29 +25,29 @@ def advance(state: State, skills: Skills) -> State:
     if state.policy.auto_plan:
         state = take_waiting_goals(state)
     for plan in sorted(state.plans, key=lambda name: _priority(state, name)):
-        book = state.plans[plan]
-        if book.cancelling and not book.ended:
-            state = _cancel(state, book)
-        elif book.job is None and book.replan_reason is not None and not book.ended:
-            state = plan_again(state, book)
-        elif book.state is PlanState.RUNNING and book.job is None:
-            state = _run(state, book, skills)
+        entry = state.plans[plan]
+        if entry.cancelling and not entry.ended:
+            state = _cancel(state, entry)
+        elif entry.job is None and entry.replan_reason is not None and not entry.ended:
+            state = plan_again(state, entry)
+        elif entry.state is PlanState.RUNNING and entry.job is None:
+            state = _run(state, entry, skills)
     return _loosened(state, skills)
 
 
 def _loosened(state: State, skills: Skills) -> State:
     """Where nobody moves, since plans keep robots from each other in a circle, one task gets its
     robots all the same; what that upsets is planned again."""
-    alive = [book for book in state.plans.values() if not book.ended]
-    if any(book.job is not None or book.outstanding() for book in alive):
+    alive = [entry for entry in state.plans.values() if not entry.ended]
+    if any(entry.job is not None or entry.outstanding() for entry in alive):
         return state
-    for book in sorted(alive, key=lambda each: _priority(state, each.plan.plan)):
-        if book.state is not PlanState.RUNNING or book.replan_reason is not None:
+    for entry in sorted(alive, key=lambda each: _priority(state, each.plan.plan)):
+        if entry.state is not PlanState.RUNNING or entry.replan_reason is not None:
             continue
-        for record in book.current():
+        for record in entry.current():
             if record.state is not TaskState.WAITING:
                 continue
-            after = _dispatch(state, book.plan.plan, record, skills, kept=False)
+            after = _dispatch(state, entry.plan.plan, record, skills, kept=False)
             if after is not state:
                 return advance(after, skills)
     return state
@@ -57,55 +58,55 @@ def _priority(state: State, plan: str) -> tuple[int, str]:
     return -max((goal.priority for goal in goals), default=0), plan
 
 
-def _cancel(state: State, book: PlanBook) -> State:
-    if book.outstanding():
+def _cancel(state: State, entry: PlanEntry) -> State:
+    if entry.outstanding():
         return state  # their orders now say `cancelled`; the workers' reports bring us back here
     records = {
         name: record
         if record.state in ENDED_TASKS
         else replace(record, state=TaskState.CANCELLED, reason="the plan was cancelled")
-        for name, record in book.records.items()
+        for name, record in entry.records.items()
     }
-    book = replace(
-        book, state=PlanState.CANCELLED, cancelling=False, records=records, replan_reason=None
+    entry = replace(
+        entry, state=PlanState.CANCELLED, cancelling=False, records=records, replan_reason=None
     )
-    state = set_book(state, book)
+    state = set_entry(state, entry)
     return mark_goals(
-        state, book.plan.goals, GoalState.WAITING, None, f"plan {book.plan.plan} was cancelled"
+        state, entry.plan.goals, GoalState.WAITING, None, f"plan {entry.plan.plan} was cancelled"
     )
 
 
-def _run(state: State, book: PlanBook, skills: Skills) -> State:
-    state = _mark_reached(state, book, skills)
-    book = state.plans[book.plan.plan]
-    if (reason := why_replan(state, book, skills)) is not None:
-        return advance(set_book(state, replace(book, replan_reason=reason)), skills)
-    if (helpers := new_robots(state, book)) is not None:
-        return advance(set_book(state, helpers), skills)
-    if (late := late_task(state, book)) is not None:
+def _run(state: State, entry: PlanEntry, skills: Skills) -> State:
+    state = _mark_reached(state, entry, skills)
+    entry = state.plans[entry.plan.plan]
+    if (reason := why_replan(state, entry, skills)) is not None:
+        return advance(set_entry(state, replace(entry, replan_reason=reason)), skills)
+    if (helpers := new_robots(state, entry)) is not None:
+        return advance(set_entry(state, helpers), skills)
+    if (late := late_task(state, entry)) is not None:
         reason = f"{late.robot} is late with {late.task} ({late.skill})"
-        handled = (*book.late, late.task)
-        book = replace(book, replan_reason=reason, outside_reason=reason, late=handled)
-        return advance(set_book(state, book), skills)
-    if all(record.state is TaskState.SUCCEEDED for record in book.current()):
-        return set_book(state, replace(book, state=PlanState.SUCCEEDED))
-    if any(record.state in (TaskState.FAILED, TaskState.CANCELLED) for record in book.current()):
-        return give_up(state, book, "a task of the plan was cancelled or failed")
-    for record in list(book.current()):
+        handled = (*entry.late, late.task)
+        entry = replace(entry, replan_reason=reason, outside_reason=reason, late=handled)
+        return advance(set_entry(state, entry), skills)
+    if all(record.state is TaskState.SUCCEEDED for record in entry.current()):
+        return set_entry(state, replace(entry, state=PlanState.SUCCEEDED))
+    if any(record.state in (TaskState.FAILED, TaskState.CANCELLED) for record in entry.current()):
+        return give_up(state, entry, "a task of the plan was cancelled or failed")
+    for record in list(entry.current()):
         if record.state is TaskState.WAITING:
-            state = _dispatch(state, book.plan.plan, record, skills)
-            if state.plans[book.plan.plan].replan_reason is not None:
+            state = _dispatch(state, entry.plan.plan, record, skills)
+            if state.plans[entry.plan.plan].replan_reason is not None:
                 return advance(state, skills)
     return state
 
 
-def _mark_reached(state: State, book: PlanBook, skills: Skills) -> State:
+def _mark_reached(state: State, entry: PlanEntry, skills: Skills) -> State:
     """A stage of a goal is reached when all its tasks are done and its conditions hold."""
     world = state.world(skills)
     open_goals = {
-        record.goal for record in book.current() if record.state is not TaskState.SUCCEEDED
+        record.goal for record in entry.current() if record.state is not TaskState.SUCCEEDED
     }
-    for goal in book.plan.goals:
+    for goal in entry.plan.goals:
         status = state.goal_states.get(goal)
         if (
             status is None
@@ -114,14 +115,14 @@ def _mark_reached(state: State, book: PlanBook, skills: Skills) -> State:
             or not all(world.holds(condition) for condition in status.conditions)
         ):
             continue
-        book = replace(state.plans[book.plan.plan], replans=0)
+        entry = replace(state.plans[entry.plan.plan], replans=0)
         if status.stage + 1 < len(status.stages):
             state = next_stage(state, goal)
             reason = f"goal {goal} goes on with its next step"
-            state = set_book(state, replace(book, replan_reason=reason))
+            state = set_entry(state, replace(entry, replan_reason=reason))
         else:
-            state = set_book(state, book)
-            state = mark_goals(state, (goal,), GoalState.REACHED, book.plan.plan)
+            state = set_entry(state, entry)
+            state = mark_goals(state, (goal,), GoalState.REACHED, entry.plan.plan)
     return state
 
 
@@ -132,25 +133,25 @@ def _dispatch(
 
     See `_free` for `kept`.
     """
-    book = state.plans[plan]
+    entry = state.plans[plan]
     befores = (*record.after, *record.behind)
     if any(
-        book.records[before].state is not TaskState.SUCCEEDED
+        entry.records[before].state is not TaskState.SUCCEEDED
         for before in befores
-        if before in book.records
+        if before in entry.records
     ):
         return state
     action = action_of(record, skills)
     if action is None:
         reason = f"{record.task} cannot start: there is no skill {record.skill} any more"
-        return give_up(state, book, reason)
+        return give_up(state, entry, reason)
     if not all(_free(state, robot, plan, kept) for robot in action.participants):
         return state
-    if _touches_what_is_dropped(book, action, skills):
+    if _touches_what_is_dropped(entry, action, skills):
         return state
     if (unmet := unmet_before(action, state.world(skills))) is not None:
         reason = f"{record.task} ({record.skill}) cannot start: {unmet}"
-        return set_book(state, replace(book, replan_reason=reason))
+        return set_entry(state, replace(entry, replan_reason=reason))
     ordered = replace(
         record,
         state=TaskState.ORDERED,
@@ -158,24 +159,24 @@ def _dispatch(
         ordered_s=state.time_s if record.ordered_s is None else record.ordered_s,
         way_s=_way_s(state, action, skills),
     )
-    return set_record(state, book, ordered)
+    return set_record(state, entry, ordered)
 
 
 def _way_s(state: State, action: Action, skills: Skills) -> float | None:
     """The way to the task at its robot's top speed, s; `None` if nobody knows from where."""
     if action.skill.travel_to is None:
         return 0.0
-    here = state.fact("at", action.actor)
+    here = state.fact(AT, action.actor)
     if here is None or here.value not in state.places:
         return None
     return state.world(skills).way_s(action.actor, here.value, action.args[action.skill.travel_to])
 
 
-def _touches_what_is_dropped(book: PlanBook, action: Action, skills: Skills) -> bool:
+def _touches_what_is_dropped(entry: PlanEntry, action: Action, skills: Skills) -> bool:
     """Whether a task that is being cancelled, and has not confirmed it, is about the same facts."""
     variables = action.variables
-    for task in book.dropping:
-        record = book.records[task]
+    for task in entry.dropping:
+        record = entry.records[task]
         if record.state in OUTSTANDING:
             other = action_of(record, skills)
             if other is None or variables & other.variables:
@@ -193,10 +194,10 @@ def _free(state: State, robot: str, plan: str, kept: bool) -> bool:
     if not state.alive.get(robot):
         return False
     carries = _carries_for(state, robot, state.plans[plan])
-    for book in state.plans.values():
+    for entry in state.plans.values():
         begun: set[str] = set()
         unfinished: set[str] = set()
-        for record in book.records.values():
+        for record in entry.records.values():
             if robot not in (record.robot, *record.args.values()):
                 continue
             if record.state in OUTSTANDING:
@@ -205,18 +206,18 @@ def _free(state: State, robot: str, plan: str, kept: bool) -> bool:
                 begun.add(record.actor)
             elif record.robot == robot and record.state is TaskState.WAITING:
                 unfinished.add(record.actor)
-        if book.plan.plan == plan or book.ended or carries:
+        if entry.plan.plan == plan or entry.ended or carries:
             continue
-        if (kept and begun & unfinished) or _carries_for(state, robot, book):
+        if (kept and begun & unfinished) or _carries_for(state, robot, entry):
             return False
     return True
 
 
-def _carries_for(state: State, robot: str, book: PlanBook) -> bool:
+def _carries_for(state: State, robot: str, entry: PlanEntry) -> bool:
     """Whether a robot has something with it that an open goal of the plan is about."""
     return any(
-        (fact := state.fact("at", subject)) is not None and fact.value == robot
-        for goal in book.plan.goals
+        (fact := state.fact(AT, subject)) is not None and fact.value == robot
+        for goal in entry.plan.goals
         if goal in state.goal_states and state.goal_states[goal].state not in ENDED_GOALS
         for condition in state.goal_states[goal].conditions
         for subject in condition.subjects
@@ -230,25 +231,25 @@ def _fail_tasks_of_lost_robots(state: State) -> State:
         reason = f"robot {robot} has been away for {state.policy.lost_after_s:g} s"
         if robot not in state.robots:
             reason = f"robot {robot} was unregistered"
-        for book in state.plans.values():
-            if book.ended or not _needs(book, robot):
+        for entry in state.plans.values():
+            if entry.ended or not _needs(entry, robot):
                 continue
             records = {
                 name: replace(record, state=TaskState.FAILED, reason=reason)
                 if record.state in OUTSTANDING and robot in (record.robot, *record.args.values())
                 else record
-                for name, record in book.records.items()
+                for name, record in entry.records.items()
             }
-            if records != book.records or book.replan_reason is None:
-                lost = replace(book, records=records, replan_reason=reason, outside_reason=reason)
-                state = set_book(state, lost)
+            if records != entry.records or entry.replan_reason is None:
+                lost = replace(entry, records=records, replan_reason=reason, outside_reason=reason)
+                state = set_entry(state, lost)
     return state
 
 
-def _needs(book: PlanBook, robot: str) -> bool:
+def _needs(entry: PlanEntry, robot: str) -> bool:
     return any(
         record.state not in ENDED_TASKS and robot in (record.robot, *record.args.values())
-        for record in book.current()
+        for record in entry.current()
     )
 
 
@@ -256,14 +257,14 @@ def next_timer(state: State) -> float | None:
     """The Unix time [s] at which a robot that is away becomes lost to a plan that counts on it, or
     a task late."""
     counting = [
-        book
-        for book in state.plans.values()
-        if not book.ended and book.job is None and book.replan_reason is None
+        entry
+        for entry in state.plans.values()
+        if not entry.ended and entry.job is None and entry.replan_reason is None
     ]
     times = [
         since + state.policy.lost_after_s
         for robot, since in state.gone_since.items()
-        if any(_needs(book, robot) for book in counting)
+        if any(_needs(entry, robot) for entry in counting)
     ]
     if (late_s := next_lateness(state)) is not None:
         times.append(late_s)

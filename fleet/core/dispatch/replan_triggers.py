@@ -9,9 +9,10 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.handlers.goals import believe
 from fleet.core.model.preconditions import Skills, action_of
-from fleet.core.model.skills import Action, Variable
-from fleet.core.plan_entry import set_book
-from fleet.core.state import OUTSTANDING, PlanBook, State
+from fleet.core.model.skills import Action
+from fleet.core.plan_entry import set_entry
+from fleet.core.state import OUTSTANDING, PlanEntry, State
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
@@ -25,23 +26,23 @@ def fact_put(state: State, event: events.FactPut, skills: Skills) -> State:
     if changed is state:
         return state
     state = changed
-    for book in state.plans.values():
-        if book.state is PlanState.RUNNING and book.replan_reason is None:
-            reason = _contradiction(book, fact, skills)
+    for entry in state.plans.values():
+        if entry.state is PlanState.RUNNING and entry.replan_reason is None:
+            reason = _contradiction(entry, fact, skills)
             if reason is not None:
-                state = set_book(state, replace(book, replan_reason=reason))
+                state = set_entry(state, replace(entry, replan_reason=reason))
     return state
 
 
-def _contradiction(book: PlanBook, fact: Fact, skills: Skills) -> str | None:
+def _contradiction(entry: PlanEntry, fact: Fact, skills: Skills) -> str | None:
     """Why a fact is against the plan: a task needs it otherwise, and nothing before it changes it.
 
     What a robot says of the work it is doing is part of that work.
     """
-    known = Variable(fact.relation, fact.subject)
+    known = fact.key
     unfinished = {
         record.task: (record, action)
-        for record in book.current()
+        for record in entry.current()
         if record.state not in ENDED_TASKS and (action := action_of(record, skills)) is not None
     }
     for record, action in unfinished.values():
@@ -72,16 +73,16 @@ def _before(task: str, unfinished: Mapping[str, tuple[TaskRecord, Action]]) -> s
     return found
 
 
-def why_replan(state: State, book: PlanBook, skills: Skills) -> str | None:
+def why_replan(state: State, entry: PlanEntry, skills: Skills) -> str | None:
     """What has come up that the plan does not provide for."""
     world = state.world(skills)
-    for thing in book.plan.seeks:
-        where = world.value("at", thing)
+    for thing in entry.plan.seeks:
+        where = world.value(AT, thing)
         if where is not None:
             return f"{thing} was found: it is at {where}"
-    current = list(book.current())
+    current = list(entry.current())
     if all(record.state is TaskState.SUCCEEDED for record in current):
-        for goal in book.plan.goals:
+        for goal in entry.plan.goals:
             status = state.goal_states.get(goal)
             if status is None or status.state is GoalState.REACHED:
                 continue
@@ -91,17 +92,17 @@ def why_replan(state: State, book: PlanBook, skills: Skills) -> str | None:
     return None
 
 
-def new_robots(state: State, book: PlanBook) -> PlanBook | None:
-    """The book with the wish that robots take part that came since the plan was made.
+def new_robots(state: State, entry: PlanEntry) -> PlanEntry | None:
+    """The entry with the wish that robots take part that came since the plan was made.
 
     More of a kind that is there already can share what is left. A new kind may help in ways that
     the plan knows nothing of, so that everything is planned again.
     """
-    new = sorted(set(state.team()) - set(book.team))
-    if not book.team or not new or all(r.state is not TaskState.WAITING for r in book.current()):
+    new = sorted(set(state.team()) - set(entry.team))
+    if not entry.team or not new or all(r.state is not TaskState.WAITING for r in entry.current()):
         return None
     reason = f"{' and '.join(new)} can help now"
-    kinds = {state.robots[robot].model for robot in book.team if robot in state.robots}
+    kinds = {state.robots[robot].model for robot in entry.team if robot in state.robots}
     if all(state.robots[robot].model in kinds for robot in new):
-        return replace(book, replan_reason=reason, outside_reason=reason)
-    return replace(book, replan_reason=reason, anew_reason=reason)
+        return replace(entry, replan_reason=reason, outside_reason=reason)
+    return replace(entry, replan_reason=reason, anew_reason=reason)

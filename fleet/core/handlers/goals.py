@@ -9,11 +9,11 @@ from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.state import State, put, without
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, read_goal, statement_facts
+from keyexpr_schema.facts import AT, NOTHING, SEARCHED, FactKey, Value
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState
-from keyexpr_schema.payloads.world import NOTHING, Fact, StatementStatus, Value
+from keyexpr_schema.payloads.world import Fact, StatementStatus
 
-SEARCHED = "searched"
 """Relation that says of a place that somebody looked around in it."""
 
 
@@ -85,7 +85,7 @@ def next_stage(state: State, goal: str) -> State:
     kept = tuple(
         condition
         for condition in status.conditions
-        if condition.relation == "at"
+        if condition.relation == AT
         and about.isdisjoint(condition.subjects)
         and not state.robots.keys() & set(condition.subjects)
     )
@@ -102,17 +102,17 @@ def goal_deleted(state: State, event: events.GoalDeleted) -> State:
         goals=without(state.goals, event.goal),
         goal_states=without(state.goal_states, event.goal),
     )
-    for plan, book in state.plans.items():
-        if event.goal in book.plan.goals and not book.ended:
-            rest = without_goal(state, book.plan, event.goal)
-            book = replace(
-                book,
+    for plan, entry in state.plans.items():
+        if event.goal in entry.plan.goals and not entry.ended:
+            rest = without_goal(state, entry.plan, event.goal)
+            entry = replace(
+                entry,
                 plan=rest,
                 replan_reason=f"goal {event.goal} was deleted",
                 outside_reason=f"goal {event.goal} was deleted",
-                cancelling=book.cancelling or not rest.goals,
+                cancelling=entry.cancelling or not rest.goals,
             )
-            state = replace(state, plans=put(state.plans, plan, book))
+            state = replace(state, plans=put(state.plans, plan, entry))
     return state
 
 
@@ -218,10 +218,9 @@ def mark_goals(
 
 def believe(state: State, fact: Fact) -> State:
     """Believe a fact, whatever was known of its variable."""
-    name = f"{fact.subject}/{fact.relation}"
-    if state.facts.get(name) == fact:
+    if state.facts.get(fact.key) == fact:
         return state
-    return replace(state, facts=put(state.facts, name, fact))
+    return replace(state, facts=put(state.facts, fact.key, fact))
 
 
 def believe_if_newer(state: State, fact: Fact) -> State:
@@ -232,8 +231,8 @@ def believe_if_newer(state: State, fact: Fact) -> State:
 
 def fact_deleted(state: State, event: events.FactDeleted) -> State:
     """No longer believe anything of that variable."""
-    name = f"{event.subject}/{event.relation}"
-    return replace(state, facts=without(state.facts, name)) if name in state.facts else state
+    key = FactKey(event.relation, event.subject)
+    return replace(state, facts=without(state.facts, key)) if key in state.facts else state
 
 
 def statement_put(state: State, event: events.StatementPut) -> State:
@@ -263,13 +262,13 @@ def _read_statement(state: State, name: str) -> State:
         return _set_understood(state, StatementStatus(statement=name, reason=str(error)))
     facts = tuple(
         Fact(
-            subject=subject,
-            relation=relation,
+            subject=key.subject,
+            relation=key.relation,
             value=value,
             source=f"{PLANNER_SOURCE}:{name}",
             time_s=state.time_s,
         )
-        for relation, subject, value in read
+        for key, value in read
     )
     for fact in facts:
         state = believe(state, fact)
@@ -385,7 +384,7 @@ def _words_changed(state: State) -> State:
 
 def active_plan_of(state: State, goal: str) -> str | None:
     """The plan that works on a goal and has not ended."""
-    for plan, book in state.plans.items():
-        if goal in book.plan.goals and not book.ended and book.state is not PlanState.REJECTED:
+    for plan, entry in state.plans.items():
+        if goal in entry.plan.goals and not entry.ended and entry.state is not PlanState.REJECTED:
             return plan
     return None

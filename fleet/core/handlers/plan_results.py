@@ -10,10 +10,10 @@ from fleet.core import events
 from fleet.core.effects import status_of
 from fleet.core.handlers.goals import mark_goals
 from fleet.core.model.preconditions import Skills
-from fleet.core.plan_entry import answer, give_up, next_task, open_goals, set_book
+from fleet.core.plan_entry import answer, give_up, next_task, open_goals, set_entry
 from fleet.core.revision.reconcile import revise
 from fleet.core.revision.residual_plan import actors_in_order, begun_actors, remaining_plan
-from fleet.core.state import Job, PlanBook, State, put, without
+from fleet.core.state import PlanEntry, PlanningJob, State, put, without
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import Answer
@@ -24,100 +24,102 @@ MAX_REPLANS = 12
 up: the world does not go along with it."""
 
 
-def plan_again(state: State, book: PlanBook) -> State:
+def plan_again(state: State, entry: PlanEntry) -> State:
     """Start the planning job of the next revision, from the facts as they are now.
 
     What is under way goes on meanwhile; nothing new is ordered until the job has ended.
     """
-    if book.replans >= MAX_REPLANS * max(1, len(open_goals(state, book))):
+    if entry.replans >= MAX_REPLANS * max(1, len(open_goals(state, entry))):
         return give_up(
-            state, book, f"given up after {book.replans} new plans; the last: {book.replan_reason}"
+            state,
+            entry,
+            f"given up after {entry.replans} new plans; the last: {entry.replan_reason}",
         )
-    revision = book.plan.revision + 1
-    job = Job(
+    revision = entry.plan.revision + 1
+    job = PlanningJob(
         job=state.jobs + 1,
-        plan=book.plan.plan,
+        plan=entry.plan.plan,
         revision=revision,
-        goals=book.plan.goals,
-        strategy=book.plan.strategy,
-        planner=book.planner,
-        allocator=book.plan.allocator,
-        first_task=next_task(book) + (book.amendment is not None),
+        goals=entry.plan.goals,
+        strategy=entry.plan.strategy,
+        planner=entry.planner,
+        allocator=entry.plan.allocator,
+        first_task=next_task(entry) + (entry.amendment is not None),
         partial=True,
         # What is being cancelled is not what a new plan could go on with, though it wants the same.
-        running=tuple(r.task for r in book.outstanding() if r.task not in book.dropping),
-        reason=book.replan_reason,
-        request=book.amendment_request,
+        running=tuple(r.task for r in entry.outstanding() if r.task not in entry.dropping),
+        reason=entry.replan_reason,
+        request=entry.amendment_request,
     )
-    if book.amendment is not None:
-        job = replace(job, proposal=remaining_plan(book, revision, addition=book.amendment))
-    elif _may_be_mended(book):
-        gone = {robot for robot in book.allocation.values() if not state.ready(robot)}
+    if entry.amendment is not None:
+        job = replace(job, proposal=remaining_plan(entry, revision, addition=entry.amendment))
+    elif _may_be_mended(entry):
+        gone = {robot for robot in entry.allocation.values() if not state.ready(robot)}
         job = replace(
             job,
-            remaining=remaining_plan(book, revision, gone),
-            outside=book.replan_reason == book.outside_reason,
-            home=book.allocation,
-            sequence=actors_in_order(book),
-            begun=tuple(begun_actors(book, gone)),
+            remaining=remaining_plan(entry, revision, gone),
+            outside=entry.replan_reason == entry.outside_reason,
+            home=entry.allocation,
+            sequence=actors_in_order(entry),
+            begun=tuple(begun_actors(entry, gone)),
         )
-    return set_book(replace(state, jobs=job.job), replace(book, job=job))
+    return set_entry(replace(state, jobs=job.job), replace(entry, job=job))
 
 
-def _may_be_mended(book: PlanBook) -> bool:
+def _may_be_mended(entry: PlanEntry) -> bool:
     """Whether what is left of a plan may go on. A find ends a search, which takes a whole plan."""
-    if book.replan_reason == book.outside_reason:
+    if entry.replan_reason == entry.outside_reason:
         return True
-    return book.replan_reason != book.anew_reason and not book.plan.seeks
+    return entry.replan_reason != entry.anew_reason and not entry.plan.seeks
 
 
 def planning_succeeded(state: State, event: events.PlanningSucceeded, skills: Skills) -> State:
     """Take over a finished plan, or show it where it was only asked to be seen."""
     if (preview := _preview_of(state, event.job)) is not None:
         return _show(state, preview, event)
-    book = state.plans.get(event.plan.plan)
-    if book is None or book.job is None or book.job.job != event.job:
+    entry = state.plans.get(event.plan.plan)
+    if entry is None or entry.job is None or entry.job.job != event.job:
         return state
-    job = book.job
+    job = entry.job
     first = event.plan.revision == 1
     team = state.team()
-    if _as_it_was(book, job, event):
-        book = replace(book, job=None, replan_reason=_new_reason(book, job), team=team)
-        return set_book(state, book)
+    if _as_it_was(entry, job, event):
+        entry = replace(entry, job=None, replan_reason=_new_reason(entry, job), team=team)
+        return set_entry(state, entry)
     for goal, reason in event.left_out.items():
-        state = mark_goals(state, (goal,), GoalState.FAILED, book.plan.plan, reason)
-    event = replace(event, plan=replace(event.plan, autostart=book.start))
-    revision = revise(book, event, state.world(skills), frozenset(job.running))
-    to = book.state
+        state = mark_goals(state, (goal,), GoalState.FAILED, entry.plan.plan, reason)
+    event = replace(event, plan=replace(event.plan, autostart=entry.start))
+    revision = revise(entry, event, state.world(skills), frozenset(job.running))
+    to = entry.state
     if first:
         to = PlanState.PROPOSED if state.policy.approval else PlanState.READY
-    if to is PlanState.READY and book.start:
+    if to is PlanState.READY and entry.start:
         to = PlanState.RUNNING
-    book = replace(
-        _with_outcome(book, event),
+    entry = replace(
+        _with_outcome(entry, event),
         plan=revision.plan,
         state=to,
         records=revision.records,
-        dropping=tuple(dict.fromkeys([*book.dropping, *revision.dropping])),
+        dropping=tuple(dict.fromkeys([*entry.dropping, *revision.dropping])),
         change=None if first else revision.change,
         job=None,
-        replan_reason=_new_reason(book, job),
+        replan_reason=_new_reason(entry, job),
         amendment=None,
         amendment_request=None,
         team=team,
-        replans=book.replans + (not first and not (event.mended and job.outside)),
+        replans=entry.replans + (not first and not (event.mended and job.outside)),
         reason=None,
         violations=(),
     )
-    state = set_book(state, book)
+    state = set_entry(state, entry)
     goal_state = GoalState.RUNNING if to is PlanState.RUNNING else GoalState.PLANNED
-    state = mark_goals(state, book.plan.goals, goal_state, book.plan.plan)
-    return answer(state, job.request, True, _made_sentence(event), book.plan.plan)
+    state = mark_goals(state, entry.plan.goals, goal_state, entry.plan.plan)
+    return answer(state, job.request, True, _made_sentence(event), entry.plan.plan)
 
 
-def _as_it_was(book: PlanBook, job: Job, event: events.PlanningSucceeded) -> bool:
+def _as_it_was(entry: PlanEntry, job: PlanningJob, event: events.PlanningSucceeded) -> bool:
     """Whether another allocation of what is left has turned out to be the one there is."""
-    current = list(book.current())
+    current = list(entry.current())
     return (
         event.mended
         and job.outside
@@ -128,15 +130,15 @@ def _as_it_was(book: PlanBook, job: Job, event: events.PlanningSucceeded) -> boo
     )
 
 
-def _new_reason(book: PlanBook, job: Job) -> str | None:
+def _new_reason(entry: PlanEntry, job: PlanningJob) -> str | None:
     """What came up while the plan was being made is a reason to make it again."""
-    return None if book.replan_reason == job.reason else book.replan_reason
+    return None if entry.replan_reason == job.reason else entry.replan_reason
 
 
-def _with_outcome(book: PlanBook, event: events.PlanningSucceeded) -> PlanBook:
-    """The book with what a job came to: the plan, its allocation, and what is predicted of it."""
+def _with_outcome(entry: PlanEntry, event: events.PlanningSucceeded) -> PlanEntry:
+    """The entry with what a job came to: the plan, its allocation, and what is predicted of it."""
     return replace(
-        book,
+        entry,
         plan=event.plan,
         allocation=event.allocation,
         sequence=event.sequence,
@@ -161,19 +163,19 @@ def _counted(things: Sized, what: str) -> str:
     return f"{len(things)} {what}{'' if len(things) == 1 else 's'}"
 
 
-def _preview_of(state: State, job: int) -> Job | None:
+def _preview_of(state: State, job: int) -> PlanningJob | None:
     return next((found for found in state.previews.values() if found.job == job), None)
 
 
-def _show(state: State, job: Job, event: events.PlanningSucceeded) -> State:
+def _show(state: State, job: PlanningJob, event: events.PlanningSucceeded) -> State:
     assert job.request is not None
-    book = _with_outcome(PlanBook(plan=event.plan, state=PlanState.READY), event)
+    entry = _with_outcome(PlanEntry(plan=event.plan, state=PlanState.READY), event)
     reply = Answer(
         request=job.request,
         accepted=True,
         sentence=f"a dry run: {_made_sentence(event)}",
         preview=event.plan,
-        preview_status=status_of(book),
+        preview_status=status_of(entry),
     )
     return replace(
         state,
@@ -188,27 +190,27 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
         assert preview.request is not None
         state = replace(state, previews=without(state.previews, preview.request))
         return answer(state, preview.request, False, event.reason, violations=event.violations)
-    book = next(
+    entry = next(
         (b for b in state.plans.values() if b.job is not None and b.job.job == event.job), None
     )
-    if book is None or book.job is None:
+    if entry is None or entry.job is None:
         return state
-    request = book.job.request
-    book = replace(
-        book,
+    request = entry.job.request
+    entry = replace(
+        entry,
         job=None,
         violations=event.violations,
         planning_time_s=event.planning_time_s,
     )
-    if book.amendment is not None:
+    if entry.amendment is not None:
         # The plan as it was still stands; only the addition is refused.
-        book = replace(book, amendment=None, amendment_request=None, replan_reason=None)
-        state = set_book(state, book)
+        entry = replace(entry, amendment=None, amendment_request=None, replan_reason=None)
+        state = set_entry(state, entry)
         sentence = f"the task was not added: {event.reason}"
-        return answer(state, request, False, sentence, book.plan.plan, event.violations)
-    if book.plan.revision == 1 and not book.records:
-        book = replace(book, state=PlanState.REJECTED, reason=event.reason)
-        state = set_book(state, book)
-        state = mark_goals(state, book.plan.goals, GoalState.WAITING, None, event.reason)
-        return answer(state, request, False, event.reason, book.plan.plan, event.violations)
-    return give_up(state, book, event.reason)
+        return answer(state, request, False, sentence, entry.plan.plan, event.violations)
+    if entry.plan.revision == 1 and not entry.records:
+        entry = replace(entry, state=PlanState.REJECTED, reason=event.reason)
+        state = set_entry(state, entry)
+        state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None, event.reason)
+        return answer(state, request, False, event.reason, entry.plan.plan, event.violations)
+    return give_up(state, entry, event.reason)

@@ -11,7 +11,7 @@ from fleet.core.model.durations import learn
 from fleet.core.model.preconditions import Skills, action_of, unmet_before
 from fleet.core.model.skills import Action
 from fleet.core.plan_entry import give_up, open_goals, set_record
-from fleet.core.state import OUTSTANDING, PlanBook, State, put
+from fleet.core.state import OUTSTANDING, PlanEntry, State, put
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.tasks import Report, ReportState, TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact
@@ -27,10 +27,10 @@ def report_received(state: State, event: events.ReportReceived, skills: Skills) 
     report = event.report
     for fact in report.facts:
         state = believe_if_newer(state, fact)
-    book = state.plans.get(report.plan)
-    record = book.records.get(report.task) if book else None
+    entry = state.plans.get(report.plan)
+    record = entry.records.get(report.task) if entry else None
     if (
-        book is None
+        entry is None
         or record is None
         or record.state not in OUTSTANDING
         or (report.robot, report.attempt) != (record.robot, record.attempt)
@@ -41,19 +41,19 @@ def report_received(state: State, event: events.ReportReceived, skills: Skills) 
             if record.state is TaskState.RUNNING:
                 return state
             record = replace(record, state=TaskState.RUNNING, started_s=report.started_s)
-            return set_record(state, book, record)
+            return set_record(state, entry, record)
         case ReportState.SUCCEEDED:
-            return _succeeded(state, book, record, report, skills)
+            return _succeeded(state, entry, record, report, skills)
         case ReportState.CANCELLED:
-            return set_record(state, book, _ended(record, report, TaskState.CANCELLED))
+            return set_record(state, entry, _ended(record, report, TaskState.CANCELLED))
         case ReportState.FAILED:
-            return _failed(state, book, record, report)
+            return _failed(state, entry, record, report)
         case ReportState.INTERRUPTED:
-            return _interrupted(state, book, record, report, skills)
+            return _interrupted(state, entry, record, report, skills)
         case ReportState.REFUSED:
             if report.retryable and record.attempt < MAX_ATTEMPTS:
-                return set_record(state, book, _again(record, report))
-            return _failed(state, book, record, report)
+                return set_record(state, entry, _again(record, report))
+            return _failed(state, entry, record, report)
 
 
 def _ended(record: TaskRecord, report: Report, to: TaskState) -> TaskRecord:
@@ -77,13 +77,13 @@ def _again(record: TaskRecord, report: Report) -> TaskRecord:
 
 
 def _succeeded(
-    state: State, book: PlanBook, record: TaskRecord, report: Report, skills: Skills
+    state: State, entry: PlanEntry, record: TaskRecord, report: Report, skills: Skills
 ) -> State:
-    told = {(fact.relation, fact.subject) for fact in report.facts}
+    reported = {fact.key for fact in report.facts}
     action = action_of(record, skills)
     state = _learned(state, record, report, action)
     for literal in action.after if action is not None else ():
-        if tuple(literal.variable) not in told:
+        if literal.variable not in reported:
             state = believe(
                 state,
                 Fact(
@@ -94,7 +94,7 @@ def _succeeded(
                     time_s=report.ended_s or state.time_s,
                 ),
             )
-    return set_record(state, book, _ended(record, report, TaskState.SUCCEEDED))
+    return set_record(state, entry, _ended(record, report, TaskState.SUCCEEDED))
 
 
 def _learned(state: State, record: TaskRecord, report: Report, action: Action | None) -> State:
@@ -113,38 +113,38 @@ def _learned(state: State, record: TaskRecord, report: Report, action: Action | 
     return state if known is state.durations else replace(state, durations=dict(known))
 
 
-def _failed(state: State, book: PlanBook, record: TaskRecord, report: Report) -> State:
+def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) -> State:
     record = _ended(record, report, TaskState.FAILED)
-    if book.ended or record.task in book.dropping:
-        return set_record(state, book, record)
+    if entry.ended or record.task in entry.dropping:
+        return set_record(state, entry, record)
     reason = f"{record.task} ({record.skill}) failed: {report.reason}"
-    book = replace(book, replan_reason=reason)
-    if record.goal is not None and record.goal in book.plan.goals:
-        count = book.failures.get(record.goal, 0) + 1
-        book = replace(book, failures=put(book.failures, record.goal, count))
+    entry = replace(entry, replan_reason=reason)
+    if record.goal is not None and record.goal in entry.plan.goals:
+        count = entry.failures.get(record.goal, 0) + 1
+        entry = replace(entry, failures=put(entry.failures, record.goal, count))
         if count >= MAX_FAILURES:
             told = f"given up after {count} failed tasks; the last: {reason}"
-            if open_goals(state, book) == [record.goal]:
-                book = replace(book, records=put(book.records, record.task, record))
-                return give_up(state, book, told)
-            state = mark_goals(state, (record.goal,), GoalState.FAILED, book.plan.plan, told)
-            book = replace(book, plan=without_goal(state, book.plan, record.goal))
-    return set_record(state, book, record)
+            if open_goals(state, entry) == [record.goal]:
+                entry = replace(entry, records=put(entry.records, record.task, record))
+                return give_up(state, entry, told)
+            state = mark_goals(state, (record.goal,), GoalState.FAILED, entry.plan.plan, told)
+            entry = replace(entry, plan=without_goal(state, entry.plan, record.goal))
+    return set_record(state, entry, record)
 
 
 def _interrupted(
-    state: State, book: PlanBook, record: TaskRecord, report: Report, skills: Skills
+    state: State, entry: PlanEntry, record: TaskRecord, report: Report, skills: Skills
 ) -> State:
     """A worker came back in the middle of an attempt: the world decides what it is worth."""
-    if book.ended or record.task in book.dropping:
-        return set_record(state, book, _ended(record, report, TaskState.CANCELLED))
+    if entry.ended or record.task in entry.dropping:
+        return set_record(state, entry, _ended(record, report, TaskState.CANCELLED))
     action = action_of(record, skills)
     if action is None:
-        return _failed(state, book, record, report)
+        return _failed(state, entry, record, report)
     world = state.world(skills)
     if all(world.value(*literal.variable) == literal.value for literal in action.after):
         record = _ended(record, report, TaskState.SUCCEEDED)
-        return set_record(state, book, replace(record, reason="found done after an interruption"))
+        return set_record(state, entry, replace(record, reason="found done after an interruption"))
     if unmet_before(action, world) is None and record.attempt < MAX_ATTEMPTS:
-        return set_record(state, book, _again(record, report))
-    return _failed(state, book, record, report)
+        return set_record(state, entry, _again(record, report))
+    return _failed(state, entry, record, report)

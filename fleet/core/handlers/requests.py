@@ -6,8 +6,8 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.handlers.goals import active_plan_of, mark_goals
-from fleet.core.plan_entry import answer, next_task, set_book
-from fleet.core.state import Job, PlanBook, State, put, without
+from fleet.core.plan_entry import answer, next_task, set_entry
+from fleet.core.state import PlanEntry, PlanningJob, State, put, without
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState, Task
@@ -24,8 +24,8 @@ def plan_requested(state: State, event: events.PlanRequested) -> State:
         ask.request in state.answers
         or ask.request in state.previews
         or any(
-            book.job is not None and book.job.request == ask.request
-            for book in state.plans.values()
+            entry.job is not None and entry.job.request == ask.request
+            for entry in state.plans.values()
         )
     ):
         return state
@@ -37,7 +37,7 @@ def plan_requested(state: State, event: events.PlanRequested) -> State:
     if reason := _why_not_plan(state, ask.plan, goals):
         return answer(state, ask.request, False, reason)
     name = ask.plan or _new_plan_name(state)
-    job = Job(
+    job = PlanningJob(
         job=state.jobs + 1,
         plan=name,
         revision=1,
@@ -62,10 +62,10 @@ def plan_requested(state: State, event: events.PlanRequested) -> State:
         allocator=ask.allocator,
         autostart=ask.start,
     )
-    book = PlanBook(
+    entry = PlanEntry(
         plan=empty, state=PlanState.PLANNING, planner=ask.planner, start=ask.start, job=job
     )
-    return set_book(replace(state, jobs=job.job), book)
+    return set_entry(replace(state, jobs=job.job), entry)
 
 
 def _why_not_plan(state: State, plan: str | None, goals: tuple[str, ...]) -> str | None:
@@ -101,7 +101,7 @@ def plan_proposed(state: State, event: events.PlanProposed) -> State:
     plan = event.plan
     if plan.plan in state.plans or plan.plan in state.past_plans:
         return state
-    job = Job(
+    job = PlanningJob(
         job=state.jobs + 1,
         plan=plan.plan,
         revision=plan.revision,
@@ -112,8 +112,8 @@ def plan_proposed(state: State, event: events.PlanProposed) -> State:
         first_task=1,
         proposal=plan,
     )
-    book = PlanBook(plan=plan, state=PlanState.PLANNING, start=plan.autostart, job=job)
-    return set_book(replace(state, jobs=job.job), book)
+    entry = PlanEntry(plan=plan, state=PlanState.PLANNING, start=plan.autostart, job=job)
+    return set_entry(replace(state, jobs=job.job), entry)
 
 
 def replan_requested(state: State, event: events.ReplanRequested) -> State:
@@ -121,26 +121,26 @@ def replan_requested(state: State, event: events.ReplanRequested) -> State:
     ask = event.request
     if ask.request in state.answers:
         return state
-    book = state.plans.get(ask.plan)
-    if book is None:
+    entry = state.plans.get(ask.plan)
+    if entry is None:
         return answer(state, ask.request, False, _no_plan(state, ask.plan))
-    if book.state is not PlanState.RUNNING:
-        sentence = f"plan {ask.plan} is {book.state.value}, not running"
+    if entry.state is not PlanState.RUNNING:
+        sentence = f"plan {ask.plan} is {entry.state.value}, not running"
         return answer(state, ask.request, False, sentence)
-    if book.cancelling:
+    if entry.cancelling:
         return answer(state, ask.request, False, f"plan {ask.plan} is being cancelled")
     if ask.goals and (reason := _why_not_plan(state, None, ask.goals)):
         return answer(state, ask.request, False, reason)
-    goals = tuple(dict.fromkeys([*book.plan.goals, *ask.goals]))
+    goals = tuple(dict.fromkeys([*entry.plan.goals, *ask.goals]))
     # What a person asks for is no sign that the world does not go along: counting begins anew.
-    book = replace(
-        book,
-        plan=replace(book.plan, goals=goals),
+    entry = replace(
+        entry,
+        plan=replace(entry.plan, goals=goals),
         replan_reason=ask.reason,
         anew_reason=ask.reason,
         replans=0,
     )
-    state = set_book(state, book)
+    state = set_entry(state, entry)
     return answer(state, ask.request, True, f"plan {ask.plan} is made again", ask.plan)
 
 
@@ -155,14 +155,14 @@ def take_waiting_goals(state: State) -> State:
     )
     if not waiting:
         return state
-    if any(book.state is PlanState.PLANNING for book in state.plans.values()):
+    if any(entry.state is PlanState.PLANNING for entry in state.plans.values()):
         return state  # what comes meanwhile goes into the plan that is being made
-    for book in state.plans.values():
-        if book.state is PlanState.RUNNING and not book.cancelling:
-            goals = (*book.plan.goals, *waiting)
+    for entry in state.plans.values():
+        if entry.state is PlanState.RUNNING and not entry.cancelling:
+            goals = (*entry.plan.goals, *waiting)
             reason = f"{', '.join(waiting)} came up"
-            book = replace(book, plan=replace(book.plan, goals=goals), replan_reason=reason)
-            return set_book(state, book)
+            entry = replace(entry, plan=replace(entry.plan, goals=goals), replan_reason=reason)
+            return set_entry(state, entry)
     request = PlanRequest(request=f"{AUTO}{state.jobs + 1}", goals=waiting)
     asked = events.PlanRequested(
         request=request, time_s=state.time_s, wall_time_s=state.wall_time_s
@@ -178,67 +178,67 @@ def control_requested(state: State, event: events.ControlRequested) -> State:
     """Start, cancel, delete or extend a plan, or say why not."""
     ask = event.request
     if ask.request in state.answers or any(
-        book.amendment_request == ask.request for book in state.plans.values()
+        entry.amendment_request == ask.request for entry in state.plans.values()
     ):
         return state
-    book = state.plans.get(ask.plan)
-    if book is None:
+    entry = state.plans.get(ask.plan)
+    if entry is None:
         return answer(state, ask.request, False, _no_plan(state, ask.plan))
     if ask.control is Control.START:
-        if book.state is not PlanState.READY:
+        if entry.state is not PlanState.READY:
             return answer(
                 state,
                 ask.request,
                 False,
-                f"plan {ask.plan} is {book.state.value}; only a ready plan can be started",
+                f"plan {ask.plan} is {entry.state.value}; only a ready plan can be started",
             )
-        state = set_book(state, replace(book, state=PlanState.RUNNING, start=True))
-        state = mark_goals(state, book.plan.goals, GoalState.RUNNING, ask.plan)
+        state = set_entry(state, replace(entry, state=PlanState.RUNNING, start=True))
+        state = mark_goals(state, entry.plan.goals, GoalState.RUNNING, ask.plan)
         return answer(state, ask.request, True, f"plan {ask.plan} is running", ask.plan)
     if ask.control is Control.APPROVE:
-        if book.state is not PlanState.PROPOSED:
-            sentence = f"plan {ask.plan} is {book.state.value}; only a proposed plan is approved"
+        if entry.state is not PlanState.PROPOSED:
+            sentence = f"plan {ask.plan} is {entry.state.value}; only a proposed plan is approved"
             return answer(state, ask.request, False, sentence)
-        to = PlanState.RUNNING if book.start else PlanState.READY
-        state = set_book(state, replace(book, state=to))
-        if book.start:
-            state = mark_goals(state, book.plan.goals, GoalState.RUNNING, ask.plan)
+        to = PlanState.RUNNING if entry.start else PlanState.READY
+        state = set_entry(state, replace(entry, state=to))
+        if entry.start:
+            state = mark_goals(state, entry.plan.goals, GoalState.RUNNING, ask.plan)
         return answer(state, ask.request, True, f"plan {ask.plan} is {to.value}", ask.plan)
     if ask.control is Control.CANCEL:
-        if book.ended:
-            return answer(state, ask.request, False, f"plan {ask.plan} is {book.state.value}")
-        waiting = book.job.request if book.job is not None else None
+        if entry.ended:
+            return answer(state, ask.request, False, f"plan {ask.plan} is {entry.state.value}")
+        waiting = entry.job.request if entry.job is not None else None
         state = answer(state, waiting, False, f"plan {ask.plan} was cancelled while it was made")
-        state = set_book(state, replace(book, cancelling=True, job=None))
+        state = set_entry(state, replace(entry, cancelling=True, job=None))
         return answer(state, ask.request, True, f"plan {ask.plan} is being cancelled", ask.plan)
     if ask.control is Control.DELETE:
-        if not book.ended and book.state not in (PlanState.READY, PlanState.PROPOSED):
+        if not entry.ended and entry.state not in (PlanState.READY, PlanState.PROPOSED):
             return answer(
                 state,
                 ask.request,
                 False,
-                f"plan {ask.plan} is {book.state.value}; cancel it before deleting it",
+                f"plan {ask.plan} is {entry.state.value}; cancel it before deleting it",
             )
-        state = mark_goals(state, book.plan.goals, GoalState.WAITING, None)
+        state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None)
         state = replace(state, plans=without(state.plans, ask.plan))
         return answer(state, ask.request, True, f"plan {ask.plan} is deleted")
-    return _add_task(state, book, ask)
+    return _add_task(state, entry, ask)
 
 
-def _add_task(state: State, book: PlanBook, ask: ControlRequest) -> State:
-    if book.state not in (PlanState.READY, PlanState.RUNNING):
-        sentence = f"plan {ask.plan} is {book.state.value}; tasks go to ready or running plans"
+def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
+    if entry.state not in (PlanState.READY, PlanState.RUNNING):
+        sentence = f"plan {ask.plan} is {entry.state.value}; tasks go to ready or running plans"
         return answer(state, ask.request, False, sentence)
     if ask.skill is None:
         return answer(state, ask.request, False, "the request names no skill for the new task")
-    if book.amendment is not None or book.job is not None:
+    if entry.amendment is not None or entry.job is not None:
         sentence = f"plan {ask.plan} is being changed; add the task when that is done"
         return answer(state, ask.request, False, sentence)
     for before in ask.after:
-        if before not in book.records:
+        if before not in entry.records:
             sentence = (
                 f"the new task cannot wait for {before}: plan {ask.plan} has "
-                f"{', '.join(book.records) or 'no tasks'}"
+                f"{', '.join(entry.records) or 'no tasks'}"
             )
             return answer(state, ask.request, False, sentence)
     if "robot" in ask.args:
@@ -246,7 +246,7 @@ def _add_task(state: State, book: PlanBook, ask: ControlRequest) -> State:
             f"name the robot that does it as the request's robot, not as robot={ask.args['robot']}"
         )
         return answer(state, ask.request, False, sentence)
-    number = next_task(book)
+    number = next_task(entry)
     task = Task(
         task=f"t{number}",
         skill=ask.skill,
@@ -254,12 +254,12 @@ def _add_task(state: State, book: PlanBook, ask: ControlRequest) -> State:
         actor=f"x{number}",
         after=ask.after,
     )
-    pins = put(book.plan.pins, task.actor, ask.robot) if ask.robot else book.plan.pins
-    book = replace(
-        book,
-        plan=replace(book.plan, pins=pins),
+    pins = put(entry.plan.pins, task.actor, ask.robot) if ask.robot else entry.plan.pins
+    entry = replace(
+        entry,
+        plan=replace(entry.plan, pins=pins),
         amendment=task,
         amendment_request=ask.request,
         replan_reason=f"task {task.task} is added",
     )
-    return set_book(state, book)
+    return set_entry(state, entry)

@@ -14,6 +14,7 @@ from math import isfinite, sqrt
 from msgspec.structs import replace
 
 from fleet.core.model.skills import SkillModel
+from keyexpr_schema.facts import AT, FactKey, Literal
 from keyexpr_schema.payloads.durations import Durations, Estimate
 
 FULL_ATTEMPTS = 20.0
@@ -88,6 +89,6 @@ def _observed(old: Estimate, value: float, weight: float, full: float) -> Estima
 
 def _only_moves(skill: SkillModel) -> bool:
     return skill.travel_to is not None and all(
-        (relation, subject, value) == ("at", skill.actor_parameter, skill.travel_to)
-        for relation, subject, value in skill.after
+        literal == Literal(FactKey(AT, skill.actor_parameter), skill.travel_to)
+        for literal in skill.after
     )

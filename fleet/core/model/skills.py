@@ -9,27 +9,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 from fleet.errors import BadSkillFile
-from keyexpr_schema.payloads.world import Value
-
-
-class Variable(NamedTuple):
-    """One state variable, written `relation(subject)`; the subject may be an actor (`?a1`)."""
-
-    relation: str
-    subject: str
-
-    def __str__(self) -> str:
-        return f"{self.relation}({self.subject})"
-
-
-class Literal(NamedTuple):
-    """`variable = value`."""
-
-    variable: Variable
-    value: Value
-
-    def __str__(self) -> str:
-        return f"{self.variable} = {'unknown' if self.value is None else self.value}"
+from keyexpr_schema.facts import FactKey, Literal, parse_literal
 
 
 class Need(NamedTuple):
@@ -69,7 +49,7 @@ class Action:
         return self.args[self.skill.actor_parameter]
 
     @cached_property
-    def variables(self) -> frozenset[Variable]:
+    def variables(self) -> frozenset[FactKey]:
         """Every state variable that it reads or writes."""
         return frozenset(literal.variable for literal in (*self.before, *self.after))
 
@@ -87,8 +67,9 @@ class SkillModel:
     about: str
     parameters: Mapping[str, str]
     needs: Mapping[str, tuple[Need, ...]]
-    before: tuple[tuple[str, str, str | Value], ...]
-    after: tuple[tuple[str, str, str | Value], ...]
+    before: tuple[Literal, ...]
+    after: tuple[Literal, ...]
+    """With parameters for subjects; a value may be a parameter, too."""
     space_in: tuple[str, ...]
     duration_s: float
     travel_to: str | None
@@ -110,13 +91,13 @@ class SkillModel:
             KeyError: an argument is missing.
         """
 
-        def fill(rows: Iterable[tuple[str, str, str | Value]]) -> tuple[Literal, ...]:
+        def fill(rows: Iterable[Literal]) -> tuple[Literal, ...]:
             return tuple(
                 Literal(
-                    Variable(relation, args[subject]),
+                    FactKey(relation, args[subject]),
                     args[value] if isinstance(value, str) and value in self.parameters else value,
                 )
-                for relation, subject, value in rows
+                for (relation, subject), value in rows
             )
 
         return Action(
@@ -128,7 +109,6 @@ class SkillModel:
         )
 
 
-_CONDITION = re.compile(r"^\s*(\w+)\(\s*(\w+)\s*\)\s*=\s*([\w.+-]+)\s*$")
 _SPACE = re.compile(rf"^\s*{SPACE}\(\s*(\w+)\s*\)\s*$")
 _NEED = re.compile(r"^\s*(\w+)(?:\s*>=\s*(\w+)\(\s*(\w+)\s*\))?\s*$")
 _FIELDS = frozenset({"about", "parameters", "needs", "before", "after", "duration_s", "travel_to"})
@@ -200,30 +180,16 @@ def _list_of_text(value: Any, where: str) -> list[str]:
     return value
 
 
-def _condition(
-    text: str, parameters: Mapping[str, str], where: str
-) -> tuple[str, str, str | Value]:
-    match = _CONDITION.match(text)
-    if match is None:
+def _condition(text: str, parameters: Mapping[str, str], where: str) -> Literal:
+    literal = parse_literal(text)
+    if literal is None:
         raise BadSkillFile(f"{where}: {text!r} must look like `at(robot) = place`")
-    relation, subject, value = match.groups()
-    if subject not in parameters:
+    if (subject := literal.variable.subject) not in parameters:
         raise BadSkillFile(
             f"{where}: {text!r} speaks of {subject!r}, which is not a parameter; "
             f"those are {', '.join(parameters)}"
         )
-    return relation, subject, value if value in parameters else parse_value(value)
-
-
-def parse_value(text: str) -> Value:
-    """`true`, `false`, `unknown` and numbers as such; anything else is a word."""
-    named: dict[str, Value] = {"true": True, "false": False, "unknown": None}
-    if text in named:
-        return named[text]
-    try:
-        return float(text) if "." in text else int(text)
-    except ValueError:
-        return text
+    return literal
 
 
 def _needs(data: Any, parameters: Mapping[str, str], where: str) -> dict[str, tuple[Need, ...]]:

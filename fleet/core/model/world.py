@@ -7,18 +7,16 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from fleet.core.model.durations import pace, work_s
-from fleet.core.model.skills import Action, Literal, SkillModel, Variable
+from fleet.core.model.skills import Action, SkillModel
+from keyexpr_schema.facts import AT, HELD, HOLDING, LOCATED, NOTHING, FactKey, Literal, Value
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.robots import RobotSpec
-from keyexpr_schema.payloads.world import NOTHING, Fact, Object, Place, Value
+from keyexpr_schema.payloads.world import Fact, Object, Place
 
 TRAVEL_SPEED_M_S = 0.5
 """Speed assumed for a robot whose spec gives none, m/s; a slow walk indoors."""
 UNITS = {"mass": "kg", "height": "m"}
-LOCATED = "located"
-HELD = "held"
-"""Relations of goal conditions that are derived from `at` and `holding`."""
 UNKNOWN_TRAVEL_M = 5.0
 """Distance assumed where the map has none, m; about one room to the next."""
 
@@ -36,7 +34,7 @@ class WorldModel:
     objects: Mapping[str, Object] = field(default_factory=dict)
     robots: Mapping[str, RobotSpec] = field(default_factory=dict)
     available: frozenset[str] = frozenset()
-    facts: Mapping[Variable, Value] = field(default_factory=dict)
+    facts: Mapping[FactKey, Value] = field(default_factory=dict)
     durations: Mapping[str, Durations] = field(default_factory=dict)
 
     @classmethod
@@ -58,13 +56,13 @@ class WorldModel:
             objects={thing.object: thing for thing in objects},
             robots=specs,
             available=frozenset(specs if available is None else available),
-            facts={Variable(fact.relation, fact.subject): fact.value for fact in facts},
+            facts={fact.key: fact.value for fact in facts},
             durations=durations or {},
         )
 
     def value(self, relation: str, subject: str) -> Value:
         """The believed value of a variable; `None` is unknown."""
-        return self.facts.get(Variable(relation, subject))
+        return self.facts.get(FactKey(relation, subject))
 
     def kind_of(self, name: str) -> str | None:
         """`robot`, `object` or `place`, or `None` for a name that stands for nothing."""
@@ -139,7 +137,7 @@ class WorldModel:
         """Whether the facts say that the condition holds."""
         return condition_holds(self.facts, condition)
 
-    def with_facts(self, facts: Mapping[Variable, Value]) -> WorldModel:
+    def with_facts(self, facts: Mapping[FactKey, Value]) -> WorldModel:
         """The same world with some facts changed."""
         return WorldModel(
             self.skills,
@@ -152,7 +150,7 @@ class WorldModel:
         )
 
 
-def condition_holds(facts: Mapping[Variable, Value], condition: Condition) -> bool:
+def condition_holds(facts: Mapping[FactKey, Value], condition: Condition) -> bool:
     """Whether a condition holds in `facts`.
 
     `at(object) = place` also holds while the object lies in the basket of a robot that is there:
@@ -165,36 +163,36 @@ def condition_holds(facts: Mapping[Variable, Value], condition: Condition) -> bo
     )
 
 
-def _holds_for(facts: Mapping[Variable, Value], relation: str, subject: str, wanted: Value) -> bool:
-    where = facts.get(Variable("at", subject))
+def _holds_for(facts: Mapping[FactKey, Value], relation: str, subject: str, wanted: Value) -> bool:
+    where = facts.get(FactKey(AT, subject))
     if relation == LOCATED:
         return (where is not None) is wanted
     if relation == HELD:
-        held = isinstance(where, str) and facts.get(Variable("holding", where)) == subject
+        held = isinstance(where, str) and facts.get(FactKey(HOLDING, where)) == subject
         return held is wanted
-    value = facts.get(Variable(relation, subject))
+    value = facts.get(FactKey(relation, subject))
     if value is None:
         return False
     if value == wanted:
         return True
     return (
-        relation == "at"
+        relation == AT
         and isinstance(value, str)
-        and facts.get(Variable("at", value)) == wanted
-        and facts.get(Variable("holding", value), NOTHING) != subject
+        and facts.get(FactKey(AT, value)) == wanted
+        and facts.get(FactKey(HOLDING, value), NOTHING) != subject
     )
 
 
-def known_value(variable: Variable, facts: Mapping[Variable, Value], world: WorldModel) -> Value:
+def known_value(variable: FactKey, facts: Mapping[FactKey, Value], world: WorldModel) -> Value:
     """The value of a variable in `facts`; the hand of a robot that has none holds nothing."""
     value = facts.get(variable)
-    if value is None and variable.relation == "holding" and variable.subject in world.robots:
+    if value is None and variable.relation == HOLDING and variable.subject in world.robots:
         return None if world.capability(variable.subject, "grip") else NOTHING
     return value
 
 
 def first_unmet(
-    action: Action, facts: Mapping[Variable, Value], world: WorldModel
+    action: Action, facts: Mapping[FactKey, Value], world: WorldModel
 ) -> Literal | None:
     """The first precondition of the action that does not hold in `facts`; baskets aside."""
     for literal in action.before:
@@ -203,7 +201,7 @@ def first_unmet(
     return None
 
 
-def room_left(robot: str, facts: Mapping[Variable, Value], world: WorldModel) -> int:
+def room_left(robot: str, facts: Mapping[FactKey, Value], world: WorldModel) -> int:
     """How many more objects go into a robot's basket."""
     return capacity(robot, world) - len(in_basket(robot, facts, world))
 
@@ -213,11 +211,10 @@ def capacity(robot: str, world: WorldModel) -> int:
     return int(world.capability(robot, "basket") or 0)
 
 
-def in_basket(robot: str, facts: Mapping[Variable, Value], world: WorldModel) -> list[str]:
+def in_basket(robot: str, facts: Mapping[FactKey, Value], world: WorldModel) -> list[str]:
     """The objects in a robot's basket: at the robot, and not in its hand."""
     return [
         thing
         for thing in world.objects
-        if facts.get(Variable("at", thing)) == robot
-        and facts.get(Variable("holding", robot)) != thing
+        if facts.get(FactKey(AT, thing)) == robot and facts.get(FactKey(HOLDING, robot)) != thing
     ]

@@ -18,7 +18,7 @@ from fleet.core import events
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
-from fleet.core.state import OUTSTANDING, PlanBook
+from fleet.core.state import OUTSTANDING, PlanEntry
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.payloads.plans import Plan, PlanChange, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -38,14 +38,14 @@ class Revision:
 
 
 def revise(
-    book: PlanBook, event: events.PlanningSucceeded, world: WorldModel, started: frozenset[str]
+    entry: PlanEntry, event: events.PlanningSucceeded, world: WorldModel, started: frozenset[str]
 ) -> Revision:
     """Take over the plan in `event`; `started` were under way when it was being made."""
     calls = {task.task: _call(task, event.allocation) for task in event.plan.tasks}
-    going_on, skipped = _going_on(book, event, calls, world, started)
-    names = {**_same_waiting(book, calls, going_on), **going_on}
+    going_on, skipped = _going_on(entry, event, calls, world, started)
+    names = {**_same_waiting(entry, calls, going_on), **going_on}
     plan = _renamed(event.plan, names)
-    records = dict(book.records)
+    records = dict(entry.records)
     for old, task in zip(event.plan.tasks, plan.tasks, strict=True):
         records[task.task] = _record(
             plan, task, calls[old.task], records.get(task.task), event, old.task, names
@@ -57,7 +57,7 @@ def revise(
     wanted = {task.task for task in plan.tasks}
     dropping: list[str] = []
     dropped = 0
-    for name, record in book.records.items():
+    for name, record in entry.records.items():
         if name in wanted:
             continue
         if record.state in OUTSTANDING:
@@ -88,7 +88,7 @@ def _call_of(record: TaskRecord) -> Call:
 
 
 def _going_on(
-    book: PlanBook,
+    entry: PlanEntry,
     event: events.PlanningSucceeded,
     calls: Mapping[str, Call],
     world: WorldModel,
@@ -107,7 +107,7 @@ def _going_on(
     )
     under_way = {
         _call_of(record): name
-        for name, record in book.records.items()
+        for name, record in entry.records.items()
         if name in started and record.state in {*OUTSTANDING, TaskState.SUCCEEDED}
     }
     names: dict[str, str] = {}
@@ -132,10 +132,10 @@ def _holds_already(call: Call, world: WorldModel) -> bool:
 
 
 def _same_waiting(
-    book: PlanBook, calls: Mapping[str, Call], going_on: Mapping[str, str]
+    entry: PlanEntry, calls: Mapping[str, Call], going_on: Mapping[str, str]
 ) -> dict[str, str]:
     waiting: dict[Call, list[str]] = {}
-    for name, record in book.records.items():
+    for name, record in entry.records.items():
         if record.state is TaskState.WAITING:
             waiting.setdefault(_call_of(record), []).append(name)
     names: dict[str, str] = {}

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.plan_entry import next_task
-from fleet.core.state import OUTSTANDING, PlanBook
+from fleet.core.state import OUTSTANDING, PlanEntry
 from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
 
@@ -16,7 +16,7 @@ HAD_ROBOT = OUTSTANDING | {TaskState.SUCCEEDED}
 
 
 def remaining_plan(
-    book: PlanBook, revision: int, gone: Set[str] = frozenset(), addition: Task | None = None
+    entry: PlanEntry, revision: int, gone: Set[str] = frozenset(), addition: Task | None = None
 ) -> Plan:
     """The tasks that have not ended and are for goals that the plan still has, under new names, and
     `addition` under its own.
@@ -24,18 +24,18 @@ def remaining_plan(
     Actors whose robot is `gone` begin anew, with everything that they had done. The others stay
     with their robot once they have begun. Whether that is still a plan, the checker has to say.
     """
-    anew = {actor for actor, robot in book.allocation.items() if robot in gone}
+    anew = {actor for actor, robot in entry.allocation.items() if robot in gone}
     todo = [
         task
-        for task in book.plan.tasks
-        if (task.goal is None or task.goal in book.plan.goals)
+        for task in entry.plan.tasks
+        if (task.goal is None or task.goal in entry.plan.goals)
         and (
             task.actor in anew
-            or task.task not in book.records
-            or book.records[task.task].state not in ENDED_TASKS
+            or task.task not in entry.records
+            or entry.records[task.task].state not in ENDED_TASKS
         )
     ]
-    first = next_task(book) + (addition is not None)
+    first = next_task(entry) + (addition is not None)
     names = {task.task: f"t{first + number}" for number, task in enumerate(todo)}
     if addition is not None:
         todo.append(addition)
@@ -49,25 +49,25 @@ def remaining_plan(
         for task in todo
     )
     actors = {task.actor for task in tasks}
-    begun = {actor: robot for actor, robot in begun_actors(book, gone).items() if actor in actors}
-    return replace(book.plan, revision=revision, tasks=tasks, pins={**begun, **book.plan.pins})
+    begun = {actor: robot for actor, robot in begun_actors(entry, gone).items() if actor in actors}
+    return replace(entry.plan, revision=revision, tasks=tasks, pins={**begun, **entry.plan.pins})
 
 
-def begun_actors(book: PlanBook, gone: Set[str] = frozenset()) -> dict[str, str]:
+def begun_actors(entry: PlanEntry, gone: Set[str] = frozenset()) -> dict[str, str]:
     """The actors of the plan that robots, other than those `gone`, have begun to be."""
     return {
         record.actor: record.robot
-        for record in book.records.values()
+        for record in entry.records.values()
         if record.state in HAD_ROBOT
         and record.robot is not None
         and record.robot not in gone
-        and book.allocation.get(record.actor) == record.robot
+        and entry.allocation.get(record.actor) == record.robot
     }
 
 
-def actors_in_order(book: PlanBook) -> tuple[str, ...]:
+def actors_in_order(entry: PlanEntry) -> tuple[str, ...]:
     """The plan's actors by when their first task would start, if all went as predicted."""
-    current = {record.task: record for record in book.current()}
+    current = {record.task: record for record in entry.current()}
     graph = TaskGraph({task: {*r.after, *r.behind} & current.keys() for task, r in current.items()})
     start_s: dict[str, float] = {}
     spans = graph.earliest({task: record.duration_s for task, record in current.items()})

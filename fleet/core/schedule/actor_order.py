@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from fleet.core.checker.plan_checker import CheckedPlan
+from keyexpr_schema.facts import AT, Value
 from keyexpr_schema.ids import ACTOR_PREFIX
-from keyexpr_schema.payloads.world import Value
 
 
 def carried_at_end(checked: CheckedPlan) -> dict[str, str]:
@@ -15,7 +15,7 @@ def carried_at_end(checked: CheckedPlan) -> dict[str, str]:
     holder: dict[str, Value] = {}
     for task in checked.graph.order if checked.graph else ():
         for literal in checked.actions[task].after:
-            if literal.variable.relation == "at":
+            if literal.variable.relation == AT:
                 holder[literal.variable.subject] = literal.value
     return {
         thing: value.removeprefix(ACTOR_PREFIX)

@@ -10,14 +10,14 @@ from math import inf
 from typing import TypeVar
 
 from fleet.core.checker.plan_checker import CheckedPlan, check_plan
-from fleet.core.model.skills import Action, Variable
+from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import Cycle, TaskGraph
 from fleet.core.model.world import WorldModel
 from fleet.core.schedule.actor_order import first_actors
 from fleet.core.schedule.timetable import Timetable
+from keyexpr_schema.facts import AT, FactKey, Value
 from keyexpr_schema.ids import ACTOR_PREFIX
 from keyexpr_schema.payloads.plans import Plan, Violation
-from keyexpr_schema.payloads.world import Value
 
 T = TypeVar("T")
 
@@ -241,7 +241,7 @@ def _earliest(
     world: WorldModel,
     ready_s: Mapping[str, float],
 ) -> tuple[dict[str, float], dict[str, float]]:
-    where: dict[str, Value] = {robot: world.value("at", robot) for robot in world.robots}
+    where: dict[str, Value] = {robot: world.value(AT, robot) for robot in world.robots}
     start_s: dict[str, float] = {}
     end_s: dict[str, float] = {}
     for task in graph.order:
@@ -253,7 +253,7 @@ def _earliest(
         start_s[task] = start
         end_s[task] = start + predicted_duration_s(action, where.get(robot), robot, world)
         for variable, value in action.after:
-            if variable == Variable("at", action.actor):
+            if variable == FactKey(AT, action.actor):
                 where[robot] = value
     return start_s, end_s
 

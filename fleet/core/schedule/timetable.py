@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from fleet.core.model.skills import Action, Variable
+from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
+from keyexpr_schema.facts import AT, FactKey, Value
 from keyexpr_schema.ids import ACTOR_PREFIX
-from keyexpr_schema.payloads.world import Value
 
 
 class Timetable:
@@ -29,7 +29,7 @@ class Timetable:
     ) -> None:
         self._world = world
         self._allocation = allocation
-        self._start_places: dict[str, Value] = {r: world.value("at", r) for r in world.robots}
+        self._start_places: dict[str, Value] = {r: world.value(AT, r) for r in world.robots}
         self._travels: dict[tuple[str, Value, str], float] = {}
         number = {task: i for i, task in enumerate(graph.order)}
         self._before = [[number[b] for b in graph.predecessors[task]] for task in graph.order]
@@ -55,7 +55,7 @@ class Timetable:
             if name.startswith(ACTOR_PREFIX)
             else name
         )
-        moved = [value for variable, value in action.after if variable == Variable("at", name)]
+        moved = [value for variable, value in action.after if variable == FactKey(AT, name)]
         target = None if skill.travel_to is None else action.args[skill.travel_to]
         seconds = self._world.work_s(robot, skill)
         return robot, seconds, target, bool(moved), moved[-1] if moved else None

@@ -1,28 +1,23 @@
-"""Goal sentences that the grammar does not take, read by a language model."""
+"""Goal sentences that the grammar does not take, turned into conditions by a language model."""
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fleet.core.model.skills import SkillModel
 from fleet.language import Vocabulary
-from fleet.llm.client import ModelCaller
-from fleet.llm.configuration import LlmConfig
-from fleet.llm.conversation import Conversation, GivenUp, Ledger, Rejected
-from fleet.llm.prompts import load_prompts
+from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
 from fleet.llm.quoting import cleaned
-from fleet.planners.llm.answers import Answer, read_answer, schema_of
+from fleet.llm.structured_output import Answer, read_answer, schema_of
 from fleet.planners.llm.prompt_text import vocabulary_text
+from keyexpr_schema.facts import HELD, LOCATED
 from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Violation
 
-log = logging.getLogger(__name__)
-
 MAX_CONDITIONS = 100
-DERIVED = {"located": "it is known where the object is", "held": "a hand holds the object"}
+DERIVED = {LOCATED: "it is known where the object is", HELD: "a hand holds the object"}
 """Relations that follow from others; `keyexpr_schema.payloads.goals.Condition` says how."""
 
 Stages = tuple[tuple[Condition, ...], ...]
@@ -45,82 +40,59 @@ class GoalAnswer(Answer, frozen=True):
 
 
 @dataclass(frozen=True)
-class _Relation:
-    """What a relation takes: pairs of a subject's kind and a value's kind or the value itself."""
+class _Signature:
+    """What a relation takes: pairs of the subject's type, and the value's type or the value."""
 
-    rows: frozenset[tuple[str, str | bool]]
+    types: frozenset[tuple[str, str | bool]]
 
-    def told(self, name: str) -> str:
+    def text(self, relation: str) -> str:
         """The relation as a line of the prompt."""
         forms = " or ".join(
-            f"{name}({subject}) = {str(value).lower() if value is True else value}"
-            for subject, value in sorted(self.rows, key=str)
+            f"{relation}({subject}) = {str(value).lower() if value is True else value}"
+            for subject, value in sorted(self.types, key=str)
         )
-        about = DERIVED.get(name)
+        about = DERIVED.get(relation)
         return f"- {forms}" + (f": {about}" if about else "")
 
 
 class LlmInterpreter:
     """Turns a sentence into stages of conditions; asks within the budget of one plan."""
 
-    def __init__(
-        self,
-        config: LlmConfig,
-        skills: Mapping[str, SkillModel],
-        caller: ModelCaller | None = None,
-    ) -> None:
-        """`skills` say which relations there are; `caller` can be shared with a planner.
-
-        Raises:
-            BadLlmConfig: the prompts that the configuration asks for cannot be used.
-        """
-        self._config = config
-        self._prompts = load_prompts(config)
-        self._relations = _relations(skills)
-        self._caller = caller or ModelCaller()
-        self._conversation = Conversation(config, self._prompts, self._caller)
+    def __init__(self, model: LanguageModel, skills: Mapping[str, SkillModel]) -> None:
+        """`skills` say which relations there are."""
+        self._model = model
+        self._signatures = _signatures(skills)
 
     @property
     def configured(self) -> bool:
         """Whether there is a model to ask."""
-        return self._config.not_configured is None
+        return self._model.configured
 
-    def close(self) -> None:
-        """Stop asking: a call that is under way ends at once, and says so."""
-        self._caller.close()
-
-    def interpret(self, text: str, vocabulary: Vocabulary) -> Stages | str:
+    def interpret(self, sentence: str, vocabulary: Vocabulary) -> Stages | str:
         """What must hold, stage by stage, or a sentence that says why that is not known.
 
         Every name in the result exists, and fits its relation. Blocks, and never raises.
         """
-        if told := self._config.not_configured:
-            return told
 
-        def read(said: str) -> Stages | str | Rejected:
-            return self._read(said, vocabulary)
+        def read(text: str) -> Stages | str | Rejected:
+            return self._read(text, vocabulary)
 
-        try:
-            made: Stages | str | GivenUp = self._conversation.ask(
-                system=self._prompts.fill("interpret-system"),
-                question=self._prompts.fill(
-                    "interpret",
-                    relations="\n".join(row.told(name) for name, row in self._relations.items()),
-                    problem=vocabulary_text(text, vocabulary),
-                    form=_FORM,
-                ),
-                repair="interpret-repair",
-                schema=schema_of(GoalAnswer),
-                read=read,
-                ledger=Ledger(self._config),
-            )
-        except Exception as error:
-            log.exception("interpreting a goal by language model")
-            return f"reading the answer failed: {error or type(error).__name__}"
+        made: Stages | str | GivenUp = self._model.ask(
+            system="interpret-system",
+            question="interpret",
+            correction="interpret-repair",
+            values={
+                "relations": "\n".join(s.text(name) for name, s in self._signatures.items()),
+                "problem": vocabulary_text(sentence, vocabulary),
+                "form": _FORM,
+            },
+            schema=schema_of(GoalAnswer),
+            read=read,
+        )
         return made.reason if isinstance(made, GivenUp) else made
 
-    def _read(self, said: str, words: Vocabulary) -> Stages | str | Rejected:
-        answer = read_answer(said, GoalAnswer)
+    def _read(self, text: str, vocabulary: Vocabulary) -> Stages | str | Rejected:
+        answer = read_answer(text, GoalAnswer)
         if isinstance(answer, str):
             return Rejected.because("malformed", answer)
         if not answer.stages:
@@ -130,48 +102,52 @@ class LlmInterpreter:
         if len(rows) > MAX_CONDITIONS or not all(answer.stages):
             sentence = f"every stage needs a condition, and all together at most {MAX_CONDITIONS}"
             return Rejected.because("malformed", sentence)
-        violations = [v for row in rows for v in self._wrong(row, words)]
+        violations = [v for row in rows for v in self._type_errors(row, vocabulary)]
         for number, stage in enumerate(answer.stages, 1):
             violations += _contradictions(number, stage)
         if violations:
             return Rejected(tuple(violations))
         return tuple(tuple(_condition(row) for row in stage) for stage in answer.stages)
 
-    def _wrong(self, row: ConditionAnswer, words: Vocabulary) -> list[Violation]:
-        relation = self._relations.get(row.relation)
-        if relation is None:
-            known = ", ".join(self._relations)
+    def _type_errors(self, row: ConditionAnswer, vocabulary: Vocabulary) -> list[Violation]:
+        signature = self._signatures.get(row.relation)
+        if signature is None:
+            known = ", ".join(self._signatures)
             sentence = f"there is no relation {row.relation}; there are {known}"
             return [Violation(code="unknown-name", sentence=sentence)]
         found: list[Violation] = []
         for subject in dict.fromkeys((row.subject, *row.any_of)):
-            if (kind := _kind(subject, words)) is None:
-                names = ", ".join([*words.objects, *words.places, *words.robots]) or "none"
+            if (kind := _type_of(subject, vocabulary)) is None:
+                names = (
+                    ", ".join([*vocabulary.objects, *vocabulary.places, *vocabulary.robots])
+                    or "none"
+                )
                 sentence = f"{subject} is not a known name; known are {names}"
                 found.append(Violation(code="unknown-name", sentence=sentence))
             elif not any(
-                kind == wanted
-                and (row.value is value or row.value == value or _fits(row.value, value, words))
-                for wanted, value in relation.rows
+                kind == subject_type and _fits(row.value, value_type, vocabulary)
+                for subject_type, value_type in signature.types
             ):
                 sentence = (
                     f"{row.relation}({subject}) = {row.value} does not fit: {subject} is a {kind}, "
-                    f"and the relation is {relation.told(row.relation).removeprefix('- ')}"
+                    f"and the relation is {signature.text(row.relation).removeprefix('- ')}"
                 )
                 found.append(Violation(code="wrong-type", sentence=sentence))
         return found
 
 
-def _fits(value: str | bool, kind: str | bool, words: Vocabulary) -> bool:
-    return isinstance(value, str) and kind is not True and _kind(value, words) == kind
+def _fits(value: str | bool, wanted: str | bool, vocabulary: Vocabulary) -> bool:
+    if wanted in ("object", "place", "robot"):
+        return isinstance(value, str) and _type_of(value, vocabulary) == wanted
+    return value == wanted
 
 
-def _kind(name: str, words: Vocabulary) -> str | None:
-    if name in words.robots:
+def _type_of(name: str, vocabulary: Vocabulary) -> str | None:
+    if name in vocabulary.robots:
         return "robot"
-    if name in words.objects:
+    if name in vocabulary.objects:
         return "object"
-    return "place" if name in words.places else None
+    return "place" if name in vocabulary.places else None
 
 
 def _condition(row: ConditionAnswer) -> Condition:
@@ -193,21 +169,21 @@ def _contradictions(number: int, stage: tuple[ConditionAnswer, ...]) -> list[Vio
     return found
 
 
-def _relations(skills: Mapping[str, SkillModel]) -> dict[str, _Relation]:
-    rows: dict[str, set[tuple[str, str | bool]]] = {}
+def _signatures(skills: Mapping[str, SkillModel]) -> dict[str, _Signature]:
+    types: dict[str, set[tuple[str, str | bool]]] = {}
     for skill in skills.values():
-        for relation, subject, value in skill.after:
+        for (relation, subject), value in skill.after:
             if isinstance(value, str):
                 # `holding = nothing` is a word; `at = to` a parameter of some type.
-                shown: str | bool = skill.parameters.get(value, value)
+                type_or_value: str | bool = skill.parameters.get(value, value)
             elif value is True:
-                shown = True
+                type_or_value = True
             else:
                 continue
-            rows.setdefault(relation, set()).add((skill.parameters[subject], shown))
+            types.setdefault(relation, set()).add((skill.parameters[subject], type_or_value))
     for relation in DERIVED:
-        rows[relation] = {("object", True)}
-    return {name: _Relation(frozenset(rows[name])) for name in sorted(rows)}
+        types[relation] = {("object", True)}
+    return {name: _Signature(frozenset(types[name])) for name in sorted(types)}
 
 
 _FORM = """{"stages": [[{"relation": "RELATION", "subject": "NAME", "value": "NAME", \

@@ -9,20 +9,20 @@ from fleet.core.model.skills import SPACE, SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.language import Vocabulary
 from fleet.llm.quoting import fenced
+from keyexpr_schema.facts import AT, Literal
 from keyexpr_schema.payloads.goals import Condition, Goal
-from keyexpr_schema.payloads.world import Value
 
 
 def skills_text(skills: Iterable[SkillModel]) -> str:
     """The skills, one a line: parameters, what they need, what must hold before and holds after."""
-    return "\n".join(_skill(skill) for skill in skills)
+    return "\n".join(_skill_text(skill) for skill in skills)
 
 
-def _skill(skill: SkillModel) -> str:
+def _skill_text(skill: SkillModel) -> str:
     parameters = ", ".join(f"{name}: {kind}" for name, kind in skill.parameters.items())
-    before = [_literal(*row) for row in skill.before]
+    before = [str(row) for row in skill.before]
     before += [f"{SPACE}({carrier})" for carrier in skill.space_in]
-    parts = [f"- {skill.name}({parameters}): {skill.about}".rstrip(": ")]
+    sentences = [f"- {skill.name}({parameters}): {skill.about}".rstrip(": ")]
     needs = [
         f"{parameter} has {need.capability}"
         + (f" >= {need.measure}({need.of})" if need.measure else "")
@@ -30,21 +30,13 @@ def _skill(skill: SkillModel) -> str:
         for need in rows
     ]
     if needs:
-        parts.append(f"Needs: {', '.join(needs)}.")
-    parts.append(f"Before: {', '.join(before) or 'nothing'}.")
-    parts.append(f"After: {', '.join(_literal(*row) for row in skill.after) or 'nothing'}.")
-    return " ".join(parts)
+        sentences.append(f"Needs: {', '.join(needs)}.")
+    sentences.append(f"Before: {', '.join(before) or 'nothing'}.")
+    sentences.append(f"After: {', '.join(map(str, skill.after)) or 'nothing'}.")
+    return " ".join(sentences)
 
 
-def _literal(relation: str, subject: str, value: Value) -> str:
-    return f"{relation}({subject}) = {_value(value)}"
-
-
-def _value(value: Value) -> str:
-    return "unknown" if value is None else str(value).lower() if value is True else str(value)
-
-
-def useful_skills(world: WorldModel) -> list[SkillModel]:
+def team_skills(world: WorldModel) -> list[SkillModel]:
     """The skills that some connected robot has."""
     names = {name for robot in world.team for name in world.robots[robot].skills}
     return [skill for skill in world.skills.values() if skill.name in names]
@@ -65,13 +57,13 @@ def problem_text(world: WorldModel, goals: Iterable[Goal], keep: Iterable[Condit
         for name in world.team
     ]
     objects = [
-        {**_object(thing.label, thing.aliases), "object": name, "mass_kg": thing.mass_kg}
+        {**_names(thing.label, thing.aliases), "object": name, "mass_kg": thing.mass_kg}
         for name, thing in world.objects.items()
     ]
     facts = [
-        f"{variable} = {_value(value)}"
+        str(Literal(variable, value))
         for variable, value in world.facts.items()
-        if not (variable.relation == "at" and variable.subject in world.robots)
+        if not (variable.relation == AT and variable.subject in world.robots)
     ]
     wanted = [
         {
@@ -82,7 +74,7 @@ def problem_text(world: WorldModel, goals: Iterable[Goal], keep: Iterable[Condit
         for goal in goals
     ]
     places = [
-        {**_object(place.label, place.aliases), "place": name}
+        {**_names(place.label, place.aliases), "place": name}
         for name, place in world.places.items()
     ]
     return fenced(
@@ -97,29 +89,31 @@ def problem_text(world: WorldModel, goals: Iterable[Goal], keep: Iterable[Condit
     )
 
 
-def vocabulary_text(text: str, words: Vocabulary) -> str:
+def vocabulary_text(text: str, vocabulary: Vocabulary) -> str:
     """A sentence and the names that it may use, fenced."""
     return fenced(
         {
             "places": [
-                {**_object(place.label, place.aliases), "place": name}
-                for name, place in words.places.items()
+                {**_names(place.label, place.aliases), "place": name}
+                for name, place in vocabulary.places.items()
             ],
             "objects": [
                 {
-                    **_object(thing.label, thing.aliases),
+                    **_names(thing.label, thing.aliases),
                     "object": name,
                     "kind": thing.kind,
                     "ordinal": thing.ordinal,
-                    "at": words.whereabouts.get(name, "unknown"),
+                    "at": vocabulary.whereabouts.get(name, "unknown"),
                 }
-                for name, thing in words.objects.items()
+                for name, thing in vocabulary.objects.items()
             ],
-            "robots": [{"robot": name, "label": spec.label} for name, spec in words.robots.items()],
+            "robots": [
+                {"robot": name, "label": spec.label} for name, spec in vocabulary.robots.items()
+            ],
             "sentence": text,
         }
     )
 
 
-def _object(label: str, aliases: tuple[str, ...]) -> dict[str, Any]:
+def _names(label: str, aliases: tuple[str, ...]) -> dict[str, Any]:
     return {"label": label, "aliases": list(aliases)} if aliases else {"label": label}

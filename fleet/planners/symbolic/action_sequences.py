@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
-from fleet.core.handlers.goals import SEARCHED
-from fleet.core.model.skills import Action, Variable
-from fleet.core.model.world import HELD, WorldModel
+from fleet.core.model.skills import Action
+from fleet.core.model.world import WorldModel
 from fleet.core.schedule.plan_schedule import predicted_duration_s
 from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import Strand
 from fleet.planners.symbolic.search import Facts, Found, cheapest, ground_actions, within_reach
+from keyexpr_schema.facts import AT, HELD, HOLDING, NOTHING, SEARCHED, FactKey, Value
 from keyexpr_schema.payloads.goals import Condition
-from keyexpr_schema.payloads.world import NOTHING, Value
 
 ALTERNATIVES = 4
 """Different strands sought for each condition."""
@@ -65,7 +64,7 @@ def aims_in_order(problem: PlanningProblem) -> list[Aim]:
     that leave an object in a hand.
     """
     world = problem.world
-    held = {world.value("holding", robot) for robot in world.team}
+    held = {world.value(HOLDING, robot) for robot in world.team}
     aims = [
         Aim(goal.goal, condition)
         for goal in sorted(problem.goals, key=lambda g: (-g.priority, g.ordinal, g.goal))
@@ -100,7 +99,7 @@ def options_for(
     strands: dict[object, Strand] = {}
     for result, condition in found:
         # What rides in a basket already rides with a certain robot.
-        rides_with = world.value("at", condition.subject)
+        rides_with = world.value(AT, condition.subject)
         spoken_of = (condition.subject, condition.value, rides_with)
         named = frozenset(robot for robot in world.robots if robot in spoken_of)
         content = tuple(_signature(action) for action in result.actions)
@@ -110,7 +109,7 @@ def options_for(
 
 def _unloading_s(found: Found, condition: Condition, world: WorldModel) -> float:
     """The charge for an object that ends in a basket."""
-    where = found.facts.get(Variable("at", condition.subject))
+    where = found.facts.get(FactKey(AT, condition.subject))
     wanted = where == condition.value or condition.relation == HELD
     return 0.0 if wanted or where not in world.robots else UNLOADING_S
 
@@ -123,18 +122,18 @@ def _different(
     robots = _representatives({subject, condition.value}, subject, facts, world)
     start: Facts = dict(facts)
     for robot in world.robots.keys() - settled:
-        start[Variable("at", robot)] = None
+        start[FactKey(AT, robot)] = None
     held = {
         value
         for robot in robots
-        if isinstance(value := facts.get(Variable("holding", robot)), str) and value != NOTHING
+        if isinstance(value := facts.get(FactKey(HOLDING, robot)), str) and value != NOTHING
     }
     objects = sorted(held | ({subject} & world.objects.keys()))
     results = _cheapest_few(condition, robots, objects, start, facts, world)
     if results or not _needs_a_tool(condition, world):
         return results
     # Something else may be needed for it, such as a tool.
-    known = [thing for thing in world.objects if facts.get(Variable("at", thing)) is not None]
+    known = [thing for thing in world.objects if facts.get(FactKey(AT, thing)) is not None]
     wider = sorted({*objects, *known[:MAX_OBJECTS]})
     return _cheapest_few(condition, robots, wider, start, facts, world)
 
@@ -145,7 +144,7 @@ def _needs_a_tool(condition: Condition, world: WorldModel) -> bool:
     return any(
         list(skill.parameters.values()).count("object") > own
         for skill in world.skills.values()
-        if any(row[0] == condition.relation for row in skill.after)
+        if any(row.variable.relation == condition.relation for row in skill.after)
     )
 
 
@@ -166,9 +165,9 @@ def _cheapest_few(
     seconds: dict[tuple[int, Value], float] = {}
     """By number of the action and where its robot comes from; charges change between searches."""
     numbers = {id(action): number for number, action in enumerate(actions)}
-    stands = [Variable("at", action.actor) for action in actions]
+    stands = [FactKey(AT, action.actor) for action in actions]
 
-    def cost_s(action: Action, now: Mapping[Variable, Value]) -> float:
+    def cost_s(action: Action, now: Mapping[FactKey, Value]) -> float:
         number = numbers[id(action)]
         where = now.get(stands[number]) or facts.get(stands[number])
         cost = seconds.get((number, where))
@@ -192,12 +191,12 @@ def _cheapest_few(
 
 def _with_true_cost(found: Found, world: WorldModel, facts: Facts) -> Found:
     """The same sequence with its true cost [s], without what was charged to make it different."""
-    where: dict[str, Value] = {robot: facts.get(Variable("at", robot)) for robot in world.robots}
+    where: dict[str, Value] = {robot: facts.get(FactKey(AT, robot)) for robot in world.robots}
     seconds = 0.0
     for action in found.actions:
         seconds += predicted_duration_s(action, where.get(action.actor), action.actor, world)
         for literal in action.after:
-            if literal.variable == Variable("at", action.actor):
+            if literal.variable == FactKey(AT, action.actor):
                 where[action.actor] = literal.value
     return Found(found.actions, seconds, found.facts)
 
@@ -214,8 +213,8 @@ def _representatives(named: Set[Value], subject: str, facts: Facts, world: World
         kind = (
             spec.skills,
             tuple(sorted(spec.capabilities.items())),
-            facts.get(Variable("holding", robot)),
-            robot if robot in named or facts.get(Variable("at", subject)) == robot else None,
+            facts.get(FactKey(HOLDING, robot)),
+            robot if robot in named or facts.get(FactKey(AT, subject)) == robot else None,
         )
         kinds.setdefault(kind, robot)
     return sorted(kinds.values())
@@ -232,7 +231,7 @@ def exploration_for(aims: Sequence[Aim], problem: PlanningProblem) -> Exploratio
             subject
             for aim in aims
             for subject in aim.condition.subjects
-            if subject in world.objects and world.value("at", subject) is None
+            if subject in world.objects and world.value(AT, subject) is None
         )
     )
     if not seeks:
@@ -243,7 +242,7 @@ def exploration_for(aims: Sequence[Aim], problem: PlanningProblem) -> Exploratio
     for place in world.places:
         if place in problem.searched:
             continue
-        facts[Variable(SEARCHED, place)] = False
+        facts[FactKey(SEARCHED, place)] = False
         condition = Condition(relation=SEARCHED, subject=place, value=True)
         options = options_for(Aim(aims[0].goal, condition), facts, world)
         if options is not None:

@@ -18,7 +18,6 @@ from collections.abc import Callable, Sequence
 from itertools import product
 
 from fleet.core.checker.plan_checker import check_plan
-from fleet.core.model.skills import Variable
 from fleet.core.model.world import WorldModel
 from fleet.core.schedule.actor_constraints import least_loaded
 from fleet.core.schedule.actor_order import carried_at_end
@@ -34,6 +33,7 @@ from fleet.planners.symbolic.action_sequences import (
     options_for,
 )
 from fleet.planners.symbolic.search import Facts
+from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.plans import Plan
 
 BIG_DAG, PER_GOAL, MONOLITHIC = "big-dag", "per-goal", "monolithic"
@@ -73,7 +73,7 @@ class SymbolicPlanner(Planner):
 
 def _where_is_unknown(aim: Aim, facts: Facts, world: WorldModel) -> bool:
     return any(
-        subject in world.objects and facts.get(Variable("at", subject)) is None
+        subject in world.objects and facts.get(FactKey(AT, subject)) is None
         for subject in aim.condition.subjects
     )
 

@@ -10,25 +10,23 @@ from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count, product
 
-from fleet.core.model.skills import Action, Literal, Variable
+from fleet.core.model.skills import Action
 from fleet.core.model.world import (
-    HELD,
-    LOCATED,
     WorldModel,
     condition_holds,
     first_unmet,
     known_value,
     room_left,
 )
+from keyexpr_schema.facts import AT, HELD, HOLDING, LOCATED, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
-from keyexpr_schema.payloads.world import Value
 
-DERIVED_FROM = {LOCATED: {"at"}, HELD: {"at", "holding"}}
+DERIVED_FROM = {LOCATED: {AT}, HELD: {AT, HOLDING}}
 """Relations that a derived one is read off."""
 MAX_EXPANSIONS = 30_000
 """States looked at before the search gives up."""
 
-Facts = dict[Variable, Value]
+Facts = dict[FactKey, Value]
 
 
 @dataclass(frozen=True)
@@ -87,12 +85,12 @@ def _related(world: WorldModel, goal: Condition) -> set[str]:
         more = {
             name
             for name, skill in world.skills.items()
-            if name not in related and wanted & {row[0] for row in skill.after}
+            if name not in related and wanted & {row.variable.relation for row in skill.after}
         }
         if not more:
             return related
         related |= more
-        wanted |= {row[0] for name in more for row in world.skills[name].before}
+        wanted |= {row.variable.relation for name in more for row in world.skills[name].before}
 
 
 def _serves(literal: Literal, goal: Condition, world: WorldModel) -> bool:
@@ -107,15 +105,15 @@ def _serves(literal: Literal, goal: Condition, world: WorldModel) -> bool:
     if literal.variable.relation == goal.relation and literal.variable.subject in subjects:
         return literal.value == goal.value or literal.value in world.robots
     return (
-        goal.relation == "at"
+        goal.relation == AT
         and not subjects.isdisjoint(world.objects)
         and (
             (
-                literal.variable.relation == "at"
+                literal.variable.relation == AT
                 and literal.variable.subject in world.robots
                 and literal.value == goal.value
             )
-            or (literal.variable.relation == "holding" and literal.value not in subjects)
+            or (literal.variable.relation == HOLDING and literal.value not in subjects)
         )
     )
 
@@ -127,7 +125,7 @@ def _making_room(action: Action, makers: Mapping[Literal, list[int]]) -> list[Li
     return [
         literal
         for literal in makers
-        if literal.variable.relation == "at"
+        if literal.variable.relation == AT
         and literal.value not in action.space_in
         and literal.variable.subject not in action.args.values()
     ]
@@ -142,7 +140,7 @@ def within_reach(
     what is out of reach then is so indeed, and a search would only find that out by looking at
     every state there is.
     """
-    true: dict[Variable, set[Value]] = {}
+    true: dict[FactKey, set[Value]] = {}
 
     def may_hold(literal: Literal) -> bool:
         if literal.variable not in true:
@@ -173,11 +171,11 @@ def within_reach(
 def _may_hold_for(
     subject: str, goal: Condition, may_hold: Callable[[Literal], bool], world: WorldModel
 ) -> bool:
-    if may_hold(Literal(Variable(goal.relation, subject), goal.value)):
+    if may_hold(Literal(FactKey(goal.relation, subject), goal.value)):
         return True
-    return goal.relation == "at" and any(
-        may_hold(Literal(Variable("at", subject), robot))
-        and may_hold(Literal(Variable("at", robot), goal.value))
+    return goal.relation == AT and any(
+        may_hold(Literal(FactKey(AT, subject), robot))
+        and may_hold(Literal(FactKey(AT, robot), goal.value))
         for robot in world.robots
     )
 
@@ -187,7 +185,7 @@ def cheapest(
     start: Facts,
     goal: Condition,
     world: WorldModel,
-    cost_s: Callable[[Action, Mapping[Variable, Value]], float],
+    cost_s: Callable[[Action, Mapping[FactKey, Value]], float],
 ) -> Found | None:
     """The cheapest sequence of `actions` from `start` to a state in which `goal` holds."""
     actions = tuple(actions)
@@ -239,7 +237,7 @@ def cheapest(
     return None
 
 
-def applicable(action: Action, facts: Mapping[Variable, Value], world: WorldModel) -> bool:
+def applicable(action: Action, facts: Mapping[FactKey, Value], world: WorldModel) -> bool:
     """Whether the action's preconditions hold in `facts`, room in baskets included."""
     return first_unmet(action, facts, world) is None and all(
         room_left(carrier, facts, world) > 0 for carrier in action.space_in

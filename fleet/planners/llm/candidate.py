@@ -1,0 +1,150 @@
+"""Candidate plans: from a model's answers to one deordered plan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from msgspec.structs import replace
+
+from fleet.core.model.skills import SkillModel
+from fleet.core.model.task_graph import TaskGraph
+from fleet.core.model.world import WorldModel
+from fleet.planners.base import PlanningProblem
+from fleet.planners.deordering import Strand, tasks_from
+from fleet.planners.llm.answers import GraphAnswer, ListAnswer, StepAnswer, TaskAnswer
+from keyexpr_schema.facts import FactKey, Value
+from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.payloads.goals import Condition, Goal
+from keyexpr_schema.payloads.plans import Plan, Task
+
+
+@dataclass(frozen=True)
+class CandidatePlan:
+    """Tasks as the model named them, and actors that must be certain robots.
+
+    Names are the model's own until the candidate has been checked, so that corrections can speak of
+    its tasks.
+    """
+
+    tasks: tuple[Task, ...]
+    pins: Mapping[str, str]
+
+
+def candidate_of(
+    answer: GraphAnswer | ListAnswer, world: WorldModel, goals: Sequence[Goal]
+) -> CandidatePlan:
+    """The tasks of an answer; those of a flat list wait for one another in its order."""
+    only = goals[0].goal if len(goals) == 1 else None
+    rows: Sequence[StepAnswer] = answer.tasks
+    tasks: list[Task] = []
+    for row in rows:
+        name = row.task if isinstance(row, TaskAnswer) else f"t{len(tasks) + 1}"
+        before = (tasks[-1].task,) if tasks else ()
+        skill = world.skills.get(row.skill)
+        tasks.append(
+            Task(
+                task=name,
+                skill=row.skill,
+                args=row.args,
+                actor=_actor_of(skill, row.args),
+                after=tuple(dict.fromkeys(row.after)) if isinstance(row, TaskAnswer) else before,
+                goal=row.goal if only is None else only,
+                duration_s=skill.duration_s if skill is not None else 0.0,
+            )
+        )
+    pins = {pin.actor.removeprefix(ACTOR_PREFIX): pin.robot for pin in answer.pins}
+    actors = {task.actor for task in tasks}
+    return CandidatePlan(tuple(tasks), {actor: pins[actor] for actor in pins if actor in actors})
+
+
+def _actor_of(skill: SkillModel | None, args: Mapping[str, str]) -> str:
+    """The actor that does a task with these arguments."""
+    value = args.get(skill.actor_parameter, "") if skill is not None else ""
+    return value.removeprefix(ACTOR_PREFIX) or "a1"
+
+
+def plan_of(
+    candidate: CandidatePlan,
+    problem: PlanningProblem,
+    goals: Sequence[Goal],
+    keep: Sequence[Condition] = (),
+) -> Plan:
+    """The candidate as a plan for these goals that leaves alone what `keep` says."""
+    return Plan(
+        plan=problem.plan,
+        revision=problem.revision,
+        goals=tuple(goal.goal for goal in goals),
+        conditions=tuple(dict.fromkeys([*conditions_of(goals), *keep])),
+        tasks=candidate.tasks,
+        pins=dict(candidate.pins),
+        strategy=problem.strategy,
+        made_by="llm",
+        allocator=problem.allocator,
+    )
+
+
+def conditions_of(goals: Sequence[Goal]) -> tuple[Condition, ...]:
+    """What must hold at the end, goal by goal."""
+    return tuple(condition for goal in goals for condition in goal.conditions)
+
+
+def merged(candidates: Sequence[CandidatePlan], problem: PlanningProblem, keep_order: bool) -> Plan:
+    """One plan of checked candidates, with names that are unique over the revisions of the plan.
+
+    Between candidates there is only the order that deordering leaves; within a candidate the
+    model's own order is kept, too, if `keep_order`.
+    """
+    world = problem.world
+    strands: list[Strand] = []
+    rows: list[Task] = []
+    for candidate in candidates:
+        graph = TaskGraph({task.task: task.after for task in candidate.tasks})
+        by_name = {task.task: task for task in candidate.tasks}
+        ordered = [by_name[name] for name in graph.order]
+        rows.extend(ordered)
+        robots = {ACTOR_PREFIX + actor: robot for actor, robot in candidate.pins.items()}
+        actions = tuple(
+            world.skills[task.skill].ground(
+                {name: robots.get(value, value) for name, value in task.args.items()}
+            )
+            for task in ordered
+        )
+        strands.append(Strand("", actions, frozenset(robots.values())))
+    tasks, pins = tasks_from(strands, problem.first_task)
+    if keep_order:
+        tasks = _with_model_order(tasks, rows, candidates)
+    tasks = tuple(replace(task, goal=row.goal) for task, row in zip(tasks, rows, strict=True))
+    return plan_of(CandidatePlan(tasks, pins), problem, problem.goals)
+
+
+def _with_model_order(
+    tasks: Sequence[Task], rows: Sequence[Task], candidates: Sequence[CandidatePlan]
+) -> tuple[Task, ...]:
+    """The tasks with the model's order added, in the fewest edges."""
+    start = 0
+    after: dict[str, set[str]] = {task.task: set(task.after) for task in tasks}
+    for candidate in candidates:
+        here = slice(start, start + len(candidate.tasks))
+        start = here.stop
+        names = {row.task: task.task for row, task in zip(rows[here], tasks[here], strict=True)}
+        for task in candidate.tasks:
+            after[names[task.task]] |= {names[before] for before in task.after}
+    reduced = TaskGraph(after).reduced()
+    return tuple(replace(task, after=reduced[task.task]) for task in tasks)
+
+
+def world_after(candidate: CandidatePlan, world: WorldModel) -> WorldModel:
+    """The world after a checked candidate, as far as that is settled before robots are chosen."""
+    graph = TaskGraph({task.task: task.after for task in candidate.tasks})
+    by_name = {task.task: task for task in candidate.tasks}
+    facts: dict[FactKey, Value] = {}
+    for name in graph.order:
+        task = by_name[name]
+        for literal in world.skills[task.skill].ground(task.args).after:
+            if literal.variable.subject.startswith(ACTOR_PREFIX):
+                continue
+            value = literal.value
+            in_hand = isinstance(value, str) and value.startswith(ACTOR_PREFIX)
+            facts[literal.variable] = None if in_hand else value
+    return world.with_facts(facts)

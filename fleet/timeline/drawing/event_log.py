@@ -1,0 +1,174 @@
+"""The event log: what a payload says, as a sentence and a level."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from fleet.timeline.drawing.lanes import call_text
+from keyexpr_schema.facts import render_value
+from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus
+from keyexpr_schema.payloads.robots import RobotActivity, RobotSpec, RobotState
+from keyexpr_schema.payloads.service import Reject
+from keyexpr_schema.payloads.simulation import Truth
+from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskRecord, TaskState, Try
+from keyexpr_schema.payloads.world import Fact
+
+INFO, WARN, ERROR = "INFO", "WARN", "ERROR"
+
+Line = tuple[str, str]
+"""`(level, sentence)`."""
+
+
+def goal(now: Goal, before: Goal | None) -> Iterator[Line]:
+    """A goal was given or changed."""
+    what = f"goal {now.goal}: “{now.text}”"
+    if before is None:
+        yield INFO, what
+    elif before != now:
+        yield INFO, f"{what} (changed)"
+
+
+def goal_status(now: GoalStatus, before: GoalStatus | None) -> Iterator[Line]:
+    """A goal moved on."""
+    if before is not None and (before.state, before.reason) == (now.state, now.reason):
+        return
+    bad = now.state in (GoalState.FAILED, GoalState.REJECTED)
+    means = ""
+    if now.conditions and (before is None or before.conditions != now.conditions):
+        means = f"; it means {', '.join(map(str, now.conditions))}"
+    yield ERROR if bad else INFO, f"goal {now.goal} is {now.state.value}{_why(now.reason)}{means}"
+
+
+def plan(now: Plan, before: Plan | None) -> Iterator[Line]:
+    """A plan was made or made again."""
+    if before is not None and before.revision == now.revision and before.tasks == now.tasks:
+        return
+    again = before is not None or now.revision > 1
+    what = f"plan {now.plan} revision {now.revision}" if again else f"plan {now.plan}"
+    actors = {task.actor for task in now.tasks}
+    yield (
+        WARN if again else INFO,
+        f"{what}: {len(now.tasks)} tasks, {len(actors)} actors for "
+        f"{', '.join(now.goals) or 'no goal'}, by {now.made_by} ({now.strategy})",
+    )
+
+
+def plan_status(now: PlanStatus, before: PlanStatus | None) -> Iterator[Line]:
+    """A plan moved on, or its actors went to other robots."""
+    if before is None or (before.state, before.reason) != (now.state, now.reason):
+        bad = now.state in (PlanState.FAILED, PlanState.REJECTED)
+        yield ERROR if bad else INFO, f"plan {now.plan} is {now.state.value}{_why(now.reason)}"
+    if now.allocation and (before is None or before.allocation != now.allocation):
+        who = ", ".join(f"{actor} → {robot}" for actor, robot in sorted(now.allocation.items()))
+        yield INFO, f"plan {now.plan} allocates {who}"
+    for violation in (
+        now.violations if before is None or before.violations != now.violations else ()
+    ):
+        yield ERROR, f"plan {now.plan}: {violation.sentence}"
+
+
+def task_record(now: TaskRecord, before: TaskRecord | None) -> Iterator[Line]:
+    """A task ended badly, or changed hands. The rest is told by orders and reports."""
+    if before is not None and before.robot and now.robot and before.robot != now.robot:
+        yield WARN, f"task {now.task} goes from {before.robot} to {now.robot}"
+    if before is not None and before.state is now.state:
+        return
+    if now.state in (TaskState.FAILED, TaskState.CANCELLED):
+        what = call_text(now.skill, now.args, now.robot)
+        level = ERROR if now.state is TaskState.FAILED else WARN
+        yield level, f"task {now.task} ({what}) is {now.state.value}{_why(now.reason)}"
+
+
+def order(now: Order, before: Order | None) -> Iterator[Line]:
+    """A robot was told to do or to stop something."""
+    fence = (now.epoch, now.revision, now.attempt)
+    if before is None or (before.epoch, before.revision, before.attempt) != fence:
+        attempt = f", attempt {now.attempt}" if now.attempt > 1 else ""
+        what = call_text(now.skill, now.args, now.robot)
+        yield INFO, f"{now.robot} shall {what} ({now.task}{attempt})"
+        before = None
+    if now.cancelled and not (before is not None and before.cancelled):
+        yield WARN, f"{now.robot} shall stop {now.task}"
+
+
+def tries(now: Report, before: Report | None, what: str) -> Iterator[tuple[float, Line]]:
+    """Each failed try of an attempt at `what` that is news: when it ended [s], and why."""
+    known = len(before.tries) if before is not None else 0
+    for one in now.tries[known:]:
+        if one.reason is not None:
+            said = f"{now.robot}: {what}, try {one.number} failed: {one.reason}"
+            yield one.ended_s, (WARN, said)
+
+
+def report(now: Report, before: Report | None, what: str) -> Iterator[Line]:
+    """A robot said how an attempt at `what` stands."""
+    if before is not None and before.state is now.state:
+        return
+    if now.state is ReportState.STARTED:
+        yield INFO, f"{now.robot} started {what}"
+        return
+    good = now.state is ReportState.SUCCEEDED
+    count = f" at try {len(now.tries)}" if good and len(now.tries) > 1 else ""
+    why = "" if good else _why(now.reason or _last(now.tries))
+    yield INFO if good else ERROR, f"{now.robot}: {what} {now.state.value}{count}{why}"
+
+
+def fact(now: Fact, before: Fact | None) -> Iterator[Line]:
+    """Someone said something about the world that was not known so."""
+    if before is not None and before.value == now.value:
+        return
+    was = f" (was {render_value(before.value)})" if before is not None else ""
+    yield (
+        INFO,
+        f"{now.source} says {now.literal}{was}",
+    )
+
+
+def robot_spec(now: RobotSpec, before: RobotSpec | None) -> Iterator[Line]:
+    """A robot was registered."""
+    if before != now:
+        yield INFO, f"{now.robot} ({now.model}) can {', '.join(now.skills) or 'do nothing'}"
+
+
+def robot_state(now: RobotState, before: RobotState | None) -> Iterator[Line]:
+    """A worker began anew, or its robot is being recovered or was stopped."""
+    if before is not None and before.incarnation != now.incarnation:
+        yield WARN, f"{now.robot}'s worker started anew"
+    odd = now.activity in (RobotActivity.RECOVERING, RobotActivity.STOPPED)
+    if odd and (before is None or before.activity is not now.activity):
+        yield WARN, f"{now.robot} is {now.activity.value}"
+
+
+def truth(now: Truth, before: Truth | None) -> Iterator[Line]:
+    """An object really changed place, support or hand."""
+    if now.held_by is None and not now.settled:
+        return
+    if before is not None and (before.place, before.support, before.held_by) == (
+        now.place,
+        now.support,
+        now.held_by,
+    ):
+        return
+    if now.held_by is not None:
+        where = f"in the hand of {now.held_by}"
+    else:
+        where = f"on {now.support}" if now.support else "in mid-air"
+    yield (
+        INFO,
+        f"in truth {now.object} is {where}, {f'in {now.place}' if now.place else 'in no place'}",
+    )
+
+
+def reject(now: Reject, before: Reject | None) -> Iterator[Line]:
+    """A value could not be read."""
+    if before is None or before.reason != now.reason:
+        yield ERROR, f"{now.component} could not read {now.keyexpr}: {now.reason}"
+
+
+def _why(reason: str | None) -> str:
+    return f": {reason}" if reason else ""
+
+
+def _last(tries: tuple[Try, ...]) -> str | None:
+    return tries[-1].reason if tries else None

@@ -1,0 +1,92 @@
+"""Where rows go: one Rerun stream, two timelines."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+import numpy as np
+import rerun as rr
+
+from fleet.timeline.clock import Clock
+from fleet.timeline.drawing.text import drawable
+from fleet.timeline.errors import UnwritableRecording
+
+APPLICATION = "robotfleet"
+SIM_TIME = "sim_time"
+WALL_TIME = "wall_time"
+
+
+class Sink:
+    """Logs to a Rerun stream on `sim_time` (duration) and `wall_time` (timestamp)."""
+
+    def __init__(self, stream: rr.RecordingStream, clock: Clock) -> None:
+        self.stream = stream
+        self.clock = clock
+
+    def log(
+        self, path: str, what: Any, sim_s: float, wall_s: float | None = None, *more: Any
+    ) -> None:
+        """Log archetypes at a fleet time [s]; the wall time follows from it if not given."""
+        if wall_s is None:
+            wall_s = self.clock.wall_at(sim_s)
+        self.stream.set_time(SIM_TIME, duration=sim_s)
+        self.stream.set_time(WALL_TIME, timestamp=time.time() if wall_s is None else wall_s)
+        self.stream.log(path, what, *more)
+
+    def fix(self, path: str, what: Any) -> None:
+        """Log an archetype that holds at all times."""
+        self.stream.log(path, what, static=True)
+
+    def columns(
+        self, path: str, sim_s: Sequence[float], wall_s: Sequence[float], columns: Any
+    ) -> None:
+        """Log many rows of one entity at once."""
+        self.stream.send_columns(
+            path,
+            indexes=[
+                rr.TimeColumn(SIM_TIME, duration=np.asarray(sim_s, dtype=np.float64)),
+                rr.TimeColumn(WALL_TIME, timestamp=np.asarray(wall_s, dtype=np.float64)),
+            ],
+            columns=columns,
+        )
+
+
+def entity(*parts: str) -> str:
+    """An entity path whose parts may hold any character: a `/` in a name makes no new level."""
+    return str(rr.new_entity_path(list(parts)))
+
+
+def open_stream(out: Path, name: str, live_port: int | None = None) -> rr.RecordingStream:
+    """A new recording that is written to `out`, and served on `127.0.0.1:live_port` if given.
+
+    Raises:
+        UnwritableRecording: the file cannot be made there.
+    """
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        out.touch()
+    except OSError as error:
+        raise UnwritableRecording(
+            f"cannot record to {out}: {error.strerror or error}; name a file you may write"
+        ) from None
+    stream = rr.RecordingStream(APPLICATION, recording_id=uuid4(), send_properties=True)
+    sinks: list[Any] = [rr.FileSink(out)]
+    if live_port is not None:
+        sinks.append(rr.GrpcServerSink(bind_ip="127.0.0.1", port=live_port))
+    stream.set_sinks(*sinks)
+    stream.set_log_time_enabled(False)
+    stream.set_log_tick_enabled(False)
+    stream.send_recording_name(drawable(name))
+    return stream
+
+
+def free_port() -> int:
+    """A TCP port of this machine that nobody listens on just now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

@@ -1,0 +1,312 @@
+"""The 3D world: a static room, one transform a moving body, trails, labels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import rerun as rr
+
+from fleet.timeline.drawing.palette import Palette, Rgba
+from fleet.timeline.drawing.shapes import Bounds, log_shapes
+from fleet.timeline.drawing.sink import Sink, entity
+from fleet.timeline.drawing.text import drawable
+from fleet.timeline.drawing.trails import Trail
+from keyexpr_schema.payloads.motions import PointM
+from keyexpr_schema.payloads.robots import RobotSpec, RobotState
+from keyexpr_schema.payloads.simulation import Body, Frame, QuaternionWxyz, Scene, ShapeKind
+from keyexpr_schema.payloads.world import Place
+
+FRAME_STEP_S = 0.05
+"""Frames closer together than this [s, fleet time] are thinned out: 20 a second look smooth."""
+
+ROWS = 400
+"""Rows of one body that are sent at once, at the latest."""
+
+LABEL_M = 0.6
+"""How far over a robot its label hangs: seen from above, a lower one hides its arm."""
+
+ROBOT_TRAIL_M = 0.025
+OBJECT_TRAIL_M = 0.015
+
+_STILL_M = 0.0005
+_STILL_QUATERNION = 0.0005
+_STAND_IN_M = (0.2, 0.5)  # radius, height of a robot that no scene describes
+
+Pose = tuple[PointM, QuaternionWxyz]
+
+
+@dataclass
+class _Column:
+    """Poses of one body that wait to be sent, and the last one that was taken."""
+
+    path: str
+    last: Pose | None = None
+    sim_s: list[float] = field(default_factory=list)
+    wall_s: list[float] = field(default_factory=list)
+    points: list[PointM] = field(default_factory=list)
+    quaternions: list[tuple[float, float, float, float]] = field(default_factory=list)  # x y z w
+
+
+class World:
+    """Draws scenes, frames, places and robots. All lengths in metres, world frame."""
+
+    def __init__(self, sink: Sink, palette: Palette) -> None:
+        self._sink = sink
+        self._palette = palette
+        self._bodies: dict[str, Body] = {}
+        self._columns: dict[str, _Column] = {}
+        self._roots: dict[str, str] = {}  # owner -> the body that stands for it
+        self._specs: dict[str, RobotSpec] = {}
+        self._trails: dict[str, Trail] = {}
+        self._labels: dict[str, tuple[str, float]] = {}
+        self._doing: dict[str, str | None] = {}
+        self._stand_ins: set[str] = set()
+        self._tints: dict[str, int] = {}
+        self._frame_s: float | None = None
+        self._scene: Scene | None = None
+        self._heights: dict[str, float] = {}
+        self.bounds = Bounds()
+
+    # --- what is there -----------------------------------------------------------------------
+    def scene(self, scene: Scene) -> None:
+        """Draw the fixed bodies and the shapes of the moving ones."""
+        if scene == self._scene:
+            return
+        self.flush()
+        self._scene = scene
+        self._bodies = {body.body: body for body in scene.bodies}
+        self._columns.clear()
+        self._roots.clear()
+        for body in scene.bodies:
+            fixed = scene.fixed.get(body.body)
+            if fixed is not None:
+                path = entity("world", "room", body.body)
+                point, (w, x, y, z) = fixed
+                self._sink.fix(
+                    path,
+                    rr.Transform3D(translation=point, quaternion=rr.Quaternion(xyzw=[x, y, z, w])),
+                )
+                self.bounds.add(point, body.shapes)
+            else:
+                path = entity("world", "bodies", body.owner or "world", body.body)
+                if body.owner is not None:
+                    self._roots.setdefault(body.owner, body.body)
+            log_shapes(self._sink, path, body.shapes)
+        for robot in sorted(self._stand_ins & self._roots.keys()):
+            self._stand_ins.discard(robot)
+            path = entity("world", "robots", robot)
+            self._sink.log(path, rr.Clear(recursive=True), self._sink.clock.now_s)
+        self._relabel()
+
+    def place(self, place: Place) -> None:
+        """Tint the floor of a place and write its name on it."""
+        boxes = [
+            ((a + c) / 2, (b + d) / 2, abs(c - a) / 2, abs(d - b) / 2)
+            for a, b, c, d in place.region_m
+        ]
+        path = entity("world", "places", place.place)
+        if not boxes:
+            return
+        tint = _TINTS[self._tints.setdefault(place.place, len(self._tints)) % len(_TINTS)]
+        self._sink.fix(
+            path,
+            rr.Boxes3D(
+                centers=[(x, y, 0.004) for x, y, _, _ in boxes],
+                half_sizes=[
+                    (max(0.01, w - 0.05), max(0.01, h - 0.05), 0.002) for _, _, w, h in boxes
+                ],
+                colors=[tint] * len(boxes),
+                fill_mode=rr.components.FillMode.Solid,
+            ),
+        )
+        for x, y, w, h in boxes:
+            self.bounds.cover(x - w, y - h)
+            self.bounds.cover(x + w, y + h)
+        x, y, _, h = max(boxes, key=lambda box: box[2] * box[3])
+        self._sink.fix(
+            f"{path}/name",
+            rr.Points3D(
+                [(x, y - 0.6 * h, 0.02)],
+                radii=[0.001],
+                colors=[(200, 200, 200, 255)],
+                labels=[drawable(place.label)],
+                show_labels=True,
+            ),
+        )
+
+    def robot(self, spec: RobotSpec) -> None:
+        """A robot by that name belongs to the fleet."""
+        self._specs[spec.robot] = spec
+        if spec.robot in self._trails:
+            self._trails[spec.robot].become(self._palette.robot(spec.robot), ROBOT_TRAIL_M)
+        self._relabel()
+
+    # --- where it is -------------------------------------------------------------------------
+    def frame(self, frame: Frame, wall_s: float) -> None:
+        """Take the poses of a frame; bodies that did not move cost nothing."""
+        last = self._frame_s
+        if last is not None and 0.0 <= frame.time_s - last < FRAME_STEP_S * 0.99:
+            return
+        self._frame_s = frame.time_s
+        for name, pose in frame.poses.items():
+            column = self._columns.get(name)
+            if column is None:
+                body = self._bodies.get(name)
+                owner = (body.owner if body else None) or "world"
+                column = _Column(entity("world", "bodies", owner, name))
+                self._columns[name] = column
+            if column.last is not None and _still(column.last, pose):
+                continue
+            column.last = pose
+            point, (w, x, y, z) = pose
+            column.sim_s.append(frame.time_s)
+            column.wall_s.append(wall_s)
+            column.points.append(point)
+            column.quaternions.append((x, y, z, w))
+            if len(column.sim_s) >= ROWS:
+                self._send(column)
+        for owner, root in self._roots.items():
+            there = frame.poses.get(root)
+            if there is not None:
+                self._trail(owner).visit(self._sink, there[0], frame.time_s, wall_s)
+        if last is None:  # now it is known how high the robots are
+            self._relabel()
+
+    def state(self, state: RobotState, sim_s: float, wall_s: float) -> None:
+        """Show a robot that no scene describes where it says that it is."""
+        if state.pose_m_rad is None or state.robot in self._roots:
+            return
+        x, y, yaw = state.pose_m_rad
+        radius, height = _STAND_IN_M
+        path = entity("world", "robots", state.robot)
+        if state.robot not in self._stand_ins:
+            self._stand_ins.add(state.robot)
+            body = rr.Cylinders3D(
+                lengths=[height],
+                radii=[radius],
+                centers=[(0, 0, height / 2)],
+                colors=[self._palette.robot(state.robot)],
+                fill_mode=rr.components.FillMode.Solid,
+            )
+            self._sink.log(f"{path}/body", body, sim_s, wall_s)
+            self.robot_label(state.robot, self._doing.get(state.robot), sim_s, wall_s)
+        self._sink.log(
+            path,
+            rr.Transform3D(
+                translation=[x, y, 0.0], rotation=rr.RotationAxisAngle([0, 0, 1], radians=yaw)
+            ),
+            sim_s,
+            wall_s,
+        )
+        self._trail(state.robot).visit(self._sink, (x, y, 0.05), sim_s, wall_s)
+
+    def robot_label(
+        self, robot: str, doing: str | None, sim_s: float, wall_s: float | None
+    ) -> None:
+        """Write over the robot what it is called, and what it does (`None`: nothing)."""
+        root = self._roots.get(robot)
+        if root is None and robot not in self._stand_ins:
+            return  # nobody has said where it is
+        path = entity("world", "bodies", robot, root) if root else entity("world", "robots", robot)
+        spec = self._specs.get(robot)
+        name = (spec.label if spec else "") or robot
+        text = drawable(f"{name}: {doing}" if doing else name)
+        height = self._height(robot) if root else _STAND_IN_M[1]
+        if self._labels.get(robot) == (path + text, height):
+            return
+        self._labels[robot] = (path + text, height)
+        self._sink.log(
+            f"{path}/label",
+            rr.Points3D(
+                [(0, 0, height + LABEL_M)],
+                radii=[0.001],
+                colors=[self._palette.robot(robot)],
+                labels=[text],
+                show_labels=True,
+            ),
+            sim_s,
+            wall_s,
+        )
+
+    def flush(self, at_least: int = 1) -> None:
+        """Send the poses that wait, of bodies with `at_least` so many."""
+        for column in self._columns.values():
+            if len(column.sim_s) >= at_least:
+                self._send(column)
+
+    def _relabel(self) -> None:
+        for robot in self._specs:
+            self.robot_label(robot, self._doing.get(robot), self._sink.clock.now_s, None)
+
+    # --- inside --------------------------------------------------------------------------------
+    def _send(self, column: _Column) -> None:
+        if not column.sim_s:
+            return
+        self._sink.columns(
+            column.path,
+            column.sim_s,
+            column.wall_s,
+            rr.Transform3D.columns(translation=column.points, quaternion=column.quaternions),
+        )
+        column.sim_s, column.wall_s, column.points, column.quaternions = [], [], [], []
+
+    def _trail(self, owner: str) -> Trail:
+        trail = self._trails.get(owner)
+        if trail is None:
+            robot = owner in self._specs or owner not in self._roots
+            colour = self._palette.robot(owner) if robot else self._own_colour(owner)
+            trail = Trail(
+                entity("world", "trails", owner), colour, ROBOT_TRAIL_M if robot else OBJECT_TRAIL_M
+            )
+            self._trails[owner] = trail
+        return trail
+
+    def _own_colour(self, owner: str) -> Rgba:
+        body = self._bodies.get(self._roots.get(owner, ""))
+        if body is None or not body.shapes:
+            return self._palette.robot(owner)
+        r, g, b, _ = (round(255 * min(1.0, max(0.0, part))) for part in body.shapes[0].rgba)
+        return (r, g, b, 255)
+
+    def _height(self, robot: str) -> float:
+        """Height [m] of a robot's highest shape over its root, as far as its frames tell."""
+        root = self._columns.get(self._roots.get(robot, ""))
+        base = root.last[0][2] if root is not None and root.last is not None else 0.0
+        tops = [0.3]
+        for name, body in self._bodies.items():
+            column = self._columns.get(name)
+            if body.owner == robot and column is not None and column.last is not None:
+                tops.append(column.last[0][2] - base + max(map(_top, _sizes(body)), default=0.0))
+        # Kept from one call to the next, or the label would dance with the arm.
+        self._heights[robot] = max(self._heights.get(robot, 0.0), *tops)
+        return self._heights[robot]
+
+
+def _sizes(body: Body) -> Iterable[tuple[float, float]]:
+    for shape in body.shapes:
+        a, b, c = shape.size_m
+        half = {ShapeKind.BOX: c, ShapeKind.CYLINDER: b, ShapeKind.SPHERE: a}.get(shape.kind, a + b)
+        yield shape.point_m[2], half
+
+
+def _top(size: tuple[float, float]) -> float:
+    return size[0] + size[1]
+
+
+def _still(last: Pose, now: Pose) -> bool:
+    if last == now:
+        return True
+    moved = max(abs(a - b) for a, b in zip(last[0], now[0], strict=True))
+    turned = max(abs(a - b) for a, b in zip(last[1], now[1], strict=True))
+    return moved < _STILL_M and turned < _STILL_QUATERNION
+
+
+_TINTS: tuple[Rgba, ...] = (
+    (92, 84, 66, 255),
+    (66, 80, 96, 255),
+    (70, 90, 72, 255),
+    (90, 70, 88, 255),
+    (78, 78, 82, 255),
+)
+"""Floors of places, in the order in which those are told of."""

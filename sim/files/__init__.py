@@ -1,0 +1,1 @@
+"""World, robot and mission files: their types, how they are read, and what is checked."""

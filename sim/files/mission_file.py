@@ -1,0 +1,173 @@
+"""Loads mission and robot files and checks that what they say can be (see `world_file`)."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+
+from keyexpr_schema.ids import Id
+from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
+from sim.errors import BadFile
+from sim.files.solids import Solid, solids
+from sim.files.world_file import check_objects, load_world
+from sim.files.world_schema import LARGEST_RADIUS_M, PointXY, WorldFile
+from sim.files.yaml_file import FileEntry, find_file, read_yaml
+
+
+class PlanOptions(FileEntry, frozen=True):
+    """Which planner and which allocator; `None` leaves it to the planner's own settings."""
+
+    strategy: str | None = None
+    planner: str | None = None
+    allocator: str | None = None
+
+
+class MissionRobot(msgspec.Struct, frozen=True, kw_only=True):
+    """A robot of a mission, where the simulation puts it, and the folder of its robot file."""
+
+    spec: RobotSpec
+    start_m_rad: PoseMRad
+    folder: Path
+
+
+class Mission(msgspec.Struct, frozen=True, kw_only=True):
+    """A world, robots in it, statements about it and goals."""
+
+    mission: Id
+    world: WorldFile
+    robots: tuple[MissionRobot, ...]
+    statements: tuple[str, ...]
+    goals: tuple[str, ...]
+    plan: PlanOptions
+
+
+class _Start(FileEntry, frozen=True):
+    at_m: PointXY
+    yaw_deg: float = 0.0
+
+
+class _RobotEntry(FileEntry, frozen=True):
+    spec: str
+    start: _Start
+    robot: Id | None = None
+    """A name of its own, so that a mission can have several of one specification."""
+
+
+class _Placement(FileEntry, frozen=True):
+    on: str
+    at_m: tuple[float, float]
+    yaw_deg: float = 0.0
+
+
+class _MissionEntry(FileEntry, frozen=True):
+    mission: Id
+    world: str
+    robots: Annotated[tuple[_RobotEntry, ...], msgspec.Meta(min_length=1)]
+    objects: dict[Id, _Placement | None] = {}
+    """Where things lie in this mission and not where the world file says; `null`: not there."""
+    statements: tuple[str, ...] = ()
+    goals: tuple[str, ...] = ()
+    plan: PlanOptions = PlanOptions()
+
+
+def load_robot(file: str | Path) -> RobotSpec:
+    """The robot file given by path or name (see `config_file`), checked."""
+    path = find_file("robots", file)
+    spec = read_yaml(path, RobotSpec, "robot file")
+    for name, value in spec.capabilities.items():
+        if not (math.isfinite(value) and value >= 0.0):
+            raise BadFile(f"{path}: capabilities.{name}: {value} is not a number from 0 up")
+    if spec.capabilities.get("drive", 0.0) <= 0.0:
+        raise BadFile(
+            f"{path}: capabilities: it lacks `drive`, the robot's top speed in m/s (such as 0.6)"
+        )
+    return spec
+
+
+def load_mission(name: str | Path) -> Mission:
+    """The mission given by path or name (see `config_file`), with its world and robots."""
+    path = find_file("missions", name)
+    entry = read_yaml(path, _MissionEntry, "mission file")
+    world = _rearranged(path, load_world(find_file("worlds", entry.world, path)), entry.objects)
+    robots: list[MissionRobot] = []
+    for number, item in enumerate(entry.robots):
+        file = find_file("robots", item.spec, path)
+        spec = load_robot(file)
+        if item.robot is not None:
+            spec = msgspec.structs.replace(spec, robot=item.robot)
+        start = (*item.start.at_m, math.radians(item.start.yaw_deg))
+        where = f"{path}: robots[{number}] ({spec.robot})"
+        _check_start(where, world, spec.robot, start, robots)
+        robots.append(MissionRobot(spec=spec, start_m_rad=start, folder=file.parent))
+    return Mission(
+        mission=entry.mission,
+        world=world,
+        robots=tuple(robots),
+        statements=entry.statements,
+        goals=entry.goals,
+        plan=entry.plan,
+    )
+
+
+def _rearranged(
+    path: Path, world: WorldFile, placements: dict[str, _Placement | None]
+) -> WorldFile:
+    """The world with a mission's objects put elsewhere or taken away."""
+    entries = dict(world.object_entries)
+    for name, placement in placements.items():
+        if name not in entries:
+            raise BadFile(
+                f"{path}: objects.{name}: the world has no such object; "
+                f"it has {', '.join(world.object_entries) or 'none'}"
+            )
+        if placement is None:
+            del entries[name]
+        else:
+            entries[name] = msgspec.structs.replace(
+                entries[name], on=placement.on, at_m=placement.at_m, yaw_deg=placement.yaw_deg
+            )
+    rearranged = msgspec.structs.replace(world, object_entries=entries)
+    check_objects(path, rearranged)
+    return rearranged
+
+
+def _check_start(
+    where: str, world: WorldFile, robot: str, start: PoseMRad, others: list[MissionRobot]
+) -> None:
+    x, y, _ = start
+    if robot in world.place_entries or robot in world.object_entries:
+        raise BadFile(f"{where}: a place or an object has the name {robot!r}; use another")
+    if not (0 <= x <= world.size_m[0] and 0 <= y <= world.size_m[1]):
+        raise BadFile(
+            f"{where}: start.at_m: [{x}, {y}] is outside the building "
+            f"(x 0 to {world.size_m[0]}, y 0 to {world.size_m[1]})"
+        )
+    for solid in solids(world):
+        if _distance(solid, x, y) < LARGEST_RADIUS_M:
+            raise BadFile(
+                f"{where}: start.at_m: [{x}, {y}] is less than {LARGEST_RADIUS_M} m from "
+                f"{solid.name}; a robot needs that much room"
+            )
+    for other in others:
+        if other.spec.robot == robot:
+            raise BadFile(
+                f"{where}: there are two robots {robot!r}; give one another name with `robot: …`"
+            )
+        gap = math.dist(start[:2], other.start_m_rad[:2])
+        if gap < 2 * LARGEST_RADIUS_M:
+            raise BadFile(
+                f"{where}: start.at_m: it overlaps {other.spec.robot}, {gap:.2f} m away; "
+                f"keep {2 * LARGEST_RADIUS_M} m between two robots"
+            )
+
+
+def _distance(solid: Solid, x: float, y: float) -> float:
+    """From a point to the box, m; 0 inside."""
+    c, s = math.cos(solid.yaw_rad), math.sin(solid.yaw_rad)
+    dx, dy = x - solid.center_m[0], y - solid.center_m[1]
+    along = max(abs(c * dx + s * dy) - solid.half_m[0], 0.0)
+    across = max(abs(c * dy - s * dx) - solid.half_m[1], 0.0)
+    return math.hypot(along, across)

@@ -1,0 +1,85 @@
+"""What stands on the floor of a world: walls, less their doors, and furniture."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from sim.files.world_schema import PointXY, WorldFile
+
+
+@dataclass(frozen=True)
+class Solid:
+    """An upright box on the floor that nothing drives through.
+
+    `center_m` and `half_m` (half-extents along its own axes) are (x, y); `yaw_rad` turns it.
+    """
+
+    kind: Literal["wall", "table", "block"]
+    name: str
+    center_m: PointXY
+    half_m: PointXY
+    yaw_rad: float
+    height_m: float
+
+
+def solids(world: WorldFile) -> tuple[Solid, ...]:
+    """Everything that stands in the way on the floor: outer walls, inner walls, furniture."""
+    return (*_outer_walls(world), *_inner_walls(world), *_furniture(world))
+
+
+def _outer_walls(world: WorldFile) -> list[Solid]:
+    """Just outside the border, so that `size_m` is what is free inside."""
+    (x, y), t = world.size_m, world.wall_thickness_m
+    height = world.wall_height_m
+    return [
+        Solid("wall", "wall_south", (x / 2, -t / 2), (x / 2 + t, t / 2), 0.0, height),
+        Solid("wall", "wall_north", (x / 2, y + t / 2), (x / 2 + t, t / 2), 0.0, height),
+        Solid("wall", "wall_west", (-t / 2, y / 2), (t / 2, y / 2), 0.0, height),
+        Solid("wall", "wall_east", (x + t / 2, y / 2), (t / 2, y / 2), 0.0, height),
+    ]
+
+
+def _inner_walls(world: WorldFile) -> list[Solid]:
+    pieces: list[Solid] = []
+    for number, wall in enumerate(world.walls):
+        (x0, y0), (x1, y1) = wall.from_m, wall.to_m
+        length = math.hypot(x1 - x0, y1 - y0)
+        ux, uy = (x1 - x0) / length, (y1 - y0) / length
+        gaps: list[tuple[float, float]] = []
+        for door in world.doors.values():
+            dx, dy = door.center_m[0] - x0, door.center_m[1] - y0
+            along, across = dx * ux + dy * uy, abs(dy * ux - dx * uy)
+            if across <= world.wall_thickness_m and 0.0 <= along <= length:
+                gaps.append((along - door.width_m / 2, along + door.width_m / 2))
+        start = 0.0
+        for low, high in [*sorted(gaps), (length, length)]:
+            if low - start > 1e-6:
+                middle, half = (start + low) / 2, (low - start) / 2
+                pieces.append(
+                    Solid(
+                        "wall",
+                        f"wall_{number}_{len(pieces)}",
+                        (x0 + ux * middle, y0 + uy * middle),
+                        (half, world.wall_thickness_m / 2),
+                        math.atan2(uy, ux),
+                        world.wall_height_m,
+                    )
+                )
+            start = max(start, high)
+    return pieces
+
+
+def _furniture(world: WorldFile) -> list[Solid]:
+    return [
+        Solid(
+            entry.kind,
+            name,
+            entry.center_m,
+            (entry.size_m[0] / 2, entry.size_m[1] / 2),
+            math.radians(entry.yaw_deg),
+            entry.size_m[2],
+        )
+        for name, entry in world.furniture.items()
+    ]

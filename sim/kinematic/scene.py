@@ -1,0 +1,71 @@
+"""What a viewer draws of a world without physics: boxes, a cylinder a robot, the objects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from keyexpr_schema.payloads.motions import PointM
+from keyexpr_schema.payloads.robots import PoseMRad
+from keyexpr_schema.payloads.simulation import Body, Frame, QuaternionWxyz, Scene, Shape, ShapeKind
+from sim.files.solids import solids
+from sim.files.world_schema import WorldFile
+
+_UPRIGHT: QuaternionWxyz = (1.0, 0.0, 0.0, 0.0)
+_COLOURS = {
+    "wall": (0.85, 0.85, 0.82, 1.0),
+    "table": (0.65, 0.48, 0.32, 1.0),
+    "block": (0.55, 0.58, 0.6, 1.0),
+}
+_ROBOT = (0.2, 0.5, 0.55, 1.0)
+_ROBOT_SIZE_M = (0.2, 0.25, 0.0)  # radius, half-height
+
+
+def draw_scene(world: WorldFile, robots: tuple[str, ...]) -> Scene:
+    """The shapes of walls, furniture, robots and objects."""
+    bodies: list[Body] = []
+    fixed: dict[str, tuple[PointM, QuaternionWxyz]] = {}
+    for solid in solids(world):
+        size = (solid.half_m[0], solid.half_m[1], solid.height_m / 2)
+        bodies.append(_body(solid.name, None, ShapeKind.BOX, size, _COLOURS[solid.kind]))
+        fixed[solid.name] = ((*solid.center_m, 0.0), _turned(solid.yaw_rad))
+    bodies += [_body(name, name, ShapeKind.CYLINDER, _ROBOT_SIZE_M, _ROBOT) for name in robots]
+    for name, entry in world.object_entries.items():
+        kind = world.object_kinds[entry.kind]
+        length, width, height = (side / 2 for side in kind.extent_m)
+        size = {
+            "box": (length, width, height),
+            "cylinder": (length, height, 0.0),
+            "sphere": (length, 0.0, 0.0),
+        }[kind.shape]
+        bodies.append(_body(name, name, ShapeKind(kind.shape), size, entry.rgba or kind.rgba))
+    return Scene(world=world.world, bodies=tuple(bodies), fixed=fixed)
+
+
+def draw_frame(
+    time_s: float, robots: Mapping[str, PoseMRad], objects: Mapping[str, PointM]
+) -> Frame:
+    """Where robots and objects are; every body's origin is at the middle of its base."""
+    poses: dict[str, tuple[PointM, QuaternionWxyz]] = {
+        name: ((x, y, 0.0), _turned(yaw)) for name, (x, y, yaw) in robots.items()
+    }
+    poses |= {name: (point, _UPRIGHT) for name, point in objects.items()}
+    return Frame(time_s=time_s, poses=poses)
+
+
+def _body(
+    name: str,
+    owner: str | None,
+    kind: ShapeKind,
+    size_m: PointM,
+    rgba: tuple[float, float, float, float],
+) -> Body:
+    half = {ShapeKind.BOX: size_m[2], ShapeKind.SPHERE: size_m[0]}.get(kind, size_m[1])
+    shape = Shape(
+        kind=kind, size_m=size_m, point_m=(0.0, 0.0, half), quaternion_wxyz=_UPRIGHT, rgba=rgba
+    )
+    return Body(body=name, owner=owner, shapes=(shape,))
+
+
+def _turned(yaw_rad: float) -> QuaternionWxyz:
+    return (math.cos(yaw_rad / 2), 0.0, 0.0, math.sin(yaw_rad / 2))

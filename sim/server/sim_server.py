@@ -1,0 +1,148 @@
+"""Joins a simulated world to keys: answers motion calls, lets time run, tells what happens.
+
+Everything runs on one asyncio loop, the world included: it goes on for a few milliseconds at a
+time, and in between calls are answered. So nothing else ever touches the backend, and no lock is
+needed; a control period of the physics (1 to 3 ms) is the longest that a call waits.
+"""
+
+from __future__ import annotations
+
+import asyncio
+
+from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.keyspace import SIM_MOTION
+from keyexpr_schema.payloads.motions import MotionOutcome
+from keyexpr_schema.payloads.simulation import MotionCall, SimRobotAddress
+from keyexpr_schema.transport.session import Session
+from sim.backend import Backend
+from sim.server.motion_calls import MotionCalls
+from sim.server.publisher import Publisher
+
+CHUNK_S = 0.004
+"""Wall time for which the world goes on before calls are looked at."""
+
+LAG_S = 0.5
+"""A world that is further behind the wall clock stops trying to catch up."""
+
+GRACE_S = 0.25
+WATCHDOG_S = 2.0
+
+
+class SimServer:
+    """One simulated world, served.
+
+    `speed` is simulated seconds a second of wall time. `None` is as fast as it goes: then time
+    advances only while some robot moves, and after a motion has ended it waits up to `grace_s` of
+    wall time for that robot's next call, so that the thinking of workers and planners takes no
+    simulated time. `idle_speed` is how fast time runs while no robot moves, in that mode.
+
+    A motion that nobody has asked about for `watchdog_s` (beyond the wait of the last call) is
+    stopped, as a driver would stop a robot whose worker is gone. While our own link to the router
+    is down, that clock stands still: then it is not the worker who is away.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        backend: Backend,
+        speed: float | None = 1.0,
+        grace_s: float = GRACE_S,
+        watchdog_s: float = WATCHDOG_S,
+        idle_speed: float = 0.0,
+    ) -> None:
+        self._session, self._backend = session, backend
+        self._speed, self._grace_s, self._watchdog_s = speed, grace_s, watchdog_s
+        self._idle_speed = idle_speed
+        self._drivers = {robot: MotionCalls(backend, robot) for robot in backend.robots}
+        self._publisher = Publisher(session, backend, speed)
+        self._called = asyncio.Event()
+        self._ready = asyncio.Event()
+
+    async def ready(self) -> None:
+        """Wait until calls are answered."""
+        await self._ready.wait()
+
+    async def run(self) -> None:
+        """Serve until cancelled."""
+        async with self._session.serve(SIM_MOTION, self._answer):
+            keeping = asyncio.create_task(self._publisher.keep_scene())
+            self._ready.set()
+            try:
+                await self._go_on()
+            finally:
+                keeping.cancel()
+                await asyncio.gather(keeping, return_exceptions=True)
+
+    async def _answer(self, address: SimRobotAddress, call: MotionCall) -> MotionOutcome:
+        driver = self._drivers.get(address.robot)
+        if driver is None:
+            raise SchemaError(
+                f"there is no robot {address.robot!r} in this world; "
+                f"there are {', '.join(self._drivers)}"
+            )
+        self._called.set()
+        return await driver.answer(call, asyncio.get_running_loop())
+
+    async def _go_on(self) -> None:
+        loop = asyncio.get_running_loop()
+        base_wall_s, base_s = loop.time(), self._backend.time_s
+        while True:
+            wall_s = loop.time()
+            speed = self._speed_now(wall_s)
+            if speed is None:
+                base_wall_s, base_s = wall_s, self._backend.time_s
+                await self._chunk(loop, None)
+                continue
+            due_s = base_s + (wall_s - base_wall_s) * speed
+            if speed == 0.0 or due_s - self._backend.time_s > LAG_S * speed:
+                base_wall_s, base_s = wall_s, self._backend.time_s
+                due_s = base_s
+            if speed > 0.0:
+                await self._chunk(loop, max(due_s, self._backend.time_s))
+            self._look_after(loop.time())
+            self._called.clear()
+            pause_s = 0.005 if speed > 0.0 or self._held(loop.time()) else 0.05
+            try:
+                async with asyncio.timeout(pause_s):
+                    await self._called.wait()
+            except TimeoutError:
+                pass
+
+    def _speed_now(self, wall_s: float) -> float | None:
+        if self._speed is not None:
+            return self._speed
+        if self._held(wall_s):
+            return 0.0
+        if any(driver.active for driver in self._drivers.values()):
+            return None
+        return self._idle_speed
+
+    def _held(self, wall_s: float) -> bool:
+        """The world waits for the next call of a robot whose motion just ended."""
+        return self._speed is None and any(
+            not driver.active and wall_s < driver.held_until_s for driver in self._drivers.values()
+        )
+
+    async def _chunk(self, loop: asyncio.AbstractEventLoop, until_s: float | None) -> None:
+        """Let the world go on for a few milliseconds, at most to `until_s`."""
+        end_wall_s = loop.time() + CHUNK_S
+        while until_s is None or self._backend.time_s < until_s:
+            self._backend.advance()
+            if self._look_after(loop.time()) or loop.time() >= end_wall_s:
+                break
+        await asyncio.sleep(0)
+
+    def _look_after(self, wall_s: float) -> bool:
+        """Ended motions, forsaken ones, and whatever is to be told; whether a motion ended."""
+        connected = self._session.connected
+        ended = []
+        for driver in self._drivers.values():
+            if driver.settle(wall_s, self._grace_s):
+                ended.append(driver.robot)
+            elif not connected:
+                driver.excuse(wall_s)
+            elif driver.forsaken(wall_s, self._watchdog_s):
+                driver.give_up("nobody asked about it any more")
+                ended.append(driver.robot)
+        self._publisher.publish(tuple(ended))
+        return bool(ended)

@@ -1,0 +1,98 @@
+"""The planner's event journal: order, snapshots, one planner at a time."""
+
+from __future__ import annotations
+
+import sqlite3
+import zlib
+from pathlib import Path
+
+import pytest
+
+from fleet.core.events import decode_event
+from fleet.core.state import PlanEntry, PlanningJob, Policy, State
+from fleet.core.step import replay, step
+from fleet.service import event_journal
+from fleet.service.event_journal import SNAPSHOT_FORMAT, EventJournal, JournalInUse
+from tests.fleet_model import FleetModel
+from tests.household import SKILLS, bring, carrier, manipulator
+from tests.replay.journal_files import HERE, events_in
+
+
+def mission() -> FleetModel:
+    model = FleetModel((manipulator(), carrier()), cups=2)
+    model.plan(bring(1, "hallway"), bring(2, "living_room"))
+    model.finish()
+    return model
+
+
+def keep(folder: Path, model: FleetModel) -> None:
+    with EventJournal(folder) as journal:
+        state = State()
+        for line in model.journal:
+            state, _ = step(state, decode_event(line), SKILLS)
+            journal.append(decode_event(line), state)
+
+
+def test_events_come_back_in_order(tmp_path: Path) -> None:
+    model = mission()
+    keep(tmp_path, model)
+    with EventJournal(tmp_path) as journal:
+        assert not journal.empty
+        assert replay(journal.events(), SKILLS) == model.state
+
+
+def test_a_new_journal_is_empty(tmp_path: Path) -> None:
+    with EventJournal(tmp_path / "new") as journal:
+        assert journal.empty
+        assert journal.snapshot() == (0, State())
+
+
+def test_a_snapshot_shortens_the_replay_and_changes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(event_journal, "SNAPSHOT_EVERY", 7)
+    model = mission()
+    keep(tmp_path, model)
+    with EventJournal(tmp_path) as journal:
+        number, state = journal.snapshot()
+        rest = list(journal.events(number))
+        assert number > 0
+        assert len(rest) < 7
+        assert replay(rest, SKILLS, state) == model.state
+
+
+@pytest.mark.parametrize(
+    "snapshot",
+    [
+        (HERE / "two-cups.snapshot-1.json").read_bytes(),
+        b'{"format": 1, "state": {}}',
+        b'{"format": %d, "state": {"plans": 7}}' % SNAPSHOT_FORMAT,
+        b"rubbish",
+    ],
+    ids=["without-a-format", "older-format", "does-not-decode", "not-json"],
+)
+def test_a_snapshot_in_another_format_is_left_aside(tmp_path: Path, snapshot: bytes) -> None:
+    journal = events_in("two-cups")
+    with EventJournal(tmp_path) as kept:
+        for event in journal:
+            kept.append(event, State())
+    with sqlite3.connect(tmp_path / "events.db") as db:
+        db.execute("INSERT INTO snapshots VALUES (26, ?)", (snapshot,))
+    with EventJournal(tmp_path) as kept:
+        number, state = kept.snapshot()
+        assert (number, state) == (0, State())
+        assert replay(kept.events(number), SKILLS, state) == replay(journal, SKILLS)
+
+
+def test_the_format_counts_up_when_a_field_of_the_state_gets_another_name() -> None:
+    kinds = (State, PlanEntry, PlanningJob, Policy)
+    names = " ".join(name for kind in kinds for name in kind.__struct_encode_fields__)
+    assert {SNAPSHOT_FORMAT: zlib.crc32(names.encode())} == {2: 2414712561}, (
+        "count SNAPSHOT_FORMAT up"
+    )
+
+
+def test_two_planners_cannot_have_one_journal(tmp_path: Path) -> None:
+    with EventJournal(tmp_path):
+        with pytest.raises(JournalInUse, match="another planner works with"):
+            EventJournal(tmp_path).__enter__()

@@ -1,0 +1,138 @@
+"""A robot's in-tray: carries out what `intake.decide` decides, and keeps the queue."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import deque
+
+from msgspec.structs import replace
+
+from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.keyspace import ORDER, REPORT
+from keyexpr_schema.payloads.tasks import Order, OrderAddress, Report, ReportState
+from keyexpr_schema.transport.session import Session
+from workers.orders.fencing import (
+    Accept,
+    AttemptName,
+    Cancel,
+    Refuse,
+    Renew,
+    Repeat,
+    attempt_name,
+    decide,
+    malformed,
+    superseded,
+)
+from workers.orders.journal import Journal
+from workers.orders.outbox import Outbox
+from workers.orders.reports import make_report, report_address
+
+
+class OrderQueue:
+    """Orders as they come in; `next` hands out one at a time.
+
+    `cancelled` is set while the order that was handed out last should be stopped.
+    """
+
+    def __init__(
+        self, session: Session, journal: Journal, outbox: Outbox, robot: str, incarnation: str
+    ) -> None:
+        self.cancelled = asyncio.Event()
+        self._session = session
+        self._journal = journal
+        self._outbox = outbox
+        self._incarnation = incarnation
+        self._queue: deque[AttemptName] = deque()
+        self._queued = asyncio.Event()
+        self._running: AttemptName | None = None
+        self._log = logging.getLogger(f"robotfleet.worker.{robot}")
+
+    async def next(self) -> Order:
+        """The order that is to be carried out now; the one before it has ended."""
+        self._running = None
+        self.cancelled.clear()
+        while not self._queue:
+            self._queued.clear()
+            await self._queued.wait()
+        self._running = self._queue.popleft()
+        return self._journal.ledger.attempts[self._running].order
+
+    async def put(self, address: OrderAddress, order: Order | None) -> None:
+        """Take in what stands on an order's key; `None`: nothing any more."""
+        if order is None:
+            self._withdraw(address)
+        elif (wrong := malformed(order)) is not None:
+            self._session.reject(ORDER.build(address), ORDER.encode(order), wrong)
+        elif OrderAddress(order.robot, order.plan, order.task) != address:
+            await self._refuse_misplaced(address, order)
+        else:
+            await self._take(order)
+
+    def _withdraw(self, address: OrderAddress) -> None:
+        for name in [n for n in self._queue if n[:2] == (address.plan, address.task)]:
+            self._queue.remove(name)
+            self._journal.dropped(name)
+
+    async def _refuse_misplaced(self, address: OrderAddress, order: Order) -> None:
+        own = OrderAddress(order.robot, order.plan, order.task)
+        here, there = ORDER.build(address), ORDER.build(own)
+        reason = f"the order at {here} says that it is the one at {there}"
+        placed = replace(order, robot=address.robot, plan=address.plan, task=address.task)
+        if attempt_name(placed) not in self._journal.ledger.attempts:
+            await self._report_unless_stored(
+                make_report(
+                    placed, self._incarnation, ReportState.REFUSED, reason=reason, retryable=False
+                )
+            )
+
+    async def _take(self, order: Order) -> None:
+        decision = decide(self._journal.ledger, order)
+        name = attempt_name(order)
+        if isinstance(decision, Accept):
+            for older in superseded(self._journal.ledger, order):
+                self._cancel(older, "a later attempt was ordered")
+            self._journal.queued(order)
+            self._queue.append(name)
+            self._queued.set()
+        elif isinstance(decision, Renew):
+            self._journal.renewed(order)
+        elif isinstance(decision, Cancel):
+            if name in self._journal.ledger.attempts:
+                self._journal.renewed(order)
+                self._cancel(name)
+            else:
+                self._end_unstarted(order, "the order was cancelled before it started")
+        elif isinstance(decision, Repeat):
+            await self._report_unless_stored(decision.report)
+        elif isinstance(decision, Refuse):
+            self._log.warning("refuses %s of %s: %s", order.task, order.plan, decision.reason)
+            refusal = make_report(
+                order, self._incarnation, ReportState.REFUSED, reason=decision.reason
+            )
+            await self._report_unless_stored(refusal)
+
+    def _cancel(self, name: AttemptName, why: str = "the order was cancelled") -> None:
+        if name == self._running:
+            self.cancelled.set()
+        elif name in self._queue:
+            self._queue.remove(name)
+            order = self._journal.ledger.attempts[name].order
+            self._end_unstarted(order, f"{why} before it started")
+
+    def _end_unstarted(self, order: Order, reason: str) -> None:
+        report = make_report(order, self._incarnation, ReportState.CANCELLED, reason=reason)
+        self._journal.ended(order, report)
+        self._outbox.wake()
+
+    async def _report_unless_stored(self, report: Report) -> None:
+        """Report what is no news to the journal, unless it stands there already."""
+        address = report_address(report)
+        try:
+            stored = await self._session.get(REPORT, address)
+        except SchemaError as error:
+            self._log.info("cannot see whether %s is known: %s", REPORT.build(address), error)
+            stored = None
+        if stored is None or replace(stored, incarnation=report.incarnation) != report:
+            self._journal.send(report)
+            self._outbox.wake()

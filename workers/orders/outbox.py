@@ -1,0 +1,83 @@
+"""Sends what the journal has waiting, in order, until each word is read back from the store."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+
+from keyexpr_schema.errors import SchemaError, UndecodablePayload
+from keyexpr_schema.keyspace import FACT, REPORT
+from keyexpr_schema.payloads.world import Fact, FactAddress
+from keyexpr_schema.transport.session import Session
+from workers.orders.journal import Journal, Unsent
+from workers.orders.reports import report_address
+
+CONFIRM_S = 10.0
+PAUSE_S = 0.5
+"""Wall seconds before the next go when a write was not confirmed though a router is there."""
+
+
+class Outbox:
+    """The one sender of a worker's facts and reports.
+
+    The journal is the queue, so that nothing is lost when the worker or the router goes down, and
+    an attempt's facts are in the store before its report is.
+    """
+
+    def __init__(self, session: Session, journal: Journal, now_s: Callable[[], float]) -> None:
+        self._session = session
+        self._journal = journal
+        self._now_s = now_s
+        self._more = asyncio.Event()
+        self._empty = asyncio.Event()
+        self._log = logging.getLogger("robotfleet.worker.outbox")
+
+    def wake(self) -> None:
+        """There is something new in the journal."""
+        self._empty.clear()
+        self._more.set()
+
+    async def emptied(self) -> None:
+        """Wait until everything has been read back from the store."""
+        await self._empty.wait()
+
+    async def run(self) -> None:
+        """Send for ever; ends by being cancelled."""
+        while True:
+            self._more.clear()
+            while (word := self._journal.unsent()) is not None:
+                try:
+                    await self._send(word)
+                except SchemaError as error:
+                    self._log.warning("not confirmed yet, tries again: %s", error)
+                    await self._session.wait_connected()
+                    await asyncio.sleep(PAUSE_S)
+                    continue
+                self._journal.sent(word.number)
+            self._empty.set()
+            await self._more.wait()
+
+    async def _send(self, word: Unsent) -> None:
+        payload = word.payload
+        if isinstance(payload, Fact):
+            address = FactAddress.of(payload.key)
+            if await self._outdated(address, payload):
+                return
+            await self._session.confirm(FACT, address, payload, timeout_s=CONFIRM_S)
+        else:
+            reported = report_address(payload)
+            await self._session.confirm(REPORT, reported, payload, timeout_s=CONFIRM_S)
+
+    async def _outdated(self, address: FactAddress, fact: Fact) -> bool:
+        """Whether somebody else observed the same thing later.
+
+        The store goes by the time of sending, and this one may be sent long after it was seen. A
+        stored fact from the future is one from before the fleet's clock was set back (a
+        simulation that was started anew) and counts for nothing.
+        """
+        try:
+            stored = await self._session.get(FACT, address)
+        except UndecodablePayload:
+            return False
+        return stored is not None and fact.time_s < stored.time_s <= self._now_s()

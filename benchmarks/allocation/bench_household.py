@@ -69,7 +69,12 @@ def allocators(limit_s: float = DEADLINE_S, llm_file: Path | None = None) -> tup
     )
     if llm_file is None:
         return own
-    return (*own, LlmAllocator(LanguageModel(load_llm_config(llm_file)), MinMaxLoadAllocator()))
+    return (
+        *own,
+        LlmAllocator(
+            LanguageModel(load_llm_config(llm_file)), MinMaxLoadAllocator(TieBreak.NEXT_LOADS)
+        ),
+    )
 
 
 def runs(seeds: int, compared: Sequence[Allocator], console: Console) -> list[Run]:

@@ -128,8 +128,9 @@ def _by_pulp(
 
     for variable in model.variables() if start else ():
         variable.setInitialValue(start[variable.name])
-    own = pulp.PULP_CBC_CMD if solver == "CBC" else pulp.HiGHS
-    model.solve(own(msg=False, timeLimit=limit_s, gapRel=gap, warmStart=bool(start)))
+    options = {"msg": False, "timeLimit": limit_s, "gapRel": gap, "warmStart": bool(start)}
+    cbc = pulp.PULP_CBC_CMD.pulp_cbc_path  # the one in PuLP's wheel
+    model.solve(pulp.COIN_CMD(path=cbc, **options) if solver == "CBC" else pulp.HiGHS(**options))
     if solver == "HiGHS":  # PuLP says "Optimal" of what HiGHS found when its time was over
         highs = model.solverModel
         proven = str(highs.getModelStatus()).endswith("kOptimal")

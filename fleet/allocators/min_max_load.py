@@ -53,7 +53,7 @@ class MinMaxLoadAllocator(Allocator):
 
     def __init__(
         self,
-        tie_break: TieBreak = TieBreak.NEXT_LOADS,
+        tie_break: TieBreak,
         fallback_round_robin: bool = False,
         time_limit_s: float = TIME_LIMIT_S,
     ) -> None:

@@ -27,7 +27,7 @@ def embodiment_factory(name: str) -> EmbodimentFactory:
         Unknown: there is none; the message lists those there are.
     """
     found = {entry.name: entry for entry in entry_points(group=GROUP)}
-    check_known("embodiment", name, [SIM, *found], "")
+    check_known("embodiment", name, [SIM, *found])
     if name in found:
         return cast("EmbodimentFactory", found[name].load())
     from sim.embodiment import SimEmbodiment

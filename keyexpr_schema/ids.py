@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import Annotated
 
 import msgspec
@@ -20,8 +21,8 @@ That leaves out everything with a meaning to Zenoh (`/ * $ ? # @`), empty chunks
 whose bytes depend on Unicode normalisation, so an id is always one canonical chunk.
 """
 
-ACTOR_PREFIX = "?"
-"""Marks a task argument that names an actor (`?a1`) and not a thing; no id starts with it."""
+_ACTOR_MARK = "?"
+"""Marks a task's argument that names an actor and not a thing; no id starts with it."""
 
 
 def check_id(value: str, what: str = "name") -> str:
@@ -33,6 +34,31 @@ def check_id(value: str, what: str = "name") -> str:
     if not _ID.fullmatch(value):
         raise InvalidId(f"{what} {value!r} is not valid: use {ID_RULE}")
     return value
+
+
+def actor_arg(actor: str) -> str:
+    """How a task's arguments name an actor: `?a1` for `a1`."""
+    return _ACTOR_MARK + actor
+
+
+def actor_in(arg: object) -> str | None:
+    """The actor that an argument (or a fact's value) names: `a1` for `?a1`; else `None`."""
+    named = isinstance(arg, str) and arg.startswith(_ACTOR_MARK)
+    return str(arg)[len(_ACTOR_MARK) :] if named else None
+
+
+def bare_name(arg: str) -> str:
+    """The actor or the thing that an argument names, without saying which: `a1` for `?a1`."""
+    return arg.removeprefix(_ACTOR_MARK)
+
+
+def bound(arg: str, allocation: Mapping[str, str]) -> str:
+    """The argument with the actor that it names, if any, replaced by its robot.
+
+    Raises:
+        KeyError: the actor has no robot.
+    """
+    return allocation[arg[len(_ACTOR_MARK) :]] if arg.startswith(_ACTOR_MARK) else arg
 
 
 def slug(text: str, limit: int = 40) -> str:

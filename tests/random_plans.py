@@ -16,6 +16,7 @@ from fleet.core.model.skills import Action, skills_from_data
 from fleet.core.model.world import WorldModel, condition_holds, first_unmet, room_left
 from fleet.planners.deordering import Strand, tasks_from
 from keyexpr_schema.facts import FactKey, Value
+from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan, Task
 from tests.household import PLACES, SKILLS, UNLOAD, at, carrier, cup, fact, manipulator
@@ -147,7 +148,7 @@ def _lifted(walk: list[Action]) -> tuple[Task, ...]:
             task,
             actor=actor_of[action.actor],
             args={
-                name: f"?{actor_of[value]}" if value in actor_of else value
+                name: actor_arg(actor_of[value]) if value in actor_of else value
                 for name, value in action.args.items()
             },
         )
@@ -157,7 +158,7 @@ def _lifted(walk: list[Action]) -> tuple[Task, ...]:
 
 def _named(task: Task, busy: set[str]) -> Task:
     """The same; who takes part and does nothing itself is no actor, and goes by name."""
-    names = {f"?{actor}": robot for actor, robot in ALLOCATION.items() if actor not in busy}
+    names = {actor_arg(actor): robot for actor, robot in ALLOCATION.items() if actor not in busy}
     return replace(task, args={name: names.get(value, value) for name, value in task.args.items()})
 
 

@@ -28,10 +28,10 @@ class SkillContext:
     and goes out as facts just before the final report.
     """
 
-    def __init__(self, spec: RobotSpec, body: Embodiment, world: WorldCache) -> None:
+    def __init__(self, spec: RobotSpec, embodiment: Embodiment, world: WorldCache) -> None:
         self.robot: str = spec.robot
         self.spec = spec
-        self.body = body
+        self.embodiment = embodiment
         self.world = world
         self._observed: dict[FactKey, Fact] = {}
         self._log = logging.getLogger(f"robotfleet.worker.{spec.robot}")
@@ -39,7 +39,7 @@ class SkillContext:
     @property
     def now_s(self) -> float:
         """Seconds on the fleet's clock."""
-        return self.body.now_s()
+        return self.embodiment.now_s()
 
     @property
     def observed(self) -> tuple[Fact, ...]:
@@ -97,7 +97,7 @@ class SkillContext:
             point_m=point_m,
             timeout_s=timeout_s,
         )
-        outcome = await self.body.perform(motion)
+        outcome = await self.embodiment.perform(motion)
         if outcome.state is not MotionState.SUCCEEDED:
             raise SkillFailed(
                 outcome.reason or f"{kind.value} {outcome.state.value} without a reason"
@@ -124,7 +124,7 @@ class SkillContext:
 
     async def holding(self) -> str | None:
         """The object in the hand, by the hand's own sensor; what it says is learned."""
-        held = (await self.body.senses()).holding
+        held = (await self.embodiment.senses()).holding
         self.observe(HOLDING, self.robot, NOTHING if held is None else held)
         if held is not None:
             self.observe(AT, held, self.robot)
@@ -141,7 +141,7 @@ class SkillContext:
         Raises:
             SkillFailed: the way is not open.
         """
-        senses = await self.body.senses()
+        senses = await self.embodiment.senses()
         if senses.place != place:
             self.log(f"is in {senses.place or 'no place'}, not in {place}: goes there first")
             senses = (await self.do(MotionKind.GO_TO, place=place)).senses

@@ -22,7 +22,7 @@ from workers.skill import Skill, SkillRegistry
 from workers.skills.household import HOUSEHOLD
 
 WAITING_LINE_S = 1.0
-"""Wall seconds of waiting for a robot to be registered before a person is told."""
+"""Wall seconds of waiting for a robot to be registered before it is announced."""
 
 
 def run(
@@ -94,11 +94,11 @@ async def _work(
             else made
         )
         worker = Worker(session, spec, body, journal, registry, incarnation)
-        telling = asyncio.create_task(_tell(worker))
+        announcing = asyncio.create_task(_announce_ready(worker))
         try:
             await worker.run()
         finally:
-            telling.cancel()
+            announcing.cancel()
 
 
 async def _registered(session: Session, robot: str) -> RobotSpec:
@@ -121,6 +121,6 @@ async def _registered(session: Session, robot: str) -> RobotSpec:
         finding.cancel()
 
 
-async def _tell(worker: Worker) -> None:
+async def _announce_ready(worker: Worker) -> None:
     await worker.ready()
     print(f"worker {worker.spec.robot} ready (incarnation {worker.incarnation})", flush=True)  # noqa: T201

@@ -1,4 +1,4 @@
-"""What a worker does before it takes orders: find out how it left the world, and say so."""
+"""What a worker does before it takes orders: find out how it left the world, and report it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OBJECT_ARGUMENT = "object"
 _log = logging.getLogger("robotfleet.worker.recovery")
 
 
-async def make_safe(body: Embodiment) -> None:
+async def make_safe(embodiment: Embodiment) -> None:
     """Bring the robot to rest with its arm folded, keeping what it holds.
 
     What goes wrong is logged and nothing more: this runs after a failure, which is what the
@@ -34,30 +34,32 @@ async def make_safe(body: Embodiment) -> None:
     """
     try:
         async with asyncio.timeout(SAFE_S):
-            await body.stop()
-            outcome = await body.perform(Motion(kind=MotionKind.STOW))
+            await embodiment.stop()
+            outcome = await embodiment.perform(Motion(kind=MotionKind.STOW))
         if outcome.reason is not None:
-            _log.info("%s: stow: %s", body.robot, outcome.reason)
+            _log.info("%s: stow: %s", embodiment.robot, outcome.reason)
     except (RobotUnreachable, SchemaError, TimeoutError) as error:
-        _log.warning("%s could not be brought to rest: %s", body.robot, str(error) or "no answer")
+        _log.warning(
+            "%s could not be brought to rest: %s", embodiment.robot, str(error) or "no answer"
+        )
 
 
-async def first_senses(body: Embodiment) -> Senses:
+async def first_senses(embodiment: Embodiment) -> Senses:
     """The first reading of the sensors, however long the driver takes to come up."""
-    told = False
+    warned = False
     while True:
         try:
-            return await body.senses()
+            return await embodiment.senses()
         except (RobotUnreachable, SchemaError) as error:
-            if not told:
-                _log.warning("%s waits for the driver of its robot: %s", body.robot, error)
-            told = True
+            if not warned:
+                _log.warning("%s waits for the driver of its robot: %s", embodiment.robot, error)
+            warned = True
             await asyncio.sleep(DRIVER_S)
 
 
 async def observe_robot(ctx: SkillContext) -> None:
-    """Learn what the robot knows of itself: where it is, what is in its hand and its basket."""
-    senses = await first_senses(ctx.body)
+    """Observe what the robot's own sensors know: where it is, what hand and basket hold."""
+    senses = await first_senses(ctx.embodiment)
     if senses.place is not None:
         ctx.observe(AT, ctx.robot, senses.place)
     await ctx.holding()
@@ -75,7 +77,7 @@ def was_interrupted(ledger: Ledger) -> bool:
 
 
 async def observe_after_crash(ctx: SkillContext, order: Order) -> tuple[Fact, ...]:
-    """Look around after a crash in the middle of `order`, and learn.
+    """The facts that can be observed after a crash in the middle of `order`.
 
     The order's object is where the hand or the eyes say; if neither does, it is unknown.
     """
@@ -86,12 +88,12 @@ async def observe_after_crash(ctx: SkillContext, order: Order) -> tuple[Fact, ..
     except (SkillFailed, RobotUnreachable, SchemaError) as error:
         ctx.log(f"could not look around: {error}")
     thing = order.args.get(OBJECT_ARGUMENT)
-    senses = await first_senses(ctx.body)
+    senses = await first_senses(ctx.embodiment)
     for name, where in seen.items():
         if where is not None and name != senses.holding:
             ctx.observe(AT, name, where)
     if thing is not None and thing != senses.holding and seen.get(thing) is None:
-        believed = ctx.world.value_of(AT, thing)
-        if believed == ctx.robot or believed == senses.place:
+        known = ctx.world.value_of(AT, thing)
+        if known == ctx.robot or known == senses.place:
             ctx.observe(AT, thing, None)
     return ctx.observed

@@ -32,8 +32,8 @@ from workers.skill import SkillRegistry
 from workers.state_publisher import StatePublisher
 from workers.world_cache import WORLD_KEYS, WorldCache
 
-LAST_WORD_S = 3.0
-"""Wall seconds that a worker which is told to end spends on getting its last report out."""
+DRAIN_S = 3.0
+"""Wall seconds that a worker which ends spends on getting its last report out."""
 
 
 class Worker:
@@ -51,7 +51,7 @@ class Worker:
         self.spec = spec
         self.incarnation = incarnation
         self._session = session
-        self._body = embodiment
+        self._embodiment = embodiment
         self._journal = journal
         self._registry = registry
         self._world = WorldCache()
@@ -87,7 +87,7 @@ class Worker:
                         await self._serve(watch, sending, group)
                 finally:
                     # While the token is still there: who sees it go must find the last report.
-                    await self._last_word()
+                    await self._drain_outbox()
         finally:
             sending.cancel()
             await asyncio.gather(sending, return_exceptions=True)
@@ -96,20 +96,20 @@ class Worker:
         self, watch: Watch, sending: asyncio.Task[None], group: asyncio.TaskGroup
     ) -> None:
         group.create_task(self._follow(watch))
-        await first_senses(self._body)
+        await first_senses(self._embodiment)
         group.create_task(self._state_publisher.run())
         await watch.synced()
         await self._recover()
-        group.create_task(self._take_in())
+        group.create_task(self._receive_orders())
         group.create_task(self._execute())
-        group.create_task(_passing_on(sending))
+        group.create_task(_propagate(sending))
         self._ready.set()
 
-    async def _last_word(self) -> None:
+    async def _drain_outbox(self) -> None:
         self._outbox.wake()
         try:
-            self._state_publisher.doing(RobotActivity.STOPPED)
-            async with asyncio.timeout(LAST_WORD_S):
+            self._state_publisher.set_activity(RobotActivity.STOPPED)
+            async with asyncio.timeout(DRAIN_S):
                 await self._outbox.emptied()
         except (SchemaError, TimeoutError):
             self._log.warning("not everything was reported; the rest goes out at the next start")
@@ -123,21 +123,21 @@ class Worker:
             else:
                 self._world.apply(change)
 
-    async def _take_in(self) -> None:
+    async def _receive_orders(self) -> None:
         while True:
-            await self._order_queue.put(*await self._arrived.get())
+            await self._order_queue.receive(*await self._arrived.get())
 
     # --- what is done ----------------------------------------------------------------------------
 
     async def _recover(self) -> None:
-        self._state_publisher.doing(RobotActivity.RECOVERING)
+        self._state_publisher.set_activity(RobotActivity.RECOVERING)
         ledger = self._journal.ledger
         ctx = self._context()
         if was_interrupted(ledger):
-            await make_safe(self._body)
+            await make_safe(self._embodiment)
         await observe_robot(ctx)
         self._journal.send(*ctx.observed)
-        for attempt in ledger.phases(Phase.STARTED):
+        for attempt in ledger.in_phase(Phase.STARTED):
             ctx = self._context()
             facts = await observe_after_crash(ctx, attempt.order)
             reason = f"the worker of {self.spec.robot} went down while it did this"
@@ -145,7 +145,7 @@ class Worker:
         self._outbox.wake()
 
     def _context(self) -> SkillContext:
-        return SkillContext(self._latest_spec(), self._body, self._world)
+        return SkillContext(self._latest_spec(), self._embodiment, self._world)
 
     def _latest_spec(self) -> RobotSpec:
         """The robot's spec as it is registered now: somebody may have changed it."""
@@ -161,13 +161,13 @@ class Worker:
             reason=reason,
             facts=facts,
             started_s=started_s,
-            ended_s=self._body.now_s(),
+            ended_s=self._embodiment.now_s(),
         )
         self._end(order, report, facts)
 
     async def _execute(self) -> None:
         while True:
-            self._state_publisher.doing(RobotActivity.IDLE)
+            self._state_publisher.set_activity(RobotActivity.IDLE)
             await self._carry_out(await self._order_queue.next())
 
     async def _carry_out(self, order: Order) -> None:
@@ -185,17 +185,17 @@ class Worker:
             self._end(order, refusal)
             return
         ctx = self._context()
-        started_s = self._body.now_s()
+        started_s = self._embodiment.now_s()
         start = make_report(order, self.incarnation, ReportState.STARTED, started_s=started_s)
         self._journal.started(order, start)  # before anything moves
         self._outbox.wake()
-        self._state_publisher.doing(RobotActivity.BUSY, order)
+        self._state_publisher.set_activity(RobotActivity.BUSY, order)
         try:
             ended = await run_attempt(
                 order.skill,
                 lambda: skill(ctx, **arguments),
-                now_s=self._body.now_s,
-                make_safe=lambda: make_safe(self._body),
+                now_s=self._embodiment.now_s,
+                make_safe=lambda: make_safe(self._embodiment),
                 deadline_s=order.deadline_s,
                 cancelled=self._order_queue.cancelled,
                 on_failure=ctx.observe_failure,
@@ -217,7 +217,7 @@ class Worker:
         )
         try:
             # Others may go by the robot's state as soon as they have the report.
-            await self._state_publisher.feel()
+            await self._state_publisher.read_senses()
         finally:
             self._end(order, report, ctx.observed)
 
@@ -227,6 +227,6 @@ class Worker:
         self._outbox.wake()
 
 
-async def _passing_on(task: asyncio.Task[None]) -> None:
+async def _propagate(task: asyncio.Task[None]) -> None:
     """Wait for a task, so that what it raises is raised here, and leave it alone when cancelled."""
     await asyncio.shield(task)

@@ -26,28 +26,28 @@ async def ensure_single_worker(session: Session, robot: str) -> None:
     Raises:
         RobotTaken: one still is after `GONE_S`.
     """
-    rivals: set[AliveAddress] = set()
+    others: set[AliveAddress] = set()
     async with session.watch_tokens(ROBOT_ALIVE, robot=robot) as watch:
 
         async def follow() -> None:
             async for change in watch:
-                (rivals.add if change.alive else rivals.discard)(change.address)
-                if not rivals:
+                (others.add if change.alive else others.discard)(change.address)
+                if not others:
                     return
 
         following = asyncio.create_task(follow())
         try:
             await watch.synced()
-            await asyncio.sleep(0)  # what lies ready reaches `rivals`
-            if rivals:
+            await asyncio.sleep(0)  # what lies ready reaches `others`
+            if others:
                 with suppress(TimeoutError):
                     async with asyncio.timeout(GONE_S):
                         await asyncio.shield(following)
         finally:
             following.cancel()
             await asyncio.gather(following, return_exceptions=True)
-    if rivals:
-        names = ", ".join(sorted(rival.incarnation for rival in rivals))
+    if others:
+        names = ", ".join(sorted(other.incarnation for other in others))
         raise RobotTaken(
             f"a worker of {robot} is connected already ({names}): two would both carry out each "
             "order; stop that one first"

@@ -29,9 +29,9 @@ STOOD_STILL_M = 0.01
 class StatePublisher:
     """What everybody may know of this robot. `activity` and `order` are set by its worker."""
 
-    def __init__(self, session: Session, body: Embodiment, incarnation: str) -> None:
+    def __init__(self, session: Session, embodiment: Embodiment, incarnation: str) -> None:
         self._session = session
-        self._body = body
+        self._embodiment = embodiment
         self._incarnation = incarnation
         self._activity = RobotActivity.RECOVERING
         self._order: Order | None = None
@@ -39,18 +39,18 @@ class StatePublisher:
         self._sent: RobotState | None = None
         self._sent_wall_s = 0.0
         self._silent = False
-        self._log = logging.getLogger(f"robotfleet.worker.{body.robot}")
+        self._log = logging.getLogger(f"robotfleet.worker.{embodiment.robot}")
 
-    def doing(self, activity: RobotActivity, order: Order | None = None) -> None:
-        """Say what the robot is about; goes out at once."""
+    def set_activity(self, activity: RobotActivity, order: Order | None = None) -> None:
+        """Set what the robot does; published at once."""
         self._activity, self._order = activity, order
         self._publish()
 
-    async def feel(self) -> None:
+    async def read_senses(self) -> None:
         """Read the sensors once, now; what changed goes out."""
         try:
             async with asyncio.timeout(PATIENCE_S):
-                self._senses = await self._body.senses()
+                self._senses = await self._embodiment.senses()
         except (RobotUnreachable, SchemaError, TimeoutError) as error:
             if not self._silent:
                 self._log.warning("the robot's sensors give nothing: %s", str(error) or "no answer")
@@ -66,7 +66,7 @@ class StatePublisher:
             if self._session.connected and not connected:
                 self._sent = None
             connected = self._session.connected
-            await self.feel()
+            await self.read_senses()
             await asyncio.sleep(SENSE_S)
 
     def _publish(self) -> None:
@@ -80,7 +80,7 @@ class StatePublisher:
     def _state(self) -> RobotState:
         senses, order = self._senses, self._order
         return RobotState(
-            robot=self._body.robot,
+            robot=self._embodiment.robot,
             incarnation=self._incarnation,
             activity=self._activity,
             pose_m_rad=None if senses is None else senses.pose_m_rad,
@@ -89,22 +89,23 @@ class StatePublisher:
             basket=() if senses is None else senses.basket,
             plan=None if order is None else order.plan,
             task=None if order is None else order.task,
-            time_s=self._body.now_s() if senses is None else senses.time_s,
+            time_s=self._embodiment.now_s() if senses is None else senses.time_s,
         )
 
 
 def _differs(sent: RobotState | None, state: RobotState, age_s: float) -> bool:
-    """Whether `state` says something that the one sent `age_s` ago did not, and its time has come.
+    """Whether `state` is worth publishing `age_s` after the one that was sent last.
 
     The pose is compared on the floor plan only: a robot that turns on the spot stays where it is
     for everybody else.
     """
-    if sent is None or _words(sent) != _words(state):
+    if sent is None or _discrete(sent) != _discrete(state):
         return True
     if age_s < DRIVING_S or state.pose_m_rad is None or sent.pose_m_rad is None:
         return sent.pose_m_rad is None and state.pose_m_rad is not None
     return dist(sent.pose_m_rad[:2], state.pose_m_rad[:2]) > STOOD_STILL_M
 
 
-def _words(state: RobotState) -> tuple[object, ...]:
+def _discrete(state: RobotState) -> tuple[object, ...]:
+    """All but pose and time."""
     return (state.activity, state.place, state.holding, state.basket, state.plan, state.task)

@@ -21,7 +21,7 @@ import yaml
 from fleet.core.model.skills import skills_from_data
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import AT
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.payloads.plans import Task as PlanTask
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -158,7 +158,7 @@ def plan_of(home: Household, strategy: str) -> Plan:
                 PlanTask(
                     task=number[chore.name],
                     skill=chore.name,
-                    args={"robot": ACTOR_PREFIX + actor[chore.name], "place": chore.place},
+                    args={"robot": actor_arg(actor[chore.name]), "place": chore.place},
                     actor=actor[chore.name],
                     after=tuple(number[before] for before in befores),
                     goal=goal,

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 import msgspec
 
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_in
 from keyexpr_schema.payloads.plans import Plan, Task
 
 
@@ -107,7 +107,7 @@ def _name_and_skill(task: Task) -> object:
 
 def _call(task: Task) -> object:
     return task.skill, tuple(
-        sorted((n, "?" if v.startswith(ACTOR_PREFIX) else v) for n, v in task.args.items())
+        sorted((n, v if actor_in(v) is None else "?") for n, v in task.args.items())
     )
 
 
@@ -146,7 +146,7 @@ def _changes(
 def _argument(side: PlanSide, task: Task, name: str) -> str | None:
     """An argument in words; `None` where it says what the robot says, or cannot be compared."""
     value = task.args.get(name, "nothing")
-    if not value.startswith(ACTOR_PREFIX):
+    actor = actor_in(value)
+    if actor is None:
         return value
-    actor = value.removeprefix(ACTOR_PREFIX)
     return None if actor == task.actor else side.robot(actor)

@@ -11,7 +11,7 @@ from fleet.allocators.infeasibility import explained
 from fleet.allocators.load_balancing.balance import balance
 from fleet.allocators.load_balancing.problem import NoAssignment
 from keyexpr_schema.facts import AT, Value
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_arg
 
 UNABLE_S = 1e9
 """Cost of a robot that cannot be the actor, s: more than any travel, and safe to add up."""
@@ -89,7 +89,7 @@ def _last_places(problem: AllocationProblem) -> dict[str, Value]:
     actor_of = {task.task: task.actor for task in problem.plan.tasks}
     for task in graph.order:
         for literal in problem.checked.actions[task].after:
-            if literal.variable == (AT, ACTOR_PREFIX + actor_of[task]):
+            if literal.variable == (AT, actor_arg(actor_of[task])):
                 places[actor_of[task]] = literal.value
     return places
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from fleet.allocators.base import AllocationProblem, NotAllocated
 from fleet.allocators.load_balancing.problem import NoAssignment
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import bare_name
 from keyexpr_schema.payloads.plans import Violation
 
 NAMED = 6
@@ -56,4 +56,4 @@ def _why(problem: AllocationProblem, clique: Sequence[str]) -> str:
 
 
 def _actors(participants: Iterable[str]) -> set[str]:
-    return {name.removeprefix(ACTOR_PREFIX) for name in participants}
+    return {bare_name(name) for name in participants}

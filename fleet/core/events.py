@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
+from fleet.core.plan_entry import PlanOutcome
 from fleet.core.state import Policy
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalStatus
@@ -150,8 +151,8 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
     """A planning job ended with a checked and allocated plan.
 
     `durations_s` and `extra_after` are by task, `sequence` lists each robot's actors in order.
-    `mended` says that what was left of the plan got another allocation, `left_out` which goals it
-    does without, and why.
+    `repaired` says that the residual plan goes on, perhaps with goals planned anew beside it,
+    `left_out` which goals the plan does without, and why.
     """
 
     job: int
@@ -164,8 +165,13 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
     planning_time_s: float
     lower_bound_s: float | None = None
     notes: tuple[str, ...] = ()
-    mended: bool = False
+    repaired: bool = msgspec.field(default=False, name="mended")
     left_out: dict[str, str] = {}
+
+    @property
+    def outcome(self) -> PlanOutcome:
+        """What allocation came to."""
+        return msgspec.convert(self, PlanOutcome, from_attributes=True)
 
 
 class PlanningFailed(Event, frozen=True, kw_only=True):

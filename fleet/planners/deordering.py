@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
 from keyexpr_schema.facts import FactKey
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_arg, bare_name
 from keyexpr_schema.payloads.plans import Task
 
 
@@ -52,7 +52,7 @@ def tasks_from(
                     actors[robot] = f"a{revision}{actor_count}"
                     if robot in strand.named:
                         pins[actors[robot]] = robot
-                args[parameter] = ACTOR_PREFIX + actors[robot]
+                args[parameter] = actor_arg(actors[robot])
             lifted = action.skill.ground(args)
             rows.append((f"t{first_task + len(rows)}", strand.goal, lifted))
     after = _dependencies([(name, action) for name, _, action in rows])
@@ -62,7 +62,7 @@ def tasks_from(
             task=name,
             skill=action.skill.name,
             args=dict(action.args),
-            actor=action.actor.removeprefix(ACTOR_PREFIX),
+            actor=bare_name(action.actor),
             after=reduced[name],
             goal=goal,
             duration_s=action.skill.duration_s,

@@ -1,10 +1,11 @@
-"""What an allocator is told besides plan and world: who is busy, what matters, who did what."""
+"""The allocation context: who is busy, what matters, who did what until now."""
 
 from __future__ import annotations
 
 from fleet.allocators.base import Circumstances
 from fleet.core.dispatch.delays import behind_s
-from fleet.core.state import PlanningJob, State
+from fleet.core.plan_entry import PlanningJob
+from fleet.core.state import State
 
 
 def circumstances_of(job: PlanningJob, state: State, busy: frozenset[str]) -> Circumstances:
@@ -16,9 +17,13 @@ def circumstances_of(job: PlanningJob, state: State, busy: frozenset[str]) -> Ci
         },
         priority={goal.goal: goal.priority for goal in goals if goal.priority},
         due_s={goal.goal: goal.due_s - state.time_s for goal in goals if goal.due_s is not None},
-        home={actor: robot for actor, robot in job.home.items() if robot in state.robots},
-        sequence=job.sequence,
-        under_way=busy | frozenset(job.begun),
+        home={
+            actor: robot
+            for actor, robot in job.previous_allocation.items()
+            if robot in state.robots
+        },
+        sequence=job.actor_order,
+        under_way=busy | frozenset(job.begun_actors),
     )
 
 

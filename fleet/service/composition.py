@@ -36,14 +36,14 @@ SKILL_MODELS = "robotfleet.skill_models"
 
 @dataclass(frozen=True)
 class Composition:
-    """What this planner is made of. `judge` is asked, at no cost, whether a goal can be reached."""
+    """What this planner is made of. `feasibility` says at no cost if a goal can be reached."""
 
     skills: Mapping[str, SkillModel]
     planners: Mapping[str, Planner]
     allocators: Mapping[str, Allocator]
     language_model: LanguageModel
     interpreter: LlmInterpreter
-    judge: Planner
+    feasibility: Planner
 
     @property
     def strategies(self) -> tuple[str, ...]:

@@ -18,14 +18,15 @@ from fleet.core.dispatch.dispatcher import next_timer
 from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event
 from fleet.core.model.skill_phrases import phrases_of
-from fleet.core.state import PlanningJob, Policy, State
+from fleet.core.plan_entry import PlanningJob
+from fleet.core.state import Policy, State
 from fleet.core.step import replay, step
 from fleet.errors import Superseded
 from fleet.service.composition import Composition
 from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, At, event_of, missed_deletions
 from fleet.service.outbox import Outbox
-from fleet.service.planning_job import carry_out
+from fleet.service.planning_job import run_planning_job
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import (
     ANSWER,
@@ -177,7 +178,7 @@ class PlannerService:
             self._token(token)
             if token.alive:
                 here.add((token.address.robot, token.address.incarnation))
-        for robot, runs in self._state.alive.items():
+        for robot, runs in self._state.connected.items():
             for run in runs:
                 if (robot, run) not in here:
                     self._apply(
@@ -290,7 +291,9 @@ class PlannerService:
     async def _make_plan(self, job: PlanningJob) -> None:
         at = self._at()
         try:
-            event: Event = await asyncio.to_thread(carry_out, job, self._state, self._parts, at)
+            event: Event = await asyncio.to_thread(
+                run_planning_job, job, self._state, self._parts, at
+            )
         except Exception as error:
             log.exception("planning job %d", job.job)
             event = events.PlanningFailed(

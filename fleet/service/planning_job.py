@@ -1,4 +1,4 @@
-"""Carries out planning jobs: planner, allocator and checker in a row, away from keys."""
+"""Runs planning jobs: planner, allocator and checker in a row, away from keys."""
 
 from __future__ import annotations
 
@@ -12,28 +12,29 @@ from msgspec.structs import replace
 from fleet.allocators.base import Allocated, Allocator, NotAllocated
 from fleet.core.events import PlanningFailed, PlanningSucceeded
 from fleet.core.model.world import WorldModel
-from fleet.core.state import PlanningJob, State
+from fleet.core.plan_entry import PlanningJob
+from fleet.core.state import State
 from fleet.planners.base import NoPlan, PlanningProblem
+from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
+from fleet.planners.plan_repair import repair_plan
 from fleet.service.allocation_context import circumstances_of
 from fleet.service.composition import Composition
-from fleet.service.oversubscription import PartialPlan, plan_what_can_be
-from fleet.service.plan_repair import mended_plan
 from keyexpr_schema.facts import SEARCHED
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_in
 from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.payloads.tasks import TaskState
 
 
 @dataclass(frozen=True)
-class _Made:
+class _Result:
     plan: Plan
     allocated: Allocated
-    mended: bool = False
+    repaired: bool = False
     left_out: Mapping[str, str] = field(default_factory=dict)
 
 
-def carry_out(
+def run_planning_job(
     job: PlanningJob, state: State, parts: Composition, at: Mapping[str, float]
 ) -> PlanningSucceeded | PlanningFailed:
     """Plan, check and allocate; how it ended, as an event stamped with `at`.
@@ -65,48 +66,48 @@ def carry_out(
         makespan_s=schedule.makespan_s,
         lower_bound_s=allocated.lower_bound_s,
         notes=allocated.notes,
-        mended=made.mended,
+        repaired=made.repaired,
         left_out=dict(made.left_out),
         planning_time_s=took_s,
     )
 
 
-def _plan_and_allocate(job: PlanningJob, state: State, parts: Composition) -> _Made | NoPlan:
+def _plan_and_allocate(job: PlanningJob, state: State, parts: Composition) -> _Result | NoPlan:
     allocator = parts.allocators.get(job.allocator)
     if allocator is None:
         choices = ", ".join(sorted(parts.allocators))
         return NoPlan(f"there is no allocator {job.allocator}: choose one of {choices}")
-    desk = _Desk(job, state, parts, state.world(parts.skills), allocator)
-    return (desk.mended() if job.remaining is not None else None) or desk.planned()
+    run = _Run(job, state, parts, state.world(parts.skills), allocator)
+    return run.repaired() or run.planned()
 
 
 @dataclass(frozen=True)
-class _Desk:
+class _Run:
     job: PlanningJob
     state: State
     parts: Composition
     world: WorldModel
     allocator: Allocator
 
-    def mended(self) -> _Made | None:
-        """What is left of the plan with another allocation, if that will do."""
+    def repaired(self) -> _Result | None:
+        """The residual plan, repaired if need be, with another allocation, if that will do."""
         planner = self.parts.planners.get(self.job.planner)
-        if planner is None or self.job.remaining is None:
+        if planner is None or self.job.residual is None:
             return None
-        made = mended_plan(
-            self.job.remaining, self._problem(), planner, self.parts.judge, self._reached()
+        made = repair_plan(
+            self.job.residual, self._problem(), planner, self.parts.feasibility, self._reached()
         )
         if made is None:
             return None
-        begun = {task.actor for task in made.plan.tasks} & set(self.job.begun)
+        begun = {task.actor for task in made.plan.tasks} & set(self.job.begun_actors)
         found = self._allocate(made.plan, _busy_robots(self.job, made.plan, self.state, begun))
         if isinstance(found, NotAllocated):
             return None
-        if not self.job.outside and not made.left_out and not made.changed:
+        if not self.job.reallocation and not made.left_out and not made.changed:
             return None  # it is as it was, and there is a reason why that will not do
-        return self._made(made, found, mended=True)
+        return self._result(made, found, repaired=True)
 
-    def planned(self) -> _Made | NoPlan:
+    def planned(self) -> _Result | NoPlan:
         """A new plan; of goals that can be reached, where the job allows that."""
         made = self._plan()
         if isinstance(made, NoPlan):
@@ -114,21 +115,21 @@ class _Desk:
         found = self._allocate(made.plan, _busy_robots(self.job, made.plan, self.state))
         if isinstance(found, NotAllocated):
             return NoPlan(found.violations[0].sentence, found.violations)
-        return self._made(made, found)
+        return self._result(made, found)
 
-    def _made(self, made: PartialPlan, found: Allocated, mended: bool = False) -> _Made:
-        told = (f"goal {goal} is left out: {reason}" for goal, reason in made.left_out.items())
-        found = changed(found, notes=(*found.notes, *told))
-        return _Made(made.plan, found, mended, made.left_out)
+    def _result(self, made: PartialPlan, found: Allocated, repaired: bool = False) -> _Result:
+        notes = (f"goal {goal} is left out: {reason}" for goal, reason in made.left_out.items())
+        found = changed(found, notes=(*found.notes, *notes))
+        return _Result(made.plan, found, repaired, made.left_out)
 
     def _allocate(self, plan: Plan, busy: Mapping[str, str]) -> Allocated | NotAllocated:
         """With actors that robots are `busy` with left where they are and begun with, if that can
         be; else only left where they are; else as if nothing were under way."""
-        told = circumstances_of(self.job, self.state, frozenset(busy))
-        calm = changed(told, under_way=frozenset())
+        context = circumstances_of(self.job, self.state, frozenset(busy))
+        calm = changed(context, under_way=frozenset())
         kept = replace(plan, pins={**busy, **plan.pins})
-        made = self.allocator.allocate(kept, self.world, told)
-        if isinstance(made, NotAllocated) and told.under_way:
+        made = self.allocator.allocate(kept, self.world, context)
+        if isinstance(made, NotAllocated) and context.under_way:
             made = self.allocator.allocate(kept, self.world, calm)
         if isinstance(made, NotAllocated) and kept.pins != plan.pins:
             made = self.allocator.allocate(plan, self.world, calm)
@@ -147,7 +148,7 @@ class _Desk:
         if not job.partial:
             made = planner.plan(problem)
             return made if isinstance(made, NoPlan) else PartialPlan(made)
-        return plan_what_can_be(planner, self.parts.judge, problem, self._reached())
+        return plan_reachable_goals(planner, self.parts.feasibility, problem, self._reached())
 
     def _problem(self) -> PlanningProblem:
         job, state = self.job, self.state
@@ -191,7 +192,7 @@ def _busy_robots(
     """
     entry = state.plans.get(job.plan)
     begun: dict[tuple[object, ...], list[str]] = {}
-    for name in job.running:
+    for name in job.under_way:
         record = entry.records.get(name) if entry is not None else None
         if record is not None and record.robot and record.actor not in begun_actors:
             work = _work(record.skill, record.args, (record.robot, *state.robots))
@@ -212,7 +213,7 @@ def _work(skill: str, args: Mapping[str, str], robots: Iterable[str | None]) -> 
     return skill, *sorted(
         (name, value)
         for name, value in args.items()
-        if value not in others and not value.startswith(ACTOR_PREFIX)
+        if value not in others and actor_in(value) is None
     )
 
 

@@ -24,6 +24,7 @@ from keyexpr_schema.keyspace import STORE_JOURNAL, key_of
 from keyexpr_schema.payloads.service import JournalEntry, StoreAddress, StoreJournal, StoreQuery
 from keyexpr_schema.transport.questions import reply_encoding
 from keyexpr_schema.transport.storage import Store, Write
+from keyexpr_schema.transport.trace import Operation, Trace
 from keyexpr_schema.transport.wire import (
     decode_wire,
     stamp_of_text,
@@ -64,6 +65,8 @@ class _Feed:
         # Not complete: a complete queryable on `**` would take queries away from those that
         # serve a key.
         self._queryable = session.declare_queryable("**", handlers.FifoChannel(CHANNEL))
+        journal = STORE_JOURNAL.build(StoreAddress())
+        Trace("store").note(Operation.SERVE, STORE_JOURNAL, journal)
         self._threads = [
             threading.Thread(target=self._write, name="store-write"),
             threading.Thread(target=self._answer, name="store-answer"),

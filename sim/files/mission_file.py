@@ -11,7 +11,7 @@ import msgspec
 from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from sim.errors import BadFile
-from sim.files.solids import Solid, solids
+from sim.files.solids import solids
 from sim.files.world_file import check_objects, load_world
 from sim.files.world_schema import LARGEST_RADIUS_M, PointXY, WorldFile
 from sim.files.yaml_file import FileEntry, find_file, read_yaml
@@ -146,7 +146,7 @@ def _check_start(
             f"(x 0 to {world.size_m[0]}, y 0 to {world.size_m[1]})"
         )
     for solid in solids(world):
-        if _distance(solid, x, y) < LARGEST_RADIUS_M:
+        if solid.distance_m(x, y) < LARGEST_RADIUS_M:
             raise BadFile(
                 f"{where}: start.at_m: [{x}, {y}] is less than {LARGEST_RADIUS_M} m from "
                 f"{solid.name}; a robot needs that much room"
@@ -162,12 +162,3 @@ def _check_start(
                 f"{where}: start.at_m: it overlaps {other.spec.robot}, {gap:.2f} m away; "
                 f"keep {2 * LARGEST_RADIUS_M} m between two robots"
             )
-
-
-def _distance(solid: Solid, x: float, y: float) -> float:
-    """From a point to the box, m; 0 inside."""
-    c, s = math.cos(solid.yaw_rad), math.sin(solid.yaw_rad)
-    dx, dy = x - solid.center_m[0], y - solid.center_m[1]
-    along = max(abs(c * dx + s * dy) - solid.half_m[0], 0.0)
-    across = max(abs(c * dy - s * dx) - solid.half_m[1], 0.0)
-    return math.hypot(along, across)

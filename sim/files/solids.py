@@ -23,6 +23,14 @@ class Solid:
     yaw_rad: float
     height_m: float
 
+    def distance_m(self, x_m: float, y_m: float) -> float:
+        """Distance of a point to the box on the floor plan; 0 inside."""
+        c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        dx, dy = x_m - self.center_m[0], y_m - self.center_m[1]
+        along = max(abs(c * dx + s * dy) - self.half_m[0], 0.0)
+        across = max(abs(c * dy - s * dx) - self.half_m[1], 0.0)
+        return math.hypot(along, across)
+
 
 def solids(world: WorldFile) -> tuple[Solid, ...]:
     """Everything that stands in the way on the floor: outer walls, inner walls, furniture."""

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
-from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
+from keyexpr_schema.payloads.motions import (
+    Detection,
+    Motion,
+    MotionKind,
+    MotionOutcome,
+    MotionState,
+    Senses,
+)
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from sim.backend import Backend
@@ -19,9 +25,9 @@ from sim.mujoco_world.drives import PERIOD_S
 from sim.mujoco_world.driving import approach, fold, go_to, look
 from sim.mujoco_world.handling import grasp, release
 from sim.mujoco_world.handover import release_in_basket
+from sim.mujoco_world.motion import MotionContext, MotionFailed, MotionRun, Steps
 from sim.mujoco_world.observer import Observer
 from sim.mujoco_world.robot_body import RobotBody
-from sim.mujoco_world.stage import Act, CannotDo, Ending, Stage, Steps
 from sim.navigation import Navigator
 
 STEPS = round(PERIOD_S / STEP_S)
@@ -31,7 +37,7 @@ WATCH_EVERY = 2
 SETTLE_PERIODS = 6
 """Control periods before the clock starts, in which everything comes to rest where it stands."""
 
-MOTIONS: dict[MotionKind, Callable[[Stage, Act, Motion], Steps]] = {
+MOTIONS: dict[MotionKind, Callable[[MotionContext, MotionRun], Steps]] = {
     MotionKind.GO_TO: go_to,
     MotionKind.LOOK: look,
     MotionKind.APPROACH: approach,
@@ -40,17 +46,6 @@ MOTIONS: dict[MotionKind, Callable[[Stage, Act, Motion], Steps]] = {
     MotionKind.RELEASE_IN_BASKET: release_in_basket,
     MotionKind.STOW: fold,
 }
-
-
-@dataclass
-class _Run:
-    """A robot's latest motion. `ended` is `None` while it runs."""
-
-    motion: Motion
-    began_s: float
-    steps: Steps
-    act: Act
-    ended: MotionOutcome | None = None
 
 
 class MujocoBackend(Backend):
@@ -93,9 +88,9 @@ class MujocoBackend(Backend):
                 spec.robot, start, found.description.clearance_m, spec.capabilities["drive"]
             )
         observer = Observer(self._model, self._data, world, self._bodies, seed)
-        self._stage = Stage(world, self._bodies, navigator, observer, lambda: self.time_s)
+        self._context = MotionContext(world, self._bodies, navigator, observer)
         self._collisions = Collisions(self._model, self._data, self._bodies)
-        self._runs: dict[str, _Run] = {}
+        self._runs: dict[str, MotionRun] = {}
         self._ctrl = self._data.ctrl.copy()
         self._scene = draw_scene(self._model, world.world, self.robots)
         mujoco.mj_forward(self._model, self._data)
@@ -107,7 +102,7 @@ class MujocoBackend(Backend):
 
     def truths(self) -> tuple[Truth, ...]:
         """Where every object really is, in the order of the world file."""
-        return self._stage.observer.truths(self.time_s)
+        return self._context.observer.truths(self.time_s)
 
     def contacts(self) -> ContactCount:
         """Collisions since the start, each touch counted once."""
@@ -125,7 +120,7 @@ class MujocoBackend(Backend):
     def phase(self, robot: str) -> str | None:
         """What the robot's running motion is at ("lowering the hand"), for people who watch."""
         run = self._runs.get(robot)
-        return run.act.phase if run is not None and run.ended is None else None
+        return run.phase if run is not None and run.ended is None else None
 
     def scene(self) -> Scene:
         """The shapes of everything."""
@@ -136,29 +131,28 @@ class MujocoBackend(Backend):
         return draw_frame(self._model, self._data, self._scene, self.time_s)
 
     def _begin(self, robot: str, motion: Motion) -> None:
-        act = Act(self._bodies[robot])
-        steps = MOTIONS[motion.kind](self._stage, act, motion)
-        self._runs[robot] = _Run(motion, self.time_s, steps, act)
+        run = self._runs[robot] = MotionRun(self._bodies[robot], motion, self.time_s)
+        run.steps = MOTIONS[motion.kind](self._context, run)
 
     def _stop(self, robot: str) -> None:
         run = self._runs.get(robot)
         if run is not None and run.ended is None:
-            self._end(robot, run, MotionState.STOPPED, f"stopped while {run.act.phase}")
+            self._end(robot, run, MotionState.STOPPED, f"stopped while {run.phase}")
 
     def _advance(self) -> None:
-        stage = self._stage
+        context = self._context
         # A robot whose arm is out, stopped in mid-work perhaps, must not be moved.
         pinned = {name for name, body in self._bodies.items() if body.arm_out()}
         for robot, run in self._runs.items():
             if run.ended is None:
-                if run.act.manual or run.act.handling:
+                if run.manual or run.handling:
                     pinned.add(robot)
-                if run.act.guest_of is not None:
-                    pinned.add(run.act.guest_of)
+                if run.guest_of is not None:
+                    pinned.add(run.guest_of)
         for robot in self.robots:
-            stage.navigator.pin(robot, robot in pinned)
+            context.navigator.pin(robot, robot in pinned)
         poses = {name: body.pose() for name, body in self._bodies.items()}
-        stage.legs = stage.navigator.tick(self.time_s, poses)
+        context.legs = context.navigator.tick(self.time_s, poses)
         for robot, run in self._runs.items():
             if run.ended is None:
                 self._resume(robot, run)
@@ -166,40 +160,38 @@ class MujocoBackend(Backend):
             self._steer(robot, body)
         self._physics()
 
-    def _resume(self, robot: str, run: _Run) -> None:
+    def _resume(self, robot: str, run: MotionRun) -> None:
         try:
             next(run.steps)
         except StopIteration as stop:
-            ending = stop.value
-            assert isinstance(ending, Ending)
-            self._end(robot, run, MotionState.SUCCEEDED, None, ending)
+            self._end(robot, run, MotionState.SUCCEEDED, None, stop.value)
             return
-        except CannotDo as error:
+        except MotionFailed as error:
             self._end(robot, run, MotionState.FAILED, str(error))
             return
         if self.time_s - run.began_s >= run.motion.timeout_s:
             reason = (
                 f"{run.motion.kind.value} took longer than {run.motion.timeout_s:g} s; "
-                f"it was {run.act.phase}"
+                f"it was {run.phase}"
             )
             self._end(robot, run, MotionState.FAILED, reason)
 
     def _end(
         self,
         robot: str,
-        run: _Run,
+        run: MotionRun,
         state: MotionState,
         reason: str | None,
-        ending: Ending | None = None,
+        detections: tuple[Detection, ...] = (),
     ) -> None:
         run.steps.close()
-        self._stage.navigator.cancel(robot)
+        self._context.navigator.cancel(robot)
         self._bodies[robot].freeze()
         run.ended = MotionOutcome(
             state=state,
             senses=self._senses(robot),
             reason=reason,
-            detections=ending.detections if ending else (),
+            detections=detections,
         )
 
     def _steer(self, robot: str, body: RobotBody) -> None:
@@ -207,9 +199,9 @@ class MujocoBackend(Backend):
         if body.arm_out():
             return
         run = self._runs.get(robot)
-        if run is not None and run.ended is None and run.act.manual:
+        if run is not None and run.ended is None and run.manual:
             return
-        leg = self._stage.legs.get(robot)
+        leg = self._context.legs.get(robot)
         if leg is not None:
             body.drive.drive(*leg.target_m, leg.yaw_rad, leg.speed_limit_m_s)
 
@@ -220,13 +212,13 @@ class MujocoBackend(Backend):
         for body in self._bodies.values():
             body.tick(self._ctrl)
         change = (self._ctrl - old) / STEPS
-        acts = {name: run.act for name, run in self._runs.items() if run.ended is None}
+        runs = {name: run for name, run in self._runs.items() if run.ended is None}
         for step in range(1, STEPS + 1):
             # A setpoint that moves smoothly does not shake what the hand holds.
             self._data.ctrl[:] = old + change * step
             mujoco.mj_step(self._model, self._data)
             if step % WATCH_EVERY == 0:
-                self._collisions.watch(self.time_s, acts)
+                self._collisions.watch(self.time_s, runs)
         self.time_s = round(self.time_s + PERIOD_S, 6)
 
     def _outcome(self, robot: str) -> MotionOutcome | None:
@@ -246,6 +238,6 @@ class MujocoBackend(Backend):
             pose_m_rad=(x, y, yaw),
             place=self.world.place_at(x, y),
             holding=body.held,
-            basket=self._stage.observer.basket(body),
+            basket=self._context.observer.basket(body),
             moving=body.moving(),
         )

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from sim.mujoco_world.motion import MotionRun
 from sim.mujoco_world.robot_body import RobotBody
-from sim.mujoco_world.stage import Act
 
 ENDS_AFTER_S = 0.5
 
@@ -46,7 +46,7 @@ class Collisions:
                 owner[geom] = _FIXED
         self._owner, self._hand = owner, hand
 
-    def watch(self, time_s: float, acts: Mapping[str, Act | None]) -> None:
+    def watch(self, time_s: float, runs: Mapping[str, MotionRun | None]) -> None:
         """Look at the contacts of the last physics step."""
         count = self._data.ncon
         if count == 0:
@@ -58,24 +58,24 @@ class Collisions:
         if not hits.any():
             return
         for first, second in geoms[hits].tolist():
-            self._touch(time_s, first, second, acts)
+            self._touch(time_s, first, second, runs)
 
     def _touch(
-        self, time_s: float, first: int, second: int, acts: Mapping[str, Act | None]
+        self, time_s: float, first: int, second: int, runs: Mapping[str, MotionRun | None]
     ) -> None:
         if self._owner[first] < 0:
             first, second = second, first
         a, b = int(self._owner[first]), int(self._owner[second])
         name = self._names[a]
         if b == _FIXED:
-            act = acts.get(name)
-            if self._hand[first] and act is not None and act.handling:
+            run = runs.get(name)
+            if self._hand[first] and run is not None and run.handling:
                 return
             pair = (name, self._body_names[second])
         else:
             other = self._names[b]
-            if self._reaches_into(first, name, other, acts) or self._reaches_into(
-                second, other, name, acts
+            if self._reaches_into(first, name, other, runs) or self._reaches_into(
+                second, other, name, runs
             ):
                 return
             pair = (name, other) if name < other else (other, name)
@@ -90,7 +90,7 @@ class Collisions:
             self.robot_robot += 1
 
     def _reaches_into(
-        self, geom: int, name: str, other: str, acts: Mapping[str, Act | None]
+        self, geom: int, name: str, other: str, runs: Mapping[str, MotionRun | None]
     ) -> bool:
-        act = acts.get(name)
-        return bool(self._hand[geom]) and act is not None and act.guest_of == other
+        run = runs.get(name)
+        return bool(self._hand[geom]) and run is not None and run.guest_of == other

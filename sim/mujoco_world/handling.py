@@ -9,16 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from keyexpr_schema.payloads.motions import Motion, PointM
+from keyexpr_schema.payloads.motions import PointM
 from sim.mujoco_world.arm import Arm, Gripper
 from sim.mujoco_world.drives import PERIOD_S
 from sim.mujoco_world.driving import distance_m
-from sim.mujoco_world.robot_body import RobotBody
-from sim.mujoco_world.stage import (
-    Act,
-    CannotDo,
-    Ending,
-    Stage,
+from sim.mujoco_world.motion import (
+    MotionContext,
+    MotionFailed,
+    MotionRun,
     Step,
     Steps,
     face,
@@ -26,6 +24,7 @@ from sim.mujoco_world.stage import (
     stow,
     wait,
 )
+from sim.mujoco_world.robot_body import RobotBody
 
 HOVERS_M = (0.15, 0.12, 0.09, 0.06)
 """How far above its last position the hand comes in, the first that the arm can reach."""
@@ -56,114 +55,114 @@ class Reach:
     at: list[float]
 
 
-def grasp(stage: Stage, act: Act, motion: Motion) -> Steps:
+def grasp(context: MotionContext, run: MotionRun) -> Steps:
     """Close the hand on an object near a point, lift it and fold the arm."""
-    name, point = motion.object, motion.point_m
+    name, point = run.motion.object, run.motion.point_m
     assert name is not None and point is not None
-    robot = act.robot
+    robot = run.robot
     arm, gripper = hand_of(robot)
     if robot.held is not None:
-        raise CannotDo(f"the hand is not empty: it holds {robot.held}")
+        raise MotionFailed(f"the hand is not empty: it holds {robot.held}")
     payload = robot.spec.capabilities.get("grip", 0.0)
-    entry = stage.world.object_entries[name]
-    mass = stage.world.object_kinds[entry.kind].mass_kg
+    entry = context.world.object_entries[name]
+    mass = context.world.object_kinds[entry.kind].mass_kg
     if mass > payload:
-        raise CannotDo(f"{name} weighs {mass:.2f} kg; the hand carries {payload:.2f} kg")
-    yield from stow(act)
-    _check_reach(act, point)
-    act.handling = True
-    yield from face(act, point[0], point[1])
-    point = _refined(stage, robot, name, point)
-    yield from face(act, point[0], point[1])
-    grip_m = _grip_above_base(gripper, stage.observer.height_m(name))
+        raise MotionFailed(f"{name} weighs {mass:.2f} kg; the hand carries {payload:.2f} kg")
+    yield from stow(run)
+    _check_reach(run, point)
+    run.handling = True
+    yield from face(run, point[0], point[1])
+    point = _refined(context, robot, name, point)
+    yield from face(run, point[0], point[1])
+    grip_m = _grip_above_base(gripper, context.observer.height_m(name))
     target = (point[0], point[1], point[2] + grip_m)
-    path = reach_down(arm, target, stage.observer.opening_rad(name))
+    path = reach_down(arm, target, context.observer.opening_rad(name))
     robot.grip_above_base_m = grip_m
     try:
-        yield from _take(act, path, name)
-    except CannotDo:
+        yield from _take(run, path, name)
+    except MotionFailed:
         robot.let_go()
         gripper.open()
-        yield from stow(act)
+        yield from stow(run)
         raise
-    return Ending()
+    return ()
 
 
-def _take(act: Act, path: Reach, name: str) -> Step:
+def _take(run: MotionRun, path: Reach, name: str) -> Step:
     """Come down around the object, close on it, lift it.
 
     Raises:
-        CannotDo: it is not in the hand in the end.
+        MotionFailed: it is not in the hand in the end.
     """
-    robot = act.robot
+    robot = run.robot
     _, gripper = hand_of(robot)
     gripper.open()
-    yield from move_arm(act, path.above, "moving the hand above the object")
-    yield from move_arm(act, path.at, "lowering the hand", slower=1.5)
+    yield from move_arm(run, path.above, "moving the hand above the object")
+    yield from move_arm(run, path.at, "lowering the hand", slower=1.5)
     robot.reaching_for = name
-    yield from _close(act, gripper, name)
-    yield from move_arm(act, path.above, f"lifting {name}", slower=2.0)
+    yield from _close(run, gripper, name)
+    yield from move_arm(run, path.above, f"lifting {name}", slower=2.0)
     yield from wait(SETTLE_S)
     if not (robot.holds(name) and gripper.feels()):
-        raise CannotDo(f"{name} slipped out of the hand while it was lifted")
-    yield from stow(act)
+        raise MotionFailed(f"{name} slipped out of the hand while it was lifted")
+    yield from stow(run)
     if not robot.holds(name):
-        raise CannotDo(f"{name} slipped out of the hand while the arm was folded")
+        raise MotionFailed(f"{name} slipped out of the hand while the arm was folded")
 
 
-def release(stage: Stage, act: Act, motion: Motion) -> Steps:
+def release(context: MotionContext, run: MotionRun) -> Steps:
     """Set the held object down so that its base touches a point."""
-    point = motion.point_m
+    point = run.motion.point_m
     assert point is not None
-    robot = act.robot
+    robot = run.robot
     arm, _ = hand_of(robot)
     held = held_by(robot)
-    yield from stow(act)
-    _check_reach(act, point)
-    act.handling = True
-    yield from face(act, point[0], point[1])
-    _check_free(stage, robot, held, point)
+    yield from stow(run)
+    _check_reach(run, point)
+    run.handling = True
+    yield from face(run, point[0], point[1])
+    _check_free(context, robot, held, point)
     target = (point[0], point[1], point[2] + robot.grip_above_base_m + RELEASE_LIFT_M)
     path = reach_down(arm, target, None)
     try:
-        yield from move_arm(act, path.above, "moving the hand above the point", slower=1.5)
+        yield from move_arm(run, path.above, "moving the hand above the point", slower=1.5)
         # folded, the arm hid from the camera what is straight ahead
-        _check_free(stage, robot, held, point)
-        yield from let_down(act, path, held, RELEASE_OPENING_M)
-    except CannotDo:
-        yield from stow(act)
+        _check_free(context, robot, held, point)
+        yield from let_down(run, path, held, RELEASE_OPENING_M)
+    except MotionFailed:
+        yield from stow(run)
         raise
-    return Ending()
+    return ()
 
 
-def let_down(act: Act, path: Reach, held: str, opening_m: float) -> Step:
+def let_down(run: MotionRun, path: Reach, held: str, opening_m: float) -> Step:
     """Lower what is held, open the hand, withdraw it and make sure that it is empty."""
-    robot = act.robot
+    robot = run.robot
     _, gripper = hand_of(robot)
-    yield from move_arm(act, path.above, "moving the hand above the point", slower=1.5)
-    yield from move_arm(act, path.at, "lowering the hand", slower=2.5)
+    yield from move_arm(run, path.above, "moving the hand above the point", slower=1.5)
+    yield from move_arm(run, path.at, "lowering the hand", slower=2.5)
     yield from wait(0.3)
     if robot.held is None:
-        raise CannotDo(f"{held} was lost on the way down")
-    act.phase = "opening the hand"
+        raise MotionFailed(f"{held} was lost on the way down")
+    run.phase = "opening the hand"
     robot.let_go()
     gripper.open(gripper.opening_m() + opening_m)
     yield from wait(0.6)
     if gripper.feels():
         robot.reaching_for = held
-        raise CannotDo(f"the hand is open and {held} still sticks to it")
-    yield from move_arm(act, path.above, "withdrawing the hand", slower=1.5)
-    yield from stow(act)
+        raise MotionFailed(f"the hand is open and {held} still sticks to it")
+    yield from move_arm(run, path.above, "withdrawing the hand", slower=1.5)
+    yield from stow(run)
 
 
 def hand_of(robot: RobotBody) -> tuple[Arm, Gripper]:
     """The robot's arm and gripper.
 
     Raises:
-        CannotDo: it has none.
+        MotionFailed: it has none.
     """
     if robot.arm is None or robot.gripper is None:
-        raise CannotDo(f"{robot.name} has no hand")
+        raise MotionFailed(f"{robot.name} has no hand")
     return robot.arm, robot.gripper
 
 
@@ -171,36 +170,36 @@ def held_by(robot: RobotBody) -> str:
     """The object in the robot's hand.
 
     Raises:
-        CannotDo: the hand is empty.
+        MotionFailed: the hand is empty.
     """
     if robot.held is None:
-        raise CannotDo("the hand is empty")
+        raise MotionFailed("the hand is empty")
     return robot.held
 
 
-def _check_reach(act: Act, point_m: PointM) -> None:
-    arm = act.robot.arm
+def _check_reach(run: MotionRun, point_m: PointM) -> None:
+    arm = run.robot.arm
     assert arm is not None
-    distance = distance_m(act, point_m)
+    distance = distance_m(run, point_m)
     least, greatest = arm.entry.reach_m
     if not least - 0.02 <= distance <= greatest + 0.01:
-        raise CannotDo(
+        raise MotionFailed(
             f"the point is {distance:.2f} m away and the hand reaches from {least:.2f} to "
             f"{greatest:.2f} m: approach it first"
         )
 
 
-def _refined(stage: Stage, robot: RobotBody, name: str, point: PointM) -> PointM:
+def _refined(context: MotionContext, robot: RobotBody, name: str, point: PointM) -> PointM:
     """Where the camera sees the object now; where it was said to be if it does not see it.
 
     Raises:
-        CannotDo: it is seen somewhere else.
+        MotionFailed: it is seen somewhere else.
     """
-    if not stage.observer.sees(robot, name):
+    if not context.observer.sees(robot, name):
         return point
-    seen = stage.observer.detect(robot, name).point_m
+    seen = context.observer.detect(robot, name).point_m
     if math.dist(seen, point) > PERCEIVED_NEAR_M:
-        raise CannotDo(
+        raise MotionFailed(
             f"{name} is not there: it is seen at ({seen[0]:.2f}, {seen[1]:.2f}, {seen[2]:.2f}), "
             f"{math.dist(seen, point):.2f} m away from the point"
         )
@@ -216,7 +215,7 @@ def reach_down(arm: Arm, target: PointM, opening_rad: float | None) -> Reach:
     """Joint values for a target and above it, clear of obstacles: the first seed that works.
 
     Raises:
-        CannotDo: there are none.
+        MotionFailed: there are none.
     """
     x, y, z = target
     touched = None
@@ -232,19 +231,19 @@ def reach_down(arm: Arm, target: PointM, opening_rad: float | None) -> Reach:
                     return Reach(above=above, at=at)
                 break
     if touched is not None:
-        raise CannotDo(f"the arm would touch {touched}: approach the point from another side")
-    raise CannotDo(
+        raise MotionFailed(f"the arm would touch {touched}: approach the point from another side")
+    raise MotionFailed(
         f"the hand cannot get to ({x:.2f}, {y:.2f}, {z:.2f}) from where the robot stands"
     )
 
 
-def _close(act: Act, gripper: Gripper, name: str) -> Step:
+def _close(run: MotionRun, gripper: Gripper, name: str) -> Step:
     """Close the hand until both fingers press on something.
 
     Raises:
-        CannotDo: they met, or only one of them found something.
+        MotionFailed: they met, or only one of them found something.
     """
-    act.phase = f"closing the hand on {name}"
+    run.phase = f"closing the hand on {name}"
     gripper.close()
     waited = 0.0
     felt = 0.0
@@ -253,23 +252,23 @@ def _close(act: Act, gripper: Gripper, name: str) -> Step:
         waited += PERIOD_S
         felt = felt + PERIOD_S if gripper.feels() else 0.0
         if waited > CLOSE_TIMEOUT_S:
-            raise CannotDo(f"the hand closed on nothing: {name} is not between the fingers")
+            raise MotionFailed(f"the hand closed on nothing: {name} is not between the fingers")
 
 
-def _check_free(stage: Stage, robot: RobotBody, held: str, point: PointM) -> None:
-    """Raises `CannotDo` where the camera sees something standing on the point."""
-    for name in stage.world.object_entries:
-        if name == held or not stage.observer.sees(robot, name):
+def _check_free(context: MotionContext, robot: RobotBody, held: str, point: PointM) -> None:
+    """Raises `MotionFailed` where the camera sees something standing on the point."""
+    for name in context.world.object_entries:
+        if name == held or not context.observer.sees(robot, name):
             continue
-        seen = stage.observer.detect(robot, name).point_m
-        room = (width_m(stage, name) + width_m(stage, held)) / 2 + 0.03
+        seen = context.observer.detect(robot, name).point_m
+        room = (width_m(context, name) + width_m(context, held)) / 2 + 0.03
         if math.dist(seen, point) < room:
-            raise CannotDo(
+            raise MotionFailed(
                 f"{name} stands where {held} was to be set down; keep {room:.2f} m from it"
             )
 
 
-def width_m(stage: Stage, name: str) -> float:
+def width_m(context: MotionContext, name: str) -> float:
     """The larger horizontal extent of an object [m]."""
-    entry = stage.world.object_entries[name]
-    return max(stage.world.object_kinds[entry.kind].extent_m[:2])
+    entry = context.world.object_entries[name]
+    return max(context.world.object_kinds[entry.kind].extent_m[:2])

@@ -43,7 +43,7 @@ class MotionCalls:
         if call.incarnation != self._incarnation:
             if self._incarnation is not None:
                 self._superseded.add(self._incarnation)
-                self._stop("a newer run of this robot's worker took over")
+                self.stop("a newer run of this robot's worker took over")
             self._incarnation = call.incarnation
         self._asked_at_s = now_s
         if call.stop:
@@ -55,7 +55,7 @@ class MotionCalls:
                 state=MotionState.SUCCEEDED, senses=self._backend.senses(self.robot)
             )
         if call.call != self._active:
-            self._stop("another motion took its place")
+            self.stop("another motion took its place")
             self._backend.begin(self.robot, call.motion)
             self._active = call.call
             self.held_until_s = 0.0
@@ -90,25 +90,21 @@ class MotionCalls:
         self.held_until_s = now_s + grace_s
         return True
 
-    def forsaken(self, now_s: float, patience_s: float) -> bool:
+    def abandoned(self, now_s: float, patience_s: float) -> bool:
         """Nobody has asked about the running motion for `patience_s`."""
         idle_s = now_s - self._asked_at_s
         return self.active and self._waiting == 0 and idle_s > patience_s
 
-    def excuse(self, now_s: float) -> None:
+    def postpone_watchdog(self, now_s: float) -> None:
         """Nobody could ask until now: that counts against nobody."""
         self._asked_at_s = max(self._asked_at_s, now_s)
-
-    def give_up(self, reason: str) -> None:
-        """Stop the running motion."""
-        self._stop(reason)
 
     def _stop_call(self, call: MotionCall) -> MotionOutcome:
         if call.call in self._ended:
             return self._ended[call.call]
         if self._active is not None:
             # A stop with a name of its own stops whatever runs.
-            self._stop("it was told to stop")
+            self.stop("it was told to stop")
         else:
             self._backend.stop(self.robot)
         if call.call not in self._ended:
@@ -116,7 +112,8 @@ class MotionCalls:
             self._remember(call.call, self._refusal("it was told to stop", MotionState.STOPPED))
         return self._ended[call.call]
 
-    def _stop(self, reason: str) -> None:
+    def stop(self, reason: str) -> None:
+        """Stop the running motion, if there is one."""
         if self._active is None:
             return
         self._backend.stop(self.robot)

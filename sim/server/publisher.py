@@ -1,4 +1,4 @@
-"""Tells the keys how the simulated world stands, no faster than listeners can take."""
+"""Publishes the state of the simulated world, no faster than listeners can take."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ FRAME_S, FRAMES_WALL_S, FRAMES = 0.1, 0.05, 100
 """A frame is kept this often in simulated time; they go out together this often in wall time, or
 as soon as there are so many."""
 REPEAT_WALL_S = 1.0
-"""Everything is told again after this: a put is lost without a word while a router is away."""
+"""Everything is put again after this: a put is lost silently while a router is away."""
 
 
-class Publisher:
+class WorldPublisher:
     """What of a backend goes out on which key, and how often."""
 
     def __init__(self, session: Session, backend: Backend, speed: float | None) -> None:
@@ -79,9 +79,9 @@ class Publisher:
             now_s - self._truth_s >= TRUTH_S and wall_s - self._truth_wall_s >= TRUTH_WALL_S
         ):
             self._truth_s, self._truth_wall_s = now_s, wall_s
-            self._judge(repeat)
+            self._publish_truth(repeat)
         elif robots:
-            self._judge(False)
+            self._publish_truth(False)
         if repeat:
             self._frames.append(self._backend.frame())
         if self._frames and (
@@ -90,7 +90,7 @@ class Publisher:
             self._session.put(SIM_FRAMES, SimAddress(), Frames(frames=tuple(self._frames)))
             self._frames, self._frames_wall_s = [], wall_s
 
-    def _judge(self, repeat: bool) -> None:
+    def _publish_truth(self, repeat: bool) -> None:
         for truth in self._backend.truths():
             state = (truth.place, truth.support, truth.held_by, truth.settled)
             if repeat or self._truths.get(truth.object) != state:
@@ -112,6 +112,6 @@ class Publisher:
                 await self._session.confirm(SIM_SCENE, SimAddress(), scene)
             except SchemaError:
                 continue  # no store there yet: without one there is nothing to look at, either
-            # The link tells of itself only by these fields, and half a second is soon enough.
+            # The link shows its state only in these fields, and half a second is soon enough.
             while self._session.link.generation == generation:  # noqa: ASYNC110
                 await asyncio.sleep(0.5)

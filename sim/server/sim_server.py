@@ -1,4 +1,4 @@
-"""Joins a simulated world to keys: answers motion calls, lets time run, tells what happens.
+"""Joins a simulated world to keys: answers motion calls, lets time run, publishes what happens.
 
 Everything runs on one asyncio loop, the world included: it goes on for a few milliseconds at a
 time, and in between calls are answered. So nothing else ever touches the backend, and no lock is
@@ -16,7 +16,7 @@ from keyexpr_schema.payloads.simulation import MotionCall, SimRobotAddress
 from keyexpr_schema.transport.session import Session
 from sim.backend import Backend
 from sim.server.motion_calls import MotionCalls
-from sim.server.publisher import Publisher
+from sim.server.publisher import WorldPublisher
 
 CHUNK_S = 0.004
 """Wall time for which the world goes on before calls are looked at."""
@@ -37,7 +37,7 @@ class SimServer:
     simulated time. `idle_speed` is how fast time runs while no robot moves, in that mode.
 
     A motion that nobody has asked about for `watchdog_s` (beyond the wait of the last call) is
-    stopped, as a driver would stop a robot whose worker is gone. While our own link to the router
+    stopped, as a calls would stop a robot whose worker is gone. While our own link to the router
     is down, that clock stands still: then it is not the worker who is away.
     """
 
@@ -53,8 +53,8 @@ class SimServer:
         self._session, self._backend = session, backend
         self._speed, self._grace_s, self._watchdog_s = speed, grace_s, watchdog_s
         self._idle_speed = idle_speed
-        self._drivers = {robot: MotionCalls(backend, robot) for robot in backend.robots}
-        self._publisher = Publisher(session, backend, speed)
+        self._calls = {robot: MotionCalls(backend, robot) for robot in backend.robots}
+        self._publisher = WorldPublisher(session, backend, speed)
         self._called = asyncio.Event()
         self._ready = asyncio.Event()
 
@@ -68,22 +68,22 @@ class SimServer:
             keeping = asyncio.create_task(self._publisher.keep_scene())
             self._ready.set()
             try:
-                await self._go_on()
+                await self._run_world()
             finally:
                 keeping.cancel()
                 await asyncio.gather(keeping, return_exceptions=True)
 
     async def _answer(self, address: SimRobotAddress, call: MotionCall) -> MotionOutcome:
-        driver = self._drivers.get(address.robot)
-        if driver is None:
+        calls = self._calls.get(address.robot)
+        if calls is None:
             raise SchemaError(
                 f"there is no robot {address.robot!r} in this world; "
-                f"there are {', '.join(self._drivers)}"
+                f"there are {', '.join(self._calls)}"
             )
         self._called.set()
-        return await driver.answer(call, asyncio.get_running_loop())
+        return await calls.answer(call, asyncio.get_running_loop())
 
-    async def _go_on(self) -> None:
+    async def _run_world(self) -> None:
         loop = asyncio.get_running_loop()
         base_wall_s, base_s = loop.time(), self._backend.time_s
         while True:
@@ -91,15 +91,15 @@ class SimServer:
             speed = self._speed_now(wall_s)
             if speed is None:
                 base_wall_s, base_s = wall_s, self._backend.time_s
-                await self._chunk(loop, None)
+                await self._advance_until(loop, None)
                 continue
             due_s = base_s + (wall_s - base_wall_s) * speed
             if speed == 0.0 or due_s - self._backend.time_s > LAG_S * speed:
                 base_wall_s, base_s = wall_s, self._backend.time_s
                 due_s = base_s
             if speed > 0.0:
-                await self._chunk(loop, max(due_s, self._backend.time_s))
-            self._look_after(loop.time())
+                await self._advance_until(loop, max(due_s, self._backend.time_s))
+            self._poll_motions(loop.time())
             self._called.clear()
             pause_s = 0.005 if speed > 0.0 or self._held(loop.time()) else 0.05
             try:
@@ -113,36 +113,36 @@ class SimServer:
             return self._speed
         if self._held(wall_s):
             return 0.0
-        if any(driver.active for driver in self._drivers.values()):
+        if any(calls.active for calls in self._calls.values()):
             return None
         return self._idle_speed
 
     def _held(self, wall_s: float) -> bool:
         """The world waits for the next call of a robot whose motion just ended."""
         return self._speed is None and any(
-            not driver.active and wall_s < driver.held_until_s for driver in self._drivers.values()
+            not calls.active and wall_s < calls.held_until_s for calls in self._calls.values()
         )
 
-    async def _chunk(self, loop: asyncio.AbstractEventLoop, until_s: float | None) -> None:
+    async def _advance_until(self, loop: asyncio.AbstractEventLoop, until_s: float | None) -> None:
         """Let the world go on for a few milliseconds, at most to `until_s`."""
         end_wall_s = loop.time() + CHUNK_S
         while until_s is None or self._backend.time_s < until_s:
             self._backend.advance()
-            if self._look_after(loop.time()) or loop.time() >= end_wall_s:
+            if self._poll_motions(loop.time()) or loop.time() >= end_wall_s:
                 break
         await asyncio.sleep(0)
 
-    def _look_after(self, wall_s: float) -> bool:
-        """Ended motions, forsaken ones, and whatever is to be told; whether a motion ended."""
+    def _poll_motions(self, wall_s: float) -> bool:
+        """Settle ended motions, stop abandoned ones, publish; whether a motion ended."""
         connected = self._session.connected
         ended = []
-        for driver in self._drivers.values():
-            if driver.settle(wall_s, self._grace_s):
-                ended.append(driver.robot)
+        for calls in self._calls.values():
+            if calls.settle(wall_s, self._grace_s):
+                ended.append(calls.robot)
             elif not connected:
-                driver.excuse(wall_s)
-            elif driver.forsaken(wall_s, self._watchdog_s):
-                driver.give_up("nobody asked about it any more")
-                ended.append(driver.robot)
+                calls.postpone_watchdog(wall_s)
+            elif calls.abandoned(wall_s, self._watchdog_s):
+                calls.stop("nobody asked about it any more")
+                ended.append(calls.robot)
         self._publisher.publish(tuple(ended))
         return bool(ended)

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from fleet.core.checker.plan_checker import check_plan
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel, condition_holds, first_unmet, room_left
+from keyexpr_schema.ids import bare_name
 from keyexpr_schema.payloads.plans import Plan
 from tests.random_plans import ALLOCATION, plans
 
@@ -27,7 +28,7 @@ def works(plan: Plan, world: WorldModel, allocation: dict[str, str]) -> bool:
     graph = TaskGraph({task.task: task.after for task in plan.tasks})
     actions = {
         task.task: world.skills[task.skill].ground(
-            {k: allocation.get(v.removeprefix("?"), v) for k, v in task.args.items()}
+            {k: allocation.get(bare_name(v), v) for k, v in task.args.items()}
         )
         for task in plan.tasks
     }

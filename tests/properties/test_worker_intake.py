@@ -85,7 +85,7 @@ class Intake:
                 self.ledger.put(Attempt(order, Phase.QUEUED))
                 self.queue.append(name)
             case Renew():
-                self.ledger.saw(order)
+                self.ledger.raise_fences(order)
             case Cancel():
                 if name in self.queue:
                     self.queue.remove(name)
@@ -132,7 +132,7 @@ class Intake:
             if attempt.phase is not Phase.QUEUED:
                 kept.put(attempt)
         self.ledger, self.queue, self.running = kept, [], None
-        for attempt in kept.phases(Phase.STARTED):
+        for attempt in kept.in_phase(Phase.STARTED):
             self.end(attempt_name(attempt.order), ReportState.INTERRUPTED)
 
     def check(self) -> None:
@@ -192,7 +192,7 @@ def test_the_journal_on_disk_is_the_ledger_in_memory(steps: list[tuple[Order, st
                 elif step == "open":
                     journal.__exit__(None, None, None)
                     journal = Journal(path).__enter__()
-                    for attempt in ledger.phases(Phase.QUEUED):
+                    for attempt in ledger.in_phase(Phase.QUEUED):
                         ledger.drop(attempt_name(attempt.order))
                 assert journal.ledger.epoch == ledger.epoch
                 assert journal.ledger.revisions == ledger.revisions

@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from fleet.core.checker.plan_checker import check_plan
 from fleet.core.model.skills import skills_from_data
+from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.world import Surface
@@ -20,7 +21,7 @@ A1, A2 = "?a1", "?a2"
 
 def task(name: str, skill: str, actor: str, *after: str, **args: str) -> Task:
     return Task(
-        task=name, skill=skill, actor=actor, after=after, args={"robot": f"?{actor}", **args}
+        task=name, skill=skill, actor=actor, after=after, args={"robot": actor_arg(actor), **args}
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cli.judge import Judgement, Verdict, all_agreed, judge
+from cli.demo.verdict import GoalVerdict, Verdict, all_agreed, goal_verdicts
 from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
 from keyexpr_schema.payloads.simulation import Truth
 
@@ -38,15 +38,15 @@ def truth(
     )
 
 
-def verdict(goal: GoalStatus, found: Truth | None, robots: dict[str, str | None]) -> Verdict:
-    (only,) = judge({"g": goal}, {"cup_1": found} if found else {}, robots)
+def verdict(goal: GoalStatus, found: Truth | None, robots: dict[str, str | None]) -> GoalVerdict:
+    (only,) = goal_verdicts({"g": goal}, {"cup_1": found} if found else {}, robots)
     return only
 
 
 @pytest.mark.parametrize("support", ["hallway_table", "floor", "locobot"])
 def test_an_object_that_lies_in_the_place_is_there_whatever_it_lies_on(support: str) -> None:
     found = verdict(status(), truth(support=support), {})
-    assert found.physics is Judgement.HOLDS
+    assert found.physics is Verdict.HOLDS
     assert found.agreed
     assert found.sentence == f"cup_1 lies in hallway on {support}"
 
@@ -62,7 +62,7 @@ def test_an_object_that_lies_in_the_place_is_there_whatever_it_lies_on(support: 
 )
 def test_physics_overrules_a_planner_that_says_reached(found: Truth, words: str) -> None:
     said = verdict(status(), found, {})
-    assert said.physics is Judgement.FAILS
+    assert said.physics is Verdict.FAILS
     assert not said.agreed
     assert words in said.sentence
     assert "but the planner says it is reached" in said.sentence
@@ -70,7 +70,7 @@ def test_physics_overrules_a_planner_that_says_reached(found: Truth, words: str)
 
 def test_a_goal_that_holds_but_was_given_up_is_not_agreed() -> None:
     said = verdict(status(GoalState.FAILED), truth(), {})
-    assert said.physics is Judgement.HOLDS
+    assert said.physics is Verdict.HOLDS
     assert not said.agreed
     assert "the planner says failed: the cup is gone" in said.sentence
 
@@ -93,7 +93,7 @@ def test_a_robot_stands_where_its_senses_say() -> None:
 )
 def test_what_physics_cannot_see_is_never_agreed(goal: GoalStatus) -> None:
     said = verdict(goal, truth(), {})
-    assert said.physics is Judgement.NOT_JUDGED
+    assert said.physics is Verdict.NOT_JUDGED
     assert not said.agreed
 
 
@@ -107,12 +107,12 @@ def test_one_failing_condition_fails_the_goal() -> None:
         ),
     )
     assert verdict(goal, truth(), {"hsr": "hallway"}).agreed
-    assert verdict(goal, truth(), {"hsr": None}).physics is Judgement.FAILS
+    assert verdict(goal, truth(), {"hsr": None}).physics is Verdict.FAILS
 
 
 def test_no_goals_is_no_success() -> None:
     assert not all_agreed(())
-    assert all_agreed(judge({"g": status()}, {"cup_1": truth()}, {}))
+    assert all_agreed(goal_verdicts({"g": status()}, {"cup_1": truth()}, {}))
 
 
 def derived(relation: str, value: bool = True, *subjects: str) -> GoalStatus:
@@ -133,11 +133,13 @@ def test_one_subject_of_several_is_enough() -> None:
         ),
     )
     truths = {"cup_1": truth(), "cup_2": truth("kitchen")}
-    (found,) = judge({"g": goal}, truths, {})
+    (found,) = goal_verdicts({"g": goal}, truths, {})
     assert found.agreed
     assert found.sentence == "cup_1 lies in hallway on hallway_table"
-    (nowhere,) = judge({"g": goal}, {"cup_1": truth("kitchen"), "cup_2": truth("kitchen")}, {})
-    assert nowhere.physics is Judgement.NOT_JUDGED  # nobody sees the ghost
+    (nowhere,) = goal_verdicts(
+        {"g": goal}, {"cup_1": truth("kitchen"), "cup_2": truth("kitchen")}, {}
+    )
+    assert nowhere.physics is Verdict.NOT_JUDGED  # nobody sees the ghost
 
 
 @pytest.mark.parametrize(
@@ -153,8 +155,8 @@ def test_the_physics_sees_hands(held_by: str | None, wanted: bool, agreed: bool)
     ("told", "agreed"), [("hallway", True), ("kitchen", False), (None, False), ("hsr", True)]
 )
 def test_what_is_found_is_where_the_fleet_says(told: str | None, agreed: bool) -> None:
-    (said,) = judge(
+    (said,) = goal_verdicts(
         {"g": derived("located")}, {"cup_1": truth()}, {"hsr": "hallway"}, {"cup_1": told}
     )
     assert said.agreed is agreed
-    assert said.physics is not Judgement.NOT_JUDGED
+    assert said.physics is not Verdict.NOT_JUDGED

@@ -7,12 +7,13 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from cli.plans.comparison import PlanSide, compare
+from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.plans import Plan, Task
 
 
 def task(name: str, skill: str = "navigate", actor: str = "a1", *after: str, **args: str) -> Task:
     return Task(
-        task=name, skill=skill, actor=actor, after=after, args={"robot": f"?{actor}", **args}
+        task=name, skill=skill, actor=actor, after=after, args={"robot": actor_arg(actor), **args}
     )
 
 

@@ -10,9 +10,9 @@ from rich.console import RenderableType
 
 from cli.errors import BadFile
 from cli.plans.files import read_plan, write_plan
-from cli.show.page import page
-from cli.show.plan_graph import layers, plan_dot, plan_graph
-from cli.show.plan_page import making_lines
+from cli.views.console import console
+from cli.views.plan_graph import layers, plan_dot, plan_graph
+from cli.views.plans import making_lines
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Making, Plan, PlanChange, PlanState, PlanStatus, Task
 
@@ -35,7 +35,7 @@ DIAMOND = (task("t4", "t2", "t3"), task("t2", "t1"), task("t3", "t1"), task("t1"
 
 def drawn(what: RenderableType) -> str:
     file = io.StringIO()
-    page(file).print(what)
+    console(file).print(what)
     return file.getvalue()
 
 

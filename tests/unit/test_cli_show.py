@@ -13,10 +13,10 @@ from rich.console import RenderableType
 from cli.commands.processes import parse_speed
 from cli.commands.tasks import parse_args
 from cli.errors import BadArgument
-from cli.show.live import tell
-from cli.show.page import page, table
-from cli.show.plan_tree import in_order, plan_tree
-from cli.show.words import natural, outcome
+from cli.views.console import console, table
+from cli.views.live import change_line
+from cli.views.plan_tree import in_order, plan_tree
+from cli.views.text import natural_order, outcome
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus, Task, Violation
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -50,7 +50,7 @@ PLAN = Plan(
 
 def drawn(what: RenderableType) -> str:
     file = io.StringIO()
-    page(file).print(what)
+    console(file).print(what)
     return file.getvalue()
 
 
@@ -113,7 +113,7 @@ def test_work_of_earlier_revisions_stays_in_the_tree() -> None:
 
 
 def test_names_with_numbers_are_in_the_order_people_expect() -> None:
-    assert sorted(["t10", "t2", "a1", "t1"], key=natural) == ["a1", "t1", "t2", "t10"]
+    assert sorted(["t10", "t2", "a1", "t1"], key=natural_order) == ["a1", "t1", "t2", "t10"]
 
 
 def test_a_rejected_plan_shows_why() -> None:
@@ -170,15 +170,15 @@ def test_a_change_in_a_line() -> None:
         ended_s=12.0,
         reason="it slipped",
     )
-    assert tell(record) == (
+    assert change_line(record) == (
         12.0,
         "p1/t1 pick(object=cup_1) hsr: failed (attempt 3): it slipped",
     )
-    assert tell(GoalStatus(goal="g", state=GoalState.REACHED, time_s=3.0)) == (
+    assert change_line(GoalStatus(goal="g", state=GoalState.REACHED, time_s=3.0)) == (
         3.0,
         "goal g is reached",
     )
-    assert tell("anything else") is None
+    assert change_line("anything else") is None
 
 
 def test_arguments_of_tasks() -> None:

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from cli.demo.summary import Summary, task_lines, times
-from cli.judge import Judgement, Verdict
-from cli.show.summary_page import summary_page
+from cli.demo.verdict import GoalVerdict, Verdict
+from cli.views.demo_summary import summary_page
 from fleet.core.schedule.idle_time import union_s
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState, Try
@@ -81,9 +81,9 @@ def test_the_union_of_intervals_counts_every_unit_once(pairs: list[tuple[int, in
     assert union_s(spans) == len(units)
 
 
-def verdict(goal: str, physics: Judgement, planner: GoalState) -> Verdict:
-    agreed = physics is Judgement.HOLDS and planner is GoalState.REACHED
-    return Verdict(
+def verdict(goal: str, physics: Verdict, planner: GoalState) -> Verdict:
+    agreed = physics is Verdict.HOLDS and planner is GoalState.REACHED
+    return GoalVerdict(
         goal=goal, physics=physics, planner=planner, agreed=agreed, sentence="so", conditions=()
     )
 
@@ -111,9 +111,9 @@ def page_of(*verdicts: Verdict) -> str:
 
 
 def test_the_title_tells_a_failure_from_what_physics_cannot_see() -> None:
-    holds = verdict("bring", Judgement.HOLDS, GoalState.REACHED)
-    unseen = verdict("search-all", Judgement.NOT_JUDGED, GoalState.REACHED)
-    failed = verdict("fetch", Judgement.FAILS, GoalState.REACHED)
+    holds = verdict("bring", Verdict.HOLDS, GoalState.REACHED)
+    unseen = verdict("search-all", Verdict.NOT_JUDGED, GoalState.REACHED)
+    failed = verdict("fetch", Verdict.FAILS, GoalState.REACHED)
     assert "Every goal is reached: the physics and the planner agree." in page_of(holds)
     assert "the physics cannot see all of it" in page_of(holds, unseen)
     assert "Not every goal is reached" in page_of(holds, unseen, failed)

@@ -15,6 +15,7 @@ from typing import Any
 import yaml
 
 from keyexpr_schema import keyspace as keys
+from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.key import Key
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanAddress, PlanState, PlanStatus, Task
@@ -290,7 +291,7 @@ def plan() -> Plan:
         Task(
             task=step.task,
             skill=step.skill,
-            args={k: f"?{ACTORS[v]}" if v in ACTORS else v for k, v in step.args.items()},
+            args={k: actor_arg(ACTORS[v]) if v in ACTORS else v for k, v in step.args.items()},
             actor=ACTORS[step.robot],
             after=step.after,
             goal=step.goal,

@@ -6,9 +6,9 @@ import asyncio
 import sys
 from pathlib import Path
 
+from cli.client.world import put_world
 from cli.demo.bring_up import router_up
-from cli.demo.fleet import Fleet, free_endpoint
-from cli.telling import put_world
+from cli.demo.child_processes import ChildProcesses, free_endpoint
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.world_file import load_world
 from sim.files.world_payloads import object_payloads, place_payloads
@@ -29,20 +29,24 @@ async def example(*words: str) -> tuple[int, str, str]:
 
 
 async def test_a_goal_is_understood_or_refused_with_a_reason(tmp_path: Path) -> None:
-    async with Fleet(free_endpoint(), "robotfleet", tmp_path) as fleet:
-        fleet.declare("router", "router", "--listen", fleet.endpoint, "--data", str(tmp_path / "r"))
-        fleet.declare("planner", "planner", "--data", str(tmp_path / "p"), layer=1)
-        await fleet.start("router")
-        await fleet.guard(router_up(fleet))
-        await fleet.start("planner")
+    async with ChildProcesses(free_endpoint(), "robotfleet", tmp_path) as processes:
+        processes.declare(
+            "router", "router", "--listen", processes.endpoint, "--data", str(tmp_path / "r")
+        )
+        processes.declare("planner", "planner", "--data", str(tmp_path / "p"), layer=1)
+        await processes.start("router")
+        await processes.guard(router_up(processes))
+        await processes.start("planner")
         world = load_world(ROOT / "configs" / "worlds" / "home.yaml")
-        async with open_session(SessionConfig(endpoints=(fleet.endpoint,))) as session:
+        async with open_session(SessionConfig(endpoints=(processes.endpoint,))) as session:
             await put_world(session, place_payloads(world), object_payloads(world))
-        code, out, _ = await fleet.guard(
-            example("Bring the first cup to the hallway.", fleet.endpoint)
+        code, out, _ = await processes.guard(
+            example("Bring the first cup to the hallway.", processes.endpoint)
         )
         assert (code, out.strip()) == (0, "waiting: at(cup_1) = hallway")
-        code, out, _ = await fleet.guard(example("Bring the unicorn to me.", fleet.endpoint))
+        code, out, _ = await processes.guard(
+            example("Bring the unicorn to me.", processes.endpoint)
+        )
         assert code == 1
         assert out.startswith("rejected: ")
 

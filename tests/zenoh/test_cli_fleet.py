@@ -12,16 +12,18 @@ from pathlib import Path
 import pytest
 
 from cli.demo.bring_up import router_up
-from cli.demo.fleet import Fleet, free_endpoint
+from cli.demo.child_processes import ChildProcesses, free_endpoint
 from cli.errors import BadArgument, ProcessDied
 
 DEADLINE_S = 20.0
 
 
-def make(out: Path) -> Fleet:
-    fleet = Fleet(free_endpoint(), "demo", out)
-    fleet.declare("router", "router", "--listen", fleet.endpoint, "--data", str(out / "data"))
-    return fleet
+def make(out: Path) -> ChildProcesses:
+    processes = ChildProcesses(free_endpoint(), "demo", out)
+    processes.declare(
+        "router", "router", "--listen", processes.endpoint, "--data", str(out / "data")
+    )
+    return processes
 
 
 def runs(pid: int) -> bool:
@@ -39,77 +41,77 @@ async def until(condition: Callable[[], bool]) -> None:
 
 
 async def test_a_process_is_ready_by_its_keys_and_gone_at_the_end(tmp_path: Path) -> None:
-    async with make(tmp_path) as fleet:
-        await fleet.start("router")
-        await fleet.guard(router_up(fleet))
-        pid = fleet.pid("router")
+    async with make(tmp_path) as processes:
+        await processes.start("router")
+        await processes.guard(router_up(processes))
+        pid = processes.pid("router")
         assert pid is not None
         assert runs(pid)
         with pytest.raises(BadArgument, match="runs already"):
-            await fleet.start("router")
+            await processes.start("router")
     assert not runs(pid)
-    assert f"listening on {fleet.endpoint}" in fleet.log("router").read_text()
+    assert f"listening on {processes.endpoint}" in processes.log("router").read_text()
 
 
 async def test_a_death_that_nobody_asked_for_ends_the_work(tmp_path: Path) -> None:
-    async with make(tmp_path) as fleet:
-        await fleet.start("router")
-        await fleet.guard(router_up(fleet))
-        pid = fleet.pid("router")
+    async with make(tmp_path) as processes:
+        await processes.start("router")
+        await processes.guard(router_up(processes))
+        pid = processes.pid("router")
         assert pid is not None
         os.kill(pid, signal.SIGKILL)
         with pytest.raises(ProcessDied) as error:
-            await fleet.guard(asyncio.Event().wait())
+            await processes.guard(asyncio.Event().wait())
     assert "router ended unexpectedly by SIGKILL; its log is" in str(error.value)
-    assert str(fleet.log("router")) in str(error.value)
+    assert str(processes.log("router")) in str(error.value)
 
 
 async def test_a_process_that_cannot_start_says_why(tmp_path: Path) -> None:
-    async with make(tmp_path) as fleet:
-        fleet.declare("ghost", "sim", "no-such-mission")
-        await fleet.start("ghost")
+    async with make(tmp_path) as processes:
+        processes.declare("ghost", "sim", "no-such-mission")
+        await processes.start("ghost")
         with pytest.raises(ProcessDied, match=r"exit code 1, saying .*no mission") as error:
-            await fleet.guard(asyncio.Event().wait())
-    assert str(fleet.log("ghost")) in str(error.value)
+            await processes.guard(asyncio.Event().wait())
+    assert str(processes.log("ghost")) in str(error.value)
 
 
 async def test_a_second_simulation_in_a_realm_is_turned_away(tmp_path: Path) -> None:
-    async with make(tmp_path) as fleet:
-        await fleet.start("router")
-        await fleet.guard(router_up(fleet))
+    async with make(tmp_path) as processes:
+        await processes.start("router")
+        await processes.guard(router_up(processes))
         for name in ("sim", "sim-again"):
-            fleet.declare(name, "sim", "two-cups", "--backend", "kinematic")
-        await fleet.start("sim")
-        await until(lambda: "running" in fleet.log("sim").read_text())
-        await fleet.kill("sim")
-        await fleet.start("sim")  # the dead one's scene is there still, and keeps nobody out
-        await until(lambda: fleet.log("sim").read_text().count("running") == 2)
-        await fleet.start("sim-again")
+            processes.declare(name, "sim", "two-cups", "--backend", "kinematic")
+        await processes.start("sim")
+        await until(lambda: "running" in processes.log("sim").read_text())
+        await processes.kill("sim")
+        await processes.start("sim")  # the dead one's scene is there still, and keeps nobody out
+        await until(lambda: processes.log("sim").read_text().count("running") == 2)
+        await processes.start("sim-again")
         with pytest.raises(ProcessDied, match=r"sim-again .*a simulated world runs in realm demo"):
-            await fleet.guard(asyncio.Event().wait())
-        assert fleet.pid("sim") is not None
+            await processes.guard(asyncio.Event().wait())
+        assert processes.pid("sim") is not None
 
 
 async def test_a_killed_process_can_be_started_again(tmp_path: Path) -> None:
-    async with make(tmp_path) as fleet:
-        await fleet.start("router")
-        await fleet.guard(router_up(fleet))
-        first = fleet.pid("router")
-        await fleet.kill("router")
-        assert fleet.pid("router") is None
-        await fleet.start("router")
-        await fleet.guard(router_up(fleet))
-        assert fleet.pid("router") not in (None, first)
-    assert fleet.log("router").read_text().count("listening") == 2
+    async with make(tmp_path) as processes:
+        await processes.start("router")
+        await processes.guard(router_up(processes))
+        first = processes.pid("router")
+        await processes.kill("router")
+        assert processes.pid("router") is None
+        await processes.start("router")
+        await processes.guard(router_up(processes))
+        assert processes.pid("router") not in (None, first)
+    assert processes.log("router").read_text().count("listening") == 2
 
 
 async def test_an_error_in_the_block_leaves_nothing_behind(tmp_path: Path) -> None:
-    fleet = make(tmp_path)
+    processes = make(tmp_path)
     pid = None
     with pytest.raises(RuntimeError, match="mine"):
-        async with fleet:
-            await fleet.start("router")
-            pid = fleet.pid("router")
+        async with processes:
+            await processes.start("router")
+            pid = processes.pid("router")
             raise RuntimeError("mine")
     assert pid is not None
     assert not runs(pid)
@@ -121,14 +123,15 @@ async def test_children_end_when_their_parent_is_killed(tmp_path: Path) -> None:
 import asyncio
 from pathlib import Path
 from cli.demo.bring_up import router_up
-from cli.demo.fleet import Fleet, free_endpoint
+from cli.demo.child_processes import ChildProcesses, free_endpoint
 
 async def main():
-    async with Fleet(free_endpoint(), "demo", Path({str(tmp_path)!r})) as fleet:
-        fleet.declare("router", "router", "--listen", fleet.endpoint, "--data", {str(tmp_path)!r})
-        await fleet.start("router")
-        await router_up(fleet)
-        print(fleet.pid("router"), flush=True)
+    async with ChildProcesses(free_endpoint(), "demo", Path({str(tmp_path)!r})) as processes:
+        listen = ("--listen", processes.endpoint)
+        processes.declare("router", "router", *listen, "--data", {str(tmp_path)!r})
+        await processes.start("router")
+        await router_up(processes)
+        print(processes.pid("router"), flush=True)
         await asyncio.Event().wait()
 
 asyncio.run(main())

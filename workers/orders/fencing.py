@@ -103,7 +103,7 @@ class Ledger:
         """The highest attempt of a task that was ever taken on; 0 if none was."""
         return self._latest.get((plan, task), 0)
 
-    def saw(self, order: Order) -> None:
+    def raise_fences(self, order: Order) -> None:
         """Raise the fences to an order that was taken on, renewed or cancelled."""
         self.epoch = max(self.epoch, order.epoch)
         self.revisions[order.plan] = max(self.revisions.get(order.plan, 0), order.revision)
@@ -111,7 +111,7 @@ class Ledger:
     def put(self, attempt: Attempt) -> None:
         """Enter an attempt, or how it stands now."""
         name = attempt_name(attempt.order)
-        self.saw(attempt.order)
+        self.raise_fences(attempt.order)
         self.attempts[name] = attempt
         self._latest[name[:2]] = max(self.latest(*name[:2]), name[2])
 
@@ -120,7 +120,7 @@ class Ledger:
         if (attempt := self.attempts.get(name)) is not None and attempt.phase is Phase.QUEUED:
             del self.attempts[name]
 
-    def phases(self, phase: Phase) -> Iterable[Attempt]:
+    def in_phase(self, phase: Phase) -> Iterable[Attempt]:
         """The attempts that stand so, in the order of their arrival."""
         return (e for e in list(self.attempts.values()) if e.phase is phase)
 

@@ -137,7 +137,7 @@ class Journal:
         with self._transaction():
             self._fence(order)
             self._write(Attempt(order=known, phase=attempt.phase))
-        self.ledger.saw(order)
+        self.ledger.raise_fences(order)
 
     def started(self, order: Order, report: Report) -> None:
         """The attempt is about to move the robot. Returns when that is on the disk."""

@@ -1,4 +1,4 @@
-"""A robot's in-tray: carries out what `intake.decide` decides, and keeps the queue."""
+"""A robot's order queue: carries out what `fencing.decide` decides of each order."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class OrderQueue:
         self._running = self._queue.popleft()
         return self._journal.ledger.attempts[self._running].order
 
-    async def put(self, address: OrderAddress, order: Order | None) -> None:
+    async def receive(self, address: OrderAddress, order: Order | None) -> None:
         """Take in what stands on an order's key; `None`: nothing any more."""
         if order is None:
             self._withdraw(address)

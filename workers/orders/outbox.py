@@ -1,4 +1,4 @@
-"""Sends what the journal has waiting, in order, until each word is read back from the store."""
+"""Sends what the journal has waiting, in order, until each is read back from the store."""
 
 from __future__ import annotations
 
@@ -46,20 +46,20 @@ class Outbox:
         """Send for ever; ends by being cancelled."""
         while True:
             self._more.clear()
-            while (word := self._journal.unsent()) is not None:
+            while (unsent := self._journal.unsent()) is not None:
                 try:
-                    await self._send(word)
+                    await self._send(unsent)
                 except SchemaError as error:
                     self._log.warning("not confirmed yet, tries again: %s", error)
                     await self._session.wait_connected()
                     await asyncio.sleep(PAUSE_S)
                     continue
-                self._journal.sent(word.number)
+                self._journal.sent(unsent.number)
             self._empty.set()
             await self._more.wait()
 
-    async def _send(self, word: Unsent) -> None:
-        payload = word.payload
+    async def _send(self, unsent: Unsent) -> None:
+        payload = unsent.payload
         if isinstance(payload, Fact):
             address = FactAddress.of(payload.key)
             if await self._outdated(address, payload):

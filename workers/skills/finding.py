@@ -23,7 +23,7 @@ async def looks(ctx: SkillContext, viewing: Viewing) -> AsyncGenerator[dict[str,
     Raises:
         SkillFailed: the camera gave nothing.
     """
-    pose: PoseMRad = (await ctx.body.senses()).pose_m_rad
+    pose: PoseMRad = (await ctx.embodiment.senses()).pose_m_rad
     in_vain = 0
     while viewing.looks < MOST_LOOKS:
         seen = await ctx.look()

@@ -15,7 +15,7 @@ DOORWAY_M = 0.6
 @skill("navigate", parameters={"to": ParameterKind.PLACE})
 async def navigate(ctx: SkillContext, to: str) -> None:
     """Drive to a free spot in a place."""
-    senses = await ctx.body.senses()
+    senses = await ctx.embodiment.senses()
     x_m, y_m, _ = senses.pose_m_rad
     place = ctx.world.places[to]
     if senses.place == to and inner_distance_m(place.region_m, x_m, y_m) >= DOORWAY_M:

@@ -68,7 +68,7 @@ async def _approach_free_spot(ctx: SkillContext, object: str, place: str) -> Poi
         for name, state in ctx.world.robots.items()
         if name != ctx.robot and state.pose_m_rad is not None
     ]
-    x_m, y_m, _ = (await ctx.body.senses()).pose_m_rad
+    x_m, y_m, _ = (await ctx.embodiment.senses()).pose_m_rad
     spots = candidates(ctx.world.places[place], taken, robots, (x_m, y_m))
     tried: list[PointM] = []
     why = "everything is taken"

@@ -10,7 +10,7 @@ from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel, capacity, condition_holds, known_value
 from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_arg, actor_in, bare_name
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan, Violation
 
@@ -65,7 +65,7 @@ class PlanFlow:
                     self.violations.append(
                         Violation(
                             code="robot-in-two-places",
-                            sentence=f"{before} and {task} both need {robot.removeprefix('?')} "
+                            sentence=f"{before} and {task} both need {bare_name(robot)} "
                             "and nothing says which comes first",
                             task=task,
                         )
@@ -93,14 +93,13 @@ class PlanFlow:
 
     def _check_at_start(self, task: str, literal: Literal) -> None:
         variable = literal.variable
-        if variable.subject.startswith(ACTOR_PREFIX):
+        if actor_in(variable.subject) is not None:
             facts = self.requirements[variable.subject].facts
             facts.setdefault(variable.relation, (literal.value, task))
             return
         has = known_value(variable, self._world.facts, self._world)
         wanted = literal.value
-        an_actor = isinstance(wanted, str) and wanted.startswith(ACTOR_PREFIX)
-        if an_actor and has in self._world.robots:
+        if actor_in(wanted) is not None and has in self._world.robots:
             # Who has it must be the actor: something is taken out of a basket, or back.
             self.requirements[str(wanted)].valued.setdefault(variable, task)
         elif has != wanted:
@@ -110,10 +109,10 @@ class PlanFlow:
             )
 
     def _unmet(self, code: str, task: str, literal: Literal, sentence: str) -> None:
-        subject = literal.variable.subject.removeprefix(ACTOR_PREFIX)
+        subject = bare_name(literal.variable.subject)
         value = literal.value
         if isinstance(value, str):
-            value = value.removeprefix(ACTOR_PREFIX)
+            value = bare_name(value)
         self.violations.append(
             Violation(
                 code=code,
@@ -155,7 +154,7 @@ class PlanFlow:
                 and not any(graph.precedes(writer, task) for writer, _ in rows)
             ):
                 initial += 1
-        if carrier.startswith(ACTOR_PREFIX):
+        if actor_in(carrier) is not None:
             requirement = self.requirements[carrier]
             freed = sum(self._leaves(variable, task) for variable in requirement.valued)
             requirement.space = max(requirement.space, planned + 1 - freed)
@@ -193,7 +192,7 @@ class PlanFlow:
                     if not any(self._graph.precedes(writer, other) for other, _ in rows)
                 ]
             )
-        pinned = {ACTOR_PREFIX + actor: robot for actor, robot in self._plan.pins.items()}
+        pinned = {actor_arg(actor): robot for actor, robot in self._plan.pins.items()}
         for variable in self._writers:
             value = final[variable]
             if isinstance(value, str) and value in pinned:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_arg, actor_in
 from keyexpr_schema.payloads.plans import Plan, Task, Violation
 
 
@@ -63,10 +63,10 @@ class PlanForm:
                 task.task,
             )
             return
-        if task.args[skill.actor_parameter] != ACTOR_PREFIX + task.actor:
+        if task.args[skill.actor_parameter] != actor_arg(task.actor):
             self._say(
                 "wrong-actor",
-                f"{task.task}: `{skill.actor_parameter}` must be {ACTOR_PREFIX}{task.actor}, "
+                f"{task.task}: `{skill.actor_parameter}` must be {actor_arg(task.actor)}, "
                 f"the actor that does the task, not {task.args[skill.actor_parameter]}",
                 task.task,
             )
@@ -90,8 +90,7 @@ class PlanForm:
 
     def _bind(self, task: Task, parameter: str, kind: str) -> str | None:
         value = task.args[parameter]
-        if kind == "robot" and value.startswith(ACTOR_PREFIX):
-            actor = value.removeprefix(ACTOR_PREFIX)
+        if kind == "robot" and (actor := actor_in(value)) is not None:
             if actor not in self._actors:
                 self._say(
                     "unknown-name",

@@ -24,7 +24,7 @@ from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import Cycle, TaskGraph
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import Value
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_arg, actor_in
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 
@@ -78,14 +78,14 @@ def check_plan(
     flow = PlanFlow(plan, world, graph, form.actions)
     flow.check()
     violations = flow.violations
-    for actor, robot in plan.pins.items():
-        flow.requirements[ACTOR_PREFIX + actor].pinned_to = robot
+    for pinned, robot in plan.pins.items():
+        flow.requirements[actor_arg(pinned)].pinned_to = robot
     able: Mapping[str, tuple[str, ...]] = {}
     if allocation is None:
         requirements = {
-            actor.removeprefix(ACTOR_PREFIX): each
-            for actor, each in flow.requirements.items()
-            if actor.startswith(ACTOR_PREFIX)
+            actor: each
+            for name, each in flow.requirements.items()
+            if (actor := actor_in(name)) is not None
         }
         candidates = Candidates(requirements, _leaves(graph, form.actions), world)
         violations.extend(_actors_without_robot(candidates))
@@ -100,9 +100,8 @@ def _leaves(graph: TaskGraph, actions: Mapping[str, Action]) -> dict[str, frozen
     last: dict[str, dict[str, Value]] = {}
     for task in graph.order:
         for variable, value in actions[task].after:
-            if variable.subject.startswith(ACTOR_PREFIX):
-                rows = last.setdefault(variable.subject.removeprefix(ACTOR_PREFIX), {})
-                rows[variable.relation] = value
+            if (actor := actor_in(variable.subject)) is not None:
+                last.setdefault(actor, {})[variable.relation] = value
     return {actor: frozenset(rows.items()) for actor, rows in last.items()}
 
 

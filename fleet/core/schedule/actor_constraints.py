@@ -8,7 +8,7 @@ from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.core.model.world import WorldModel
 from fleet.core.schedule.actor_order import carried_at_end
 from fleet.core.schedule.plan_schedule import actors_of
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import bare_name
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 Pair = tuple[str, str]
@@ -22,7 +22,7 @@ def actors_apart(plan: Plan, checked: CheckedPlan) -> frozenset[Pair]:
     """
     apart: set[Pair] = set()
     for action in checked.actions.values():
-        actors = sorted(name.removeprefix(ACTOR_PREFIX) for name in action.participants)
+        actors = sorted(bare_name(name) for name in action.participants)
         apart.update((a, b) for i, a in enumerate(actors) for b in actors[i + 1 :])
     loaded = sorted(set(carried_at_end(checked).values()))
     pins = plan.pins

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fleet.core.checker.plan_checker import CheckedPlan
 from keyexpr_schema.facts import AT, Value
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_arg, actor_in
 
 
 def carried_at_end(checked: CheckedPlan) -> dict[str, str]:
@@ -18,15 +18,13 @@ def carried_at_end(checked: CheckedPlan) -> dict[str, str]:
             if literal.variable.relation == AT:
                 holder[literal.variable.subject] = literal.value
     return {
-        thing: value.removeprefix(ACTOR_PREFIX)
-        for thing, value in holder.items()
-        if isinstance(value, str) and value.startswith(ACTOR_PREFIX)
+        thing: actor for thing, value in holder.items() if (actor := actor_in(value)) is not None
     }
 
 
 def first_actors(checked: CheckedPlan) -> frozenset[str]:
     """Actors that need their robot as it is now, and as some other actor would not leave it."""
-    last = {ACTOR_PREFIX + actor for actor in carried_at_end(checked).values()}
+    last = {actor_arg(actor) for actor in carried_at_end(checked).values()}
     leaves: dict[str, dict[str, Value]] = {}
     for task in checked.graph.order if checked.graph else ():
         for variable, value in checked.actions[task].after:
@@ -37,9 +35,9 @@ def first_actors(checked: CheckedPlan) -> frozenset[str]:
             for relation, value in rows.items():
                 left.setdefault(relation, set()).add(value)
     return frozenset(
-        name.removeprefix(ACTOR_PREFIX)
+        actor
         for name, requirement in checked.requirements.items()
-        if name.startswith(ACTOR_PREFIX)
+        if (actor := actor_in(name)) is not None
         and any(
             left.get(relation, set()) - {value}
             for relation, (value, _) in requirement.facts.items()

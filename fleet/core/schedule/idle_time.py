@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from fleet.core.model.task_graph import TaskGraph
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_in
 from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -173,7 +173,7 @@ def union_s(spans: Iterable[Span]) -> float:
 
 def _actors(actor: str, args: Iterable[str]) -> tuple[str, ...]:
     """Everyone who takes part in a task, who does it first."""
-    others = (arg.removeprefix(ACTOR_PREFIX) for arg in args if arg.startswith(ACTOR_PREFIX))
+    others = (other for arg in args if (other := actor_in(arg)) is not None)
     return tuple(dict.fromkeys([actor, *others]))
 
 

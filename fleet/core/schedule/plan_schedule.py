@@ -16,7 +16,7 @@ from fleet.core.model.world import WorldModel
 from fleet.core.schedule.actor_order import first_actors
 from fleet.core.schedule.timetable import Timetable
 from keyexpr_schema.facts import AT, FactKey, Value
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_in, bare_name, bound
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 T = TypeVar("T")
@@ -78,11 +78,7 @@ def actor_groups(plan: Plan) -> tuple[tuple[str, ...], ...]:
 
     owner = {task.task: task.actor for task in plan.tasks}
     for task in plan.tasks:
-        others = [
-            value.removeprefix(ACTOR_PREFIX)
-            for value in task.args.values()
-            if value.startswith(ACTOR_PREFIX)
-        ]
+        others = [actor for value in task.args.values() if (actor := actor_in(value)) is not None]
         for other in (*others, *(owner[before] for before in task.after)):
             leader[find(other)] = find(task.actor)
     groups: dict[str, list[str]] = defaultdict(list)
@@ -210,7 +206,7 @@ def schedule(
     tasks_of: dict[str, list[str]] = defaultdict(list)
     for task in graph.order:
         for participant in checked.actions[task].participants:
-            tasks_of[participant.removeprefix(ACTOR_PREFIX)].append(task)
+            tasks_of[bare_name(participant)].append(task)
     sequence: dict[str, list[str]] = defaultdict(list)
     extra: dict[str, set[str]] = defaultdict(set)
     for group in groups:
@@ -246,17 +242,13 @@ def _earliest(
     end_s: dict[str, float] = {}
     for task in graph.order:
         action = actions[task]
-        robot = _robot(action.actor, allocation)
+        robot = bound(action.actor, allocation)
         start = max((end_s[before] for before in graph.predecessors[task]), default=0.0)
         for participant in action.participants if ready_s else ():
-            start = max(start, ready_s.get(_robot(participant, allocation), 0.0))
+            start = max(start, ready_s.get(bound(participant, allocation), 0.0))
         start_s[task] = start
         end_s[task] = start + predicted_duration_s(action, where.get(robot), robot, world)
         for variable, value in action.after:
             if variable == FactKey(AT, action.actor):
                 where[robot] = value
     return start_s, end_s
-
-
-def _robot(name: str, allocation: Mapping[str, str]) -> str:
-    return allocation[name.removeprefix(ACTOR_PREFIX)] if name.startswith(ACTOR_PREFIX) else name

@@ -11,7 +11,7 @@ from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import AT, FactKey, Value
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import bare_name, bound
 
 
 class Timetable:
@@ -42,7 +42,7 @@ class Timetable:
         for i, task in enumerate(graph.order):
             action = actions[task]
             for participant in action.participants:
-                actor = participant.removeprefix(ACTOR_PREFIX)
+                actor = bare_name(participant)
                 self.first.setdefault(actor, i)
                 self.last[actor] = i
             self._rows.append(self._row(action))
@@ -50,11 +50,7 @@ class Timetable:
     def _row(self, action: Action) -> tuple[str, float, str | None, bool, Value]:
         skill = action.skill
         name = action.actor
-        robot = (
-            self._allocation[name.removeprefix(ACTOR_PREFIX)]
-            if name.startswith(ACTOR_PREFIX)
-            else name
-        )
+        robot = bound(name, self._allocation)
         moved = [value for variable, value in action.after if variable == FactKey(AT, name)]
         target = None if skill.travel_to is None else action.args[skill.travel_to]
         seconds = self._world.work_s(robot, skill)

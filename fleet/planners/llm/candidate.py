@@ -14,7 +14,7 @@ from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import Strand, tasks_from
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, StepAnswer, TaskAnswer
 from keyexpr_schema.facts import FactKey, Value
-from keyexpr_schema.ids import ACTOR_PREFIX
+from keyexpr_schema.ids import actor_arg, actor_in, bare_name
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan, Task
 
@@ -53,7 +53,7 @@ def candidate_of(
                 duration_s=skill.duration_s if skill is not None else 0.0,
             )
         )
-    pins = {pin.actor.removeprefix(ACTOR_PREFIX): pin.robot for pin in answer.pins}
+    pins = {bare_name(pin.actor): pin.robot for pin in answer.pins}
     actors = {task.actor for task in tasks}
     return CandidatePlan(tuple(tasks), {actor: pins[actor] for actor in pins if actor in actors})
 
@@ -61,7 +61,7 @@ def candidate_of(
 def _actor_of(skill: SkillModel | None, args: Mapping[str, str]) -> str:
     """The actor that does a task with these arguments."""
     value = args.get(skill.actor_parameter, "") if skill is not None else ""
-    return value.removeprefix(ACTOR_PREFIX) or "a1"
+    return bare_name(value) or "a1"
 
 
 def plan_of(
@@ -103,7 +103,7 @@ def merged(candidates: Sequence[CandidatePlan], problem: PlanningProblem, keep_o
         by_name = {task.task: task for task in candidate.tasks}
         ordered = [by_name[name] for name in graph.order]
         rows.extend(ordered)
-        robots = {ACTOR_PREFIX + actor: robot for actor, robot in candidate.pins.items()}
+        robots = {actor_arg(actor): robot for actor, robot in candidate.pins.items()}
         actions = tuple(
             world.skills[task.skill].ground(
                 {name: robots.get(value, value) for name, value in task.args.items()}
@@ -142,9 +142,9 @@ def world_after(candidate: CandidatePlan, world: WorldModel) -> WorldModel:
     for name in graph.order:
         task = by_name[name]
         for literal in world.skills[task.skill].ground(task.args).after:
-            if literal.variable.subject.startswith(ACTOR_PREFIX):
+            if actor_in(literal.variable.subject) is not None:
                 continue
             value = literal.value
-            in_hand = isinstance(value, str) and value.startswith(ACTOR_PREFIX)
+            in_hand = actor_in(value) is not None
             facts[literal.variable] = None if in_hand else value
     return world.with_facts(facts)

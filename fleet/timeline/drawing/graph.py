@@ -12,6 +12,7 @@ from fleet.timeline.drawing.lanes import call_text
 from fleet.timeline.drawing.palette import TASK_STATES
 from fleet.timeline.drawing.sink import Sink, entity
 from fleet.timeline.drawing.text import drawable
+from keyexpr_schema.ids import actor_arg, actor_in
 from keyexpr_schema.payloads.plans import Plan, PlanStatus
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
@@ -166,7 +167,7 @@ def layout(nodes: list[Node]) -> dict[str, tuple[float, float]]:
         free[node.lane] = row[node.task] + 1
     places: dict[str, tuple[float, float]] = {}
     left = 0.0
-    for lane in sorted(free, key=lambda lane: (lane.startswith("?"), _natural(lane))):
+    for lane in sorted(free, key=lambda lane: (actor_in(lane) is not None, _natural(lane))):
         mine = [node for node in nodes if node.lane == lane]
         width = max(GLYPH_PX * len(line) for node in mine for line in node.label.split("\n"))
         width += GAP_PX
@@ -209,6 +210,6 @@ def _node(
     state: TaskState,
     after: tuple[str, ...],
 ) -> Node:
-    who = robot or f"?{actor}"
+    who = robot or actor_arg(actor)
     label = f"{GLYPHS[state]} {name}: {call_text(skill, args, robot)}\n{who} · {state.value}"
     return Node(task=name, label=drawable(label), state=state, lane=who, after=after)

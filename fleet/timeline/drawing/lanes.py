@@ -9,6 +9,7 @@ import rerun as rr
 from fleet.timeline.drawing.palette import CANCELLED, FAILED, Palette, Rgba
 from fleet.timeline.drawing.sink import Sink, entity
 from fleet.timeline.drawing.text import drawable
+from keyexpr_schema.ids import actor_in
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 IDLE = ""
@@ -186,5 +187,5 @@ def _label(record: TaskRecord) -> str:
 
 def call_text(skill: str, args: dict[str, str], robot: str | None) -> str:
     """A skill call in a few words: `pick cup_1`; the robot itself and actors are left out."""
-    words = [value for value in args.values() if value != robot and not value.startswith("?")]
+    words = [value for value in args.values() if value != robot and actor_in(value) is None]
     return " ".join([skill, *words])

@@ -1,0 +1,129 @@
+"""What motions are made of: what they may use, how they end, and small common steps.
+
+A motion is a generator that is resumed once a control period; it ends by returning what was seen
+on the way, or by raising `MotionFailed`. Nothing in it waits for wall time, so a run is repeatable.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass, field
+
+from keyexpr_schema.payloads.motions import Detection, Motion, MotionOutcome
+from sim.files.world_schema import WorldFile
+from sim.mujoco_world.drives import PERIOD_S, wrap
+from sim.mujoco_world.observer import Observer
+from sim.mujoco_world.robot_body import RobotBody
+from sim.navigation import Leg, Navigator
+
+Steps = Generator[None, None, tuple[Detection, ...]]
+"""A whole motion."""
+Step = Generator[None, None, None]
+"""A part of one."""
+
+FACING_RAD = 0.006
+"""5 mm off at an arm's length; the fingers open wider than that."""
+
+
+BLOCKED_S = 2.5
+"""An arm that is not where it was told to be this long after is held up by something."""
+
+
+class MotionFailed(Exception):
+    """A motion fails. The message is one sentence for a person."""
+
+
+@dataclass
+class MotionContext:
+    """Everything a motion may look at or use."""
+
+    world: WorldFile
+    robots: dict[str, RobotBody]
+    navigator: Navigator
+    observer: Observer
+    legs: dict[str, Leg] = field(default_factory=dict)
+
+
+@dataclass
+class MotionRun:
+    """A robot's latest motion. `phase` says what it is at, for reasons of failure.
+
+    `manual`: the motion drives the base itself, not the navigator.
+    `guest_of`: the robot into whose basket it reaches; that one must stand still.
+    `handling`: the hand is near things, and touches of it do not count as collisions.
+    `ended` is `None` while it runs.
+    """
+
+    robot: RobotBody
+    motion: Motion
+    began_s: float
+    steps: Steps = field(init=False)
+    ended: MotionOutcome | None = None
+    phase: str = "starting"
+    manual: bool = False
+    handling: bool = False
+    guest_of: str | None = None
+
+
+def wait(seconds: float) -> Step:
+    """Let simulated time pass."""
+    for _ in range(max(1, round(seconds / PERIOD_S))):
+        yield
+
+
+def face(run: MotionRun, x_m: float, y_m: float) -> Step:
+    """Turn on the spot until the robot's x axis points at (x, y)."""
+    run.phase = "turning to face the point"
+    drive = run.robot.drive
+    if not run.manual:
+        run.manual = True
+        drive.halt()
+    x, y, _ = run.robot.pose()
+    heading = math.atan2(y_m - y, x_m - x)
+    drive.turn_to(heading)
+    steady = 0
+    while steady < 3:
+        yield
+        error = abs(wrap(heading - run.robot.pose()[2]))
+        steady = steady + 1 if error < FACING_RAD and drive.speed()[1] < 0.05 else 0
+
+
+def move_arm(run: MotionRun, goal: list[float], phase: str, slower: float = 1.0) -> Step:
+    """Move the joints to `goal`, all arriving together.
+
+    Raises:
+        MotionFailed: something holds the arm up.
+    """
+    arm = run.robot.arm
+    assert arm is not None
+    run.phase = phase
+    arm.goal = list(goal)
+    arm.slowness = slower
+    overdue = 0.0
+    while not arm.arrived():
+        yield
+        overdue = overdue + PERIOD_S if arm.commanded() else 0.0
+        if overdue > BLOCKED_S:
+            raise MotionFailed(f"something blocks the arm while {phase}")
+    arm.slowness = 1.0
+
+
+def stow(run: MotionRun) -> Step:
+    """Fold the arm into its carrying pose; from near things, straight up first."""
+    robot = run.robot
+    arm = robot.arm
+    if arm is None or arm.stowed():
+        return
+    run.phase = "folding the arm"
+    x, y, z = arm.grip_point()
+    radius = math.dist(robot.pose()[:2], (x, y))
+    if radius > robot.description.clearance_m:
+        for rise in (0.15, 0.10, 0.06, 0.03):
+            above = arm.solve((x, y, z + rise), arm.setpoint)
+            if above is not None:
+                yield from move_arm(run, above, "raising the hand")
+                break
+    yield from move_arm(run, list(arm.entry.stow), "folding the arm")
+    if robot.held is None and robot.gripper is not None:
+        robot.gripper.open(0.0)

@@ -1,0 +1,150 @@
+"""The key-space's writers and readers are those that a running fleet shows."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from cli.demo.mission_run import DemoOptions, running
+from keyexpr_schema.key import Component
+from keyexpr_schema.keyspace import GOAL_SPEC, KEYSPACE, REJECT
+from keyexpr_schema.payloads.goals import GoalAddress
+from keyexpr_schema.transport.trace import TRACE_VARIABLE, WRITES, Operation
+from tests.planner_process import until
+from tests.robotctl import Robotctl
+
+pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(240)]
+
+KEYS = {key.name: key for key in KEYSPACE}
+COMPONENTS = {
+    "planner": Component.PLANNER,
+    "worker": Component.WORKER,
+    "sim": Component.SIMULATION,
+    "recorder": Component.RECORDER,
+    "store": Component.STORE,
+    "robotctl": Component.PERSON,
+}
+"""By the name that a session goes by, up to the first hyphen."""
+
+NOT_WRITTEN = {
+    # Who cannot read a value says so; here nothing of that kind is for workers or the simulation.
+    "reject": Component.WORKER | Component.SIMULATION,
+}
+NOT_READ = {
+    # A worker that comes back looks up what it reported last; a simulation, whether one runs.
+    "report": Component.OWN_WORKER,
+    "sim_clock": Component.SIMULATION,
+}
+"""What the table allows, and this mission has no need of."""
+
+PLAN = """
+goals: []
+conditions: []
+tasks:
+  - {task: t1, skill: navigate, args: {robot: "?a1", to: kitchen}, actor: a1}
+"""
+
+
+@pytest.fixture(scope="module")
+def trace(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, Operation, str, str]]:
+    """Component, operation, name of the key and key expression of all that a mission does."""
+    folder = tmp_path_factory.mktemp("trace")
+    file = folder / "trace.txt"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(TRACE_VARIABLE, str(file))
+        asyncio.run(mission(folder))
+    lines = (line.split(" ") for line in file.read_text(encoding="utf-8").splitlines())
+    return [(name, Operation(operation), key, at) for name, operation, key, at in lines]
+
+
+async def mission(folder: Path) -> None:
+    """Two cups are brought; then a person looks at everything, proposes a plan, deletes, asks."""
+    options = DemoOptions(mission="two-cups", out=folder / "run", backend="kinematic")
+    (folder / "plan.yaml").write_text(f"plan: mine{PLAN}", encoding="utf-8")
+
+    async with running(options) as demo:
+        robotctl = Robotctl(demo.fleet.endpoint, folder, demo.fleet.realm)
+        robotctl.env[TRACE_VARIABLE] = str(folder / "trace.txt")
+
+        async def play() -> None:
+            await demo.give()
+            await demo.ended()
+            key, link = GOAL_SPEC.build(GoalAddress("bad")), demo.session.link
+            link.send_soon(key, b"{", "application/json", block=True)
+
+            async def unread() -> bool:
+                found = {address.component for address in await demo.session.list(REJECT)}
+                return found == {"planner", "recorder", "robotctl"}
+
+            await until(unread, "all who read goals to say that they cannot read this one")
+            for words in (
+                "status",
+                "durations",
+                "robots",
+                "goal list",
+                "plan list",
+                "task show plan-1 t1",
+                "world list",
+                "world add --fact at cup_1 kitchen",
+                "world delete at cup_1",
+                "plan propose plan.yaml --no-start",
+                "plan delete mine",
+            ):
+                done = await robotctl.soon(*words.split())
+                assert done.code == 0, (words, done.err)
+            refused = await robotctl.soon("replan", "plan-1")
+            assert "not running" in refused.err
+
+        await demo.fleet.guard(play())
+
+
+def allowed(column: Component, name: str, key: str, at: str) -> bool:
+    """Whether a column of the table has the component that goes by this name."""
+    kind, _, robot = name.partition("-")
+    if COMPONENTS[kind] in column:
+        return True
+    chunks = dict(zip(KEYS[key].template.split("/"), at.split("/"), strict=True))
+    return kind == "worker" and Component.OWN_WORKER in column and chunks["{robot}"] == robot
+
+
+def column(key: str, operation: Operation) -> Component:
+    return KEYS[key].writers if operation in WRITES else KEYS[key].readers
+
+
+def test_nothing_is_done_that_the_table_does_not_allow(
+    trace: list[tuple[str, Operation, str, str]],
+) -> None:
+    assert [
+        (name, operation, at)
+        for name, operation, key, at in trace
+        if not allowed(column(key, operation), name, key, at)
+    ] == []
+
+
+def test_all_that_the_table_says_is_done_but_for_what_is_named_here(
+    trace: list[tuple[str, Operation, str, str]],
+) -> None:
+    written: dict[str, Component] = defaultdict(lambda: Component(0))
+    read: dict[str, Component] = defaultdict(lambda: Component(0))
+    for name, operation, key, _ in trace:
+        seen = written if operation in WRITES else read
+        seen[key] |= as_in_the_table(column(key, operation), name)
+    assert dict(missing(written, "writers")) == NOT_WRITTEN
+    assert dict(missing(read, "readers")) == NOT_READ
+
+
+def as_in_the_table(column: Component, name: str) -> Component:
+    component = COMPONENTS[name.partition("-")[0]]
+    if component is Component.WORKER and Component.OWN_WORKER in column:
+        return Component.OWN_WORKER
+    return component
+
+
+def missing(seen: dict[str, Component], side: str) -> Iterator[tuple[str, Component]]:
+    for key in KEYSPACE:
+        if left := getattr(key, side) & ~seen[key.name]:
+            yield key.name, left

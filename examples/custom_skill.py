@@ -26,12 +26,16 @@ import sys
 from pathlib import Path
 
 from keyexpr_schema import SchemaError
-from sim.embodiment import sim_embodiment
-from workers.context import SkillContext
-from workers.errors import SkillFailed, WorkerError
-from workers.process import run_worker
-from workers.skill_registry import ParameterKind, skill
-from workers.skills.household import HOUSEHOLD
+from sim import sim_embodiment
+from workers import (
+    HOUSEHOLD,
+    ParameterKind,
+    SkillContext,
+    SkillFailed,
+    WorkerError,
+    run_worker,
+    skill,
+)
 
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 

@@ -2,13 +2,12 @@
 
     from sim import load_mission, make_backend
 
-Everything is imported when it is first asked for: files are read without numpy and MuJoCo.
+Files are read without numpy and MuJoCo.
 """
 
-from __future__ import annotations
+from typing import TYPE_CHECKING
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from keyexpr_schema.lazy import lazy_names
 
 if TYPE_CHECKING:
     from sim.backend import Backend as Backend
@@ -30,25 +29,20 @@ if TYPE_CHECKING:
     from sim.server.process import make_backend as make_backend
     from sim.server.process import run_simulation as run_simulation
     from sim.server.sim_server import SimServer as SimServer
-
-_NAMES = {
-    "backend": "Backend",
-    "embodiment": "SimEmbodiment sim_embodiment",
-    "errors": "BadFile SimError WorldRuns",
-    "files.mission_file": "Mission load_mission load_robot",
-    "files.world_file": "load_world",
-    "files.world_payloads": "object_payloads place_payloads",
-    "files.world_schema": "WorldFile",
-    "kinematic.backend": "KinematicBackend MotionModel",
-    "mujoco_world.backend": "MujocoBackend",
-    "server.process": "make_backend run_simulation",
-    "server.sim_server": "SimServer",
-}
-_MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}
-__all__ = sorted(_MODULES)
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
+else:
+    __all__, __getattr__ = lazy_names(
+        __name__,
+        {
+            "backend": "Backend",
+            "embodiment": "SimEmbodiment sim_embodiment",
+            "errors": "BadFile SimError WorldRuns",
+            "files.mission_file": "Mission load_mission load_robot",
+            "files.world_file": "load_world",
+            "files.world_payloads": "object_payloads place_payloads",
+            "files.world_schema": "WorldFile",
+            "kinematic.backend": "KinematicBackend MotionModel",
+            "mujoco_world.backend": "MujocoBackend",
+            "server.process": "make_backend run_simulation",
+            "server.sim_server": "SimServer",
+        },
+    )

@@ -10,3 +10,4 @@ from workers.skills.place_on_robot import place_on_robot
 from workers.skills.search import search
 
 HOUSEHOLD: tuple[Skill, ...] = (navigate, search, pick, place, place_on_robot)
+"""Every worker has these."""

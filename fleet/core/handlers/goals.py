@@ -153,7 +153,7 @@ def _reading(state: State, goal: Goal) -> Reading:
 def _note(state: State, reading: Reading) -> str | None:
     """What a goal's sentence says besides what must hold, so that no word is lost unseen."""
     notes = [f"{remark!r} asks for nothing" for remark in reading.remarks]
-    for relation, subject, value in reading.presumed:
+    for (relation, subject), value in reading.presumed:
         fact = state.fact(relation, subject)
         if fact is not None and fact.value not in (None, value):
             notes.append(f"it takes {subject} to be at {value}; believed is {fact.value}")
@@ -162,7 +162,7 @@ def _note(state: State, reading: Reading) -> str | None:
 
 def _presume(state: State, goal: str, reading: Reading) -> State:
     """Believe what a goal takes for granted where nothing is known, as if it had been stated."""
-    for relation, subject, value in reading.presumed:
+    for (relation, subject), value in reading.presumed:
         fact = state.fact(relation, subject)
         if fact is None or fact.value is None:
             said = Fact(

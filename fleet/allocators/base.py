@@ -86,7 +86,7 @@ class Allocator(ABC):
 
     name: str
     reschedules = False
-    """Whether it heeds `AllocationContext.home` itself; for others, whoever can stays where he is."""
+    """Whether it heeds the context's `home` itself; for others, whoever can stays where he is."""
 
     def allocate(
         self, plan: Plan, world: WorldModel, context: AllocationContext | None = None

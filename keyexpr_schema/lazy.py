@@ -10,6 +10,8 @@ from typing import Any
 def lazy_names(package: str, names: Mapping[str, str]) -> tuple[list[str], Callable[[str], Any]]:
     """`__all__` and `__getattr__` of a package: `names` has, by module in it, its public names.
 
+    A module is named as after the first dot of a relative import.
+
     Type checkers need the imports themselves, below `if TYPE_CHECKING:`, with this below `else:`.
     """
     modules = {name: module for module, many in names.items() for name in many.split()}
@@ -17,6 +19,6 @@ def lazy_names(package: str, names: Mapping[str, str]) -> tuple[list[str], Calla
     def get(name: str) -> Any:
         if name not in modules:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return getattr(import_module(f"{package}.{modules[name]}"), name)
+        return getattr(import_module(f".{modules[name]}", package), name)
 
     return sorted(modules), get

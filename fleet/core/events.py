@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import msgspec
 
 from fleet.core.plan_entry import PlanOutcome
@@ -13,6 +16,9 @@ from keyexpr_schema.payloads.requests import Answer, ControlRequest, PlanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Report
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement
+
+At = Mapping[str, Any]
+"""When an event happened, as its fields `time_s` and `wall_time_s`."""
 
 
 class Event(msgspec.Struct, frozen=True, kw_only=True, tag_field="event", tag=True):

@@ -1,34 +1,21 @@
-"""The language-model allocator, with real LiteLLM calls to a scripted server on the loopback."""
+"""The allocator that asks a language model."""
 
 from __future__ import annotations
 
 import json
 from typing import Any
 
-from fleet.allocators.balanced import BalancedAllocator
 from fleet.allocators.base import Allocated
 from fleet.allocators.llm import LlmAllocator
+from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.llm.client import ModelAnswer, ModelClient
 from fleet.llm.configuration import LlmConfig
 from fleet.llm.conversation import LanguageModel
-from keyexpr_schema.payloads.plans import Plan, Task
-from tests.household import home, manipulator
+from tests.household import drives, home, manipulator
 from tests.llm_server import LlmServer, Reply
 
 TEAM = (manipulator("r1"), manipulator("r2"))
-
-
-def drives(*robots: str) -> Plan:
-    """A plan of one drive for each; a name pins its actor to that robot, "" leaves it free."""
-    tasks = [
-        Task(
-            task=f"t{n}", skill="navigate", args={"robot": f"?a{n}", "to": "kitchen"}, actor=f"a{n}"
-        )
-        for n in range(len(robots))
-    ]
-    pins = {f"a{n}": robot for n, robot in enumerate(robots) if robot}
-    return Plan(plan="p", goals=(), conditions=(), tasks=tuple(tasks), pins=pins)
 
 
 def by_model(server: LlmServer, model_client: ModelClient) -> LlmAllocator:
@@ -36,7 +23,9 @@ def by_model(server: LlmServer, model_client: ModelClient) -> LlmAllocator:
     config = LlmConfig(
         model="openai/scripted", api_base=server.api_base, timeout_s=20.0, retry_wait_s=0.01
     )
-    return LlmAllocator(LanguageModel(config, model_client), BalancedAllocator())
+    return LlmAllocator(
+        LanguageModel(config, model_client), MinMaxLoadAllocator(TieBreak.NEXT_LOADS)
+    )
 
 
 def answer(**robots: str) -> Reply:
@@ -50,9 +39,9 @@ def test_a_language_model_is_told_what_is_wrong_and_mends_it(model_client: Model
         made = by_model(server, model_client).allocate(plan, world)
     assert isinstance(made, Allocated)
     assert made.allocation == {"a0": "r2", "a1": "r2"}
-    told = json.dumps(server.requests[2]["messages"])
-    assert "r9 cannot be actor a0; it can be r1, r2" in told
-    assert "r1 cannot be actor a1; it can be r2" in told
+    question = json.dumps(server.requests[2]["messages"])
+    assert "r9 cannot be actor a0; it can be r1, r2" in question
+    assert "r1 cannot be actor a1; it can be r2" in question
 
 
 def test_a_language_model_that_is_never_right_is_replaced_and_that_is_said(

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from cli.demo.mission_run import DemoOptions, running
+from cli.demo.bring_up import DemoOptions
+from cli.demo.mission_run import running_demo
 from keyexpr_schema.key import Component
 from keyexpr_schema.keyspace import GOAL_SPEC, KEYSPACE, REJECT
 from keyexpr_schema.payloads.goals import GoalAddress
@@ -66,7 +67,7 @@ async def mission(folder: Path) -> None:
     options = DemoOptions(mission="two-cups", out=folder / "run", backend="kinematic")
     (folder / "plan.yaml").write_text(f"plan: mine{PLAN}", encoding="utf-8")
 
-    async with running(options) as demo:
+    async with running_demo(options) as demo:
         robotctl = Robotctl(demo.fleet.endpoint, folder, demo.fleet.realm)
         robotctl.env[TRACE_VARIABLE] = str(folder / "trace.txt")
 

@@ -36,8 +36,8 @@ from keyexpr_schema.payloads.requests import Answer, PlanRequest, RequestAddress
 from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.payloads.service import PlannerAddress, PlannerAliveAddress, PlannerStatus
 from keyexpr_schema.payloads.tasks import TaskAddress, TaskRecord, TaskState
+from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
-from keyexpr_schema.transport.wire import zenoh_config
 from tests.robotctl import Robotctl
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -68,12 +68,12 @@ async def mission(folder: Path) -> None:
     (folder / "plan.yaml").write_text(f"plan: mine{PLAN}", encoding="utf-8")
 
     async with running_demo(options) as demo:
-        robotctl = Robotctl(demo.fleet.endpoint, folder, demo.fleet.realm)
+        robotctl = Robotctl(demo.processes.endpoint, folder, demo.processes.realm)
         robotctl.env[TRACE_VARIABLE] = str(folder / "trace.txt")
 
         async def play() -> None:
-            await demo.give()
-            await demo.ended()
+            await demo.submit()
+            await demo.wait_until_ended()
             key, link = GOAL_SPEC.build(GoalAddress("bad")), demo.session.link
             link.send_soon(key, b"{", "application/json", block=True)
 
@@ -100,7 +100,7 @@ async def mission(folder: Path) -> None:
             refused = await robotctl.soon("replan", "plan-1")
             assert "not running" in refused.err
 
-        await demo.fleet.guard(play())
+        await demo.processes.guard(play())
 
 
 def allowed(column: Component, name: str, key: str, at: str) -> bool:

@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from fleet.allocators.base import Allocated
-from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.core.checker.plan_checker import check_plan
 from fleet.core.model.world import WorldModel
 from fleet.llm.client import ModelClient
@@ -95,7 +95,7 @@ def solve(
     made = planner.plan(problem)
     assert isinstance(made, Plan), made
     assert check_plan(made, world).valid
-    assert isinstance(MilpAllocator().allocate(made, world), Allocated)
+    assert isinstance(MinMaxLoadAllocator(TieBreak.TRAVEL).allocate(made, world), Allocated)
     return made
 
 

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
         AllocationProblem,
         Allocator,
         Assignment,
-        Circumstances,
         NotAllocated,
     )
     from fleet.allocators.cost_based import CostBasedAllocator
@@ -22,13 +21,14 @@ if TYPE_CHECKING:
     from fleet.allocators.makespan import MakespanAllocator
     from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
     from fleet.allocators.round_robin import RoundRobinAllocator
+    from fleet.scheduling.plan_shop import AllocationContext
 
 __all__ = [
     "Allocated",
     "AllocationProblem",
     "Allocator",
     "Assignment",
-    "Circumstances",
+    "AllocationContext",
     "CostBasedAllocator",
     "LlmAllocator",
     "MakespanAllocator",
@@ -39,16 +39,18 @@ __all__ = [
 ]
 
 _MODULES = {
-    "CostBasedAllocator": "cost_based",
-    "LlmAllocator": "llm",
-    "MakespanAllocator": "makespan",
-    "MinMaxLoadAllocator": "min_max_load",
-    "RoundRobinAllocator": "round_robin",
-    "TieBreak": "min_max_load",
+    "AllocationContext": "fleet.scheduling.plan_shop",
+    "CostBasedAllocator": "fleet.allocators.cost_based",
+    "LlmAllocator": "fleet.allocators.llm",
+    "MakespanAllocator": "fleet.allocators.makespan",
+    "MinMaxLoadAllocator": "fleet.allocators.min_max_load",
+    "RoundRobinAllocator": "fleet.allocators.round_robin",
+    "TieBreak": "fleet.allocators.min_max_load",
 }
 
 
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_MODULES.get(name, 'base')}"), name)
+    module = _MODULES.get(name, "fleet.allocators.base")
+    return getattr(import_module(module), name)

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Allocated",
+    "AllocationContext",
     "AllocationProblem",
     "Allocator",
     "Assignment",
-    "AllocationContext",
     "CostBasedAllocator",
     "LlmAllocator",
     "MakespanAllocator",
@@ -39,18 +39,16 @@ __all__ = [
 ]
 
 _MODULES = {
-    "AllocationContext": "fleet.scheduling.plan_shop",
-    "CostBasedAllocator": "fleet.allocators.cost_based",
-    "LlmAllocator": "fleet.allocators.llm",
-    "MakespanAllocator": "fleet.allocators.makespan",
-    "MinMaxLoadAllocator": "fleet.allocators.min_max_load",
-    "RoundRobinAllocator": "fleet.allocators.round_robin",
-    "TieBreak": "fleet.allocators.min_max_load",
+    "CostBasedAllocator": "cost_based",
+    "LlmAllocator": "llm",
+    "MakespanAllocator": "makespan",
+    "MinMaxLoadAllocator": "min_max_load",
+    "RoundRobinAllocator": "round_robin",
+    "TieBreak": "min_max_load",
 }
 
 
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = _MODULES.get(name, "fleet.allocators.base")
-    return getattr(import_module(module), name)
+    return getattr(import_module(f"{__name__}.{_MODULES.get(name, 'base')}"), name)

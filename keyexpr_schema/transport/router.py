@@ -19,24 +19,27 @@ from functools import lru_cache
 import zenoh
 from zenoh import handlers
 
-from keyexpr_schema.errors import CannotListen, ForeignKey, SchemaError
+from keyexpr_schema.errors import ForeignKey, SchemaError
 from keyexpr_schema.keyspace import STORE_JOURNAL, key_of
-from keyexpr_schema.payloads.service import JournalEntry, StoreAddress, StoreJournal
-from keyexpr_schema.transport.connecting import zenoh_config
-from keyexpr_schema.transport.samples import (
-    Encoded,
-    decode_value,
-    reply_encoding_of,
+from keyexpr_schema.payloads.service import JournalEntry, StoreAddress, StoreJournal, StoreQuery
+from keyexpr_schema.transport.questions import reply_encoding
+from keyexpr_schema.transport.storage import Store, Write
+from keyexpr_schema.transport.trace import Operation, Trace
+from keyexpr_schema.transport.wire import (
+    decode_wire,
     stamp_of_text,
     text_of_stamp,
     timestamp_of_stamp,
+    zenoh_config,
 )
-from keyexpr_schema.transport.storage import Store, Write
-from keyexpr_schema.transport.trace import Operation, Trace
 
 _log = logging.getLogger(__name__)
 CHANNEL = 10_000
 _MAX_JOURNAL_REPLY = 10_000
+
+
+class CannotListen(SchemaError):
+    """A router cannot listen where it was told to."""
 
 
 @lru_cache(maxsize=65_536)
@@ -51,8 +54,8 @@ def is_stored(keyexpr: str) -> bool:
         return False
 
 
-class _Storage:
-    """Subscribes for a `Store` and answers queries from it, on two threads."""
+class _Feed:
+    """The store's two threads between a Zenoh session and a `Store`."""
 
     def __init__(self, session: zenoh.Session, store: Store) -> None:
         self._session = session
@@ -158,8 +161,14 @@ class _Storage:
     def _reply_journal(self, query: zenoh.Query, keyexpr: str, realm: str) -> None:
         try:
             data = query.payload.to_bytes() if query.payload is not None else b"{}"
-            encoding = str(query.encoding or "")
-            asked = decode_value(STORE_JOURNAL, Encoded(keyexpr, data, encoding))
+            asked = decode_wire(
+                data,
+                str(query.encoding or ""),
+                StoreQuery,
+                STORE_JOURNAL.name,
+                STORE_JOURNAL.version,
+                keyexpr,
+            )
         except SchemaError as error:
             query.reply_err(str(error).encode())
             return
@@ -180,7 +189,7 @@ class _Storage:
         query.reply(
             keyexpr,
             STORE_JOURNAL.encode(reply),  # type: ignore[arg-type]
-            encoding=reply_encoding_of(STORE_JOURNAL),
+            encoding=reply_encoding(STORE_JOURNAL),
         )
 
 
@@ -214,12 +223,12 @@ async def run_router(
             "program using the port?"
         ) from None
     try:
-        storage = await asyncio.to_thread(_Storage, session, store) if store is not None else None
+        feed = await asyncio.to_thread(_Feed, session, store) if store is not None else None
         try:
             yield
         finally:
-            if storage is not None:
-                await asyncio.shield(asyncio.to_thread(storage.close))
+            if feed is not None:
+                await asyncio.shield(asyncio.to_thread(feed.close))
     finally:
         await asyncio.shield(asyncio.to_thread(session.close))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 
 from keyexpr_schema.errors import SchemaError
@@ -106,9 +107,11 @@ class WorldPublisher:
         scene = self._backend.scene()
         while True:
             await self._session.wait_connected()
-            connections = self._session.connections
+            generation = self._session.link.generation
             try:
                 await self._session.confirm(SIM_SCENE, SimAddress(), scene)
             except SchemaError:
                 continue  # no store there yet: without one there is nothing to look at, either
-            await self._session.wait_reconnected(connections)
+            # The link shows its state only in these fields, and half a second is soon enough.
+            while self._session.link.generation == generation:  # noqa: ASYNC110
+                await asyncio.sleep(0.5)

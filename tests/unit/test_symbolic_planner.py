@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from fleet.allocators.base import Allocated, NotAllocated
-from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.core.checker.plan_checker import check_plan
 from fleet.core.model.skills import skills_from_data
 from fleet.core.model.world import WorldModel
@@ -28,7 +28,7 @@ def solve(world: WorldModel, *goals: Goal, **more: object) -> Plan:
 
 
 def allocate(plan: Plan, world: WorldModel) -> Allocated:
-    made = MilpAllocator().allocate(plan, world)
+    made = MinMaxLoadAllocator(TieBreak.TRAVEL).allocate(plan, world)
     assert isinstance(made, Allocated), made
     return made
 
@@ -125,7 +125,7 @@ def test_why_there_is_no_plan_is_said() -> None:
 
 def test_the_allocator_refuses_what_no_robot_can_do() -> None:
     plan = solve(home(), bring(1, "hallway"))
-    refused = MilpAllocator().allocate(plan, home((carrier(),)))
+    refused = MinMaxLoadAllocator(TieBreak.TRAVEL).allocate(plan, home((carrier(),)))
     assert isinstance(refused, NotAllocated)
     assert "does not have the skill" in refused.violations[0].sentence
 

@@ -7,11 +7,15 @@ from collections.abc import Mapping
 from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.core.model.world import WorldModel
 from fleet.core.schedule.actor_order import carried_at_end
-from fleet.core.schedule.plan_schedule import actors_of
 from keyexpr_schema.ids import bare_name
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 Pair = tuple[str, str]
+
+
+def actors_of(plan: Plan) -> tuple[str, ...]:
+    """The plan's actors in the order of their first tasks."""
+    return tuple(dict.fromkeys(task.actor for task in plan.tasks))
 
 
 def actors_apart(plan: Plan, checked: CheckedPlan) -> frozenset[Pair]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fleet.core.checker.plan_checker import check_plan
 from fleet.core.model.world import WorldModel
 from fleet.core.schedule.actor_constraints import least_loaded
-from fleet.core.schedule.plan_schedule import best_schedule
+from fleet.scheduling.plan_schedule import AllocatedPlan
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 
@@ -25,7 +25,8 @@ def violations_of(plan: Plan, world: WorldModel) -> tuple[Violation, ...]:
                 "let the same actor do more of it",
             ),
         )
-    found = best_schedule(plan, checked, allocation, world)
+    allocated = AllocatedPlan(plan, checked, allocation, world)
+    found = next(allocated.schedules(), None)
     if found is None:
         return (
             Violation(
@@ -34,7 +35,7 @@ def violations_of(plan: Plan, world: WorldModel) -> tuple[Violation, ...]:
                 "let actors that meet do less in between",
             ),
         )
-    return check_plan(plan, world, allocation, found.extra_after).violations
+    return allocated.violations(found)
 
 
 def _foreign_goals(plan: Plan) -> tuple[Violation, ...]:

@@ -21,7 +21,6 @@ from fleet.core.checker.plan_checker import check_plan
 from fleet.core.model.world import WorldModel
 from fleet.core.schedule.actor_constraints import least_loaded
 from fleet.core.schedule.actor_order import carried_at_end
-from fleet.core.schedule.plan_schedule import valid_schedule
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.deordering import Strand, tasks_from
 from fleet.planners.symbolic.action_sequences import (
@@ -33,6 +32,7 @@ from fleet.planners.symbolic.action_sequences import (
     options_for,
 )
 from fleet.planners.symbolic.search import Facts
+from fleet.scheduling.plan_schedule import AllocatedPlan
 from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.plans import Plan
 
@@ -184,7 +184,7 @@ def _evaluate(plan: Plan, world: WorldModel) -> tuple[float, float] | NoPlan:
     allocation = least_loaded(plan, checked, world)
     if allocation is None:
         return NoPlan("there are fewer robots than the plan needs at the same time")
-    found = valid_schedule(plan, checked, allocation, world)
+    found = AllocatedPlan(plan, checked, allocation, world).valid_schedule()
     if isinstance(found, tuple):
         return NoPlan(found[0].sentence, found)
     unloading_s = UNLOADING_S * len(carried_at_end(checked))

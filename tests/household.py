@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fleet.core.checker.checked_plan import CheckedPlan, check_plan
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.service.composition import load_skills
 from keyexpr_schema.payloads.goals import Condition, Goal
+from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Object, Place
 
@@ -91,3 +93,10 @@ def home(
         *facts,
     )
     return WorldModel.of(SKILLS, PLACES, tuple(cup(n) for n in range(1, cups + 1)), robots, known)
+
+
+def checked(plan: Plan, world: WorldModel) -> CheckedPlan:
+    """The plan, which must be valid, with its check."""
+    found = check_plan(plan, world)
+    assert isinstance(found, CheckedPlan), found.violations
+    return found

@@ -8,14 +8,9 @@ from dataclasses import dataclass, field, replace
 
 import msgspec
 
-from fleet.core.checker.plan_checker import CheckedPlan, check_plan
+from fleet.core.checker.checked_plan import CheckedPlan, check_allocation, check_plan
 from fleet.core.model.world import WorldModel
-from fleet.core.schedule.actor_constraints import (
-    able_robots,
-    actors_apart,
-    task_counts,
-    tasks_nobody_can_do,
-)
+from fleet.core.schedule.actor_constraints import actors_apart, task_counts
 from fleet.core.schedule.plan_schedule import Schedule, schedule, valid_schedule
 from keyexpr_schema.payloads.plans import Plan, Violation
 
@@ -90,48 +85,60 @@ class AllocationProblem:
     pairs of actors that must be different robots.
     """
 
-    plan: Plan
-    world: WorldModel
     checked: CheckedPlan
     able: Mapping[str, tuple[str, ...]]
     load: Mapping[str, int]
     apart: frozenset[tuple[str, str]]
     circumstances: Circumstances = field(default_factory=Circumstances)
 
+    @property
+    def plan(self) -> Plan:
+        """The plan to be allocated."""
+        return self.checked.plan
+
+    @property
+    def world(self) -> WorldModel:
+        """The world that the plan is valid in."""
+        return self.checked.world
+
 
 class Allocator(ABC):
-    """Binds actors to robots. Subclasses choose; this class checks what goes in and comes out."""
+    """Binds actors to robots. Subclasses choose; this class checks what they chose."""
 
     name: str
     reschedules = False
     """Whether it heeds `Circumstances.home` itself; for others, whoever can stays where he is."""
 
     def allocate(
-        self, plan: Plan, world: WorldModel, circumstances: Circumstances | None = None
+        self, checked: CheckedPlan, circumstances: Circumstances | None = None
     ) -> Allocated | NotAllocated:
-        """A checked allocation of `plan` to the available robots of `world`, or why there is none.
+        """A checked allocation of a plan to the connected robots of its world, or why none.
 
         Tasks of one actor go to one robot, in order; a robot does its actors one after the other.
         """
-        told = circumstances or Circumstances()
-        if told.home and not self.reschedules:
-            stay = {a: robot for a, robot in told.home.items() if robot in world.team}
-            actors = task_counts(plan)
-            pins = {a: robot for a, robot in {**stay, **plan.pins}.items() if a in actors}
+        circumstances = circumstances or Circumstances()
+        if circumstances.home and not self.reschedules:
+            plan, team = checked.plan, checked.world.team
+            pins = {a: robot for a, robot in circumstances.home.items() if robot in team}
+            pins = {a: robot for a, robot in {**pins, **plan.pins}.items() if a in plan.actors}
             if pins != plan.pins:
-                found = self._allocate(msgspec.structs.replace(plan, pins=pins), world, told)
-                if isinstance(found, Allocated):
-                    return found
-        return self._allocate(plan, world, told)
+                pinned = check_plan(msgspec.structs.replace(plan, pins=pins), checked.world)
+                if isinstance(pinned, CheckedPlan):
+                    found = self._allocate(pinned, circumstances)
+                    if isinstance(found, Allocated):
+                        return found
+        return self._allocate(checked, circumstances)
 
     def _allocate(
-        self, plan: Plan, world: WorldModel, told: Circumstances
+        self, checked: CheckedPlan, circumstances: Circumstances
     ) -> Allocated | NotAllocated:
-        checked = check_plan(plan, world)
-        if not checked.valid:
-            lacking = tasks_nobody_can_do(plan, checked, world) if checked.actions else ()
-            return NotAllocated((*lacking, *checked.violations))
-        problem = _problem(plan, world, checked, told)
+        problem = AllocationProblem(
+            checked=checked,
+            able=checked.able,
+            load=task_counts(checked.plan),
+            apart=actors_apart(checked),
+            circumstances=circumstances,
+        )
         chosen = self._assign(problem)
         if isinstance(chosen, NotAllocated):
             return chosen
@@ -147,43 +154,24 @@ class Allocator(ABC):
     def _scheduled(
         self, problem: AllocationProblem, chosen: Assignment
     ) -> Allocated | NotAllocated:
-        plan, world, allocation = problem.plan, problem.world, chosen.allocation
+        checked, allocation = problem.checked, chosen.allocation
+        ready_s = problem.circumstances.ready_s
         if chosen.sequence is None:
-            told = problem.circumstances
-            order = valid_schedule(
-                plan, problem.checked, allocation, world, told.under_way, told.ready_s
-            )
+            order = valid_schedule(checked, allocation, problem.circumstances.under_way, ready_s)
             if isinstance(order, tuple):
                 return NotAllocated(order)
             return Allocated(allocation, order, chosen.lower_bound_s, chosen.notes)
         groups = [(actor,) for actor in chosen.sequence]
-        ready_s = problem.circumstances.ready_s
-        given = schedule(plan, problem.checked, allocation, world, groups, ready_s)
+        given = schedule(checked, allocation, groups, ready_s)
         if given is None:
-            return _refused(f"{self.name}: in this order robots wait for each other for ever")
-        final = check_plan(plan, world, allocation, given.extra_after)
-        if not final.valid:
-            return NotAllocated(final.violations)
+            sentence = f"{self.name}: in this order robots wait for each other for ever"
+            return NotAllocated((Violation(code="no-allocation", sentence=sentence),))
+        if violations := check_allocation(
+            problem.plan, problem.world, allocation, given.extra_after
+        ):
+            return NotAllocated(violations)
         return Allocated(allocation, given, chosen.lower_bound_s, chosen.notes)
 
     @abstractmethod
     def _assign(self, problem: AllocationProblem) -> Mapping[str, str] | Assignment | NotAllocated:
         """A robot for every actor, among those able; or why there is none."""
-
-
-def _refused(sentence: str) -> NotAllocated:
-    return NotAllocated((Violation(code="no-allocation", sentence=sentence),))
-
-
-def _problem(
-    plan: Plan, world: WorldModel, checked: CheckedPlan, circumstances: Circumstances
-) -> AllocationProblem:
-    return AllocationProblem(
-        plan=plan,
-        world=world,
-        checked=checked,
-        able=able_robots(plan, checked),
-        load=task_counts(plan),
-        apart=actors_apart(plan, checked),
-        circumstances=circumstances,
-    )

@@ -13,8 +13,7 @@ from dataclasses import replace as changed
 
 from msgspec.structs import replace
 
-from fleet.core.checker.plan_checker import CheckedPlan, check_plan
-from fleet.core.schedule.actor_constraints import able_robots
+from fleet.core.checker.checked_plan import CheckedPlan, InvalidPlan, check_plan
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.service.oversubscription import PartialPlan, plan_what_can_be
 from keyexpr_schema.facts import SEARCHED
@@ -37,9 +36,9 @@ def mended_plan(
     """
     whole = _for_goals(remaining, problem.goals)
     checked = check_plan(whole, problem.world)
-    if checked.valid:
-        return PartialPlan(whole, changed=False)
-    broken = _broken_goals(whole, checked, problem.goals)
+    if isinstance(checked, CheckedPlan):
+        return PartialPlan(checked, changed=False)
+    broken = _broken_goals(checked, problem.goals)
     rest = tuple(goal for goal in problem.goals if goal.goal not in broken)
     if not broken or all(goal.goal in reached for goal in rest):
         return None
@@ -63,7 +62,8 @@ def mended_plan(
         replace(mended, pins={a: robot for a, robot in mended.pins.items() if a in actors}),
         [goal for goal in problem.goals if goal.goal not in left_out],
     )
-    return PartialPlan(mended, left_out) if check_plan(mended, problem.world).valid else None
+    repaired = check_plan(mended, problem.world)
+    return PartialPlan(repaired, left_out) if isinstance(repaired, CheckedPlan) else None
 
 
 def _beside(plan: Plan, other: Plan) -> Plan:
@@ -93,17 +93,18 @@ def _for_goals(plan: Plan, goals: Iterable[Goal]) -> Plan:
     )
 
 
-def _broken_goals(plan: Plan, checked: CheckedPlan, goals: Iterable[Goal]) -> frozenset[str]:
+def _broken_goals(invalid: InvalidPlan, goals: Iterable[Goal]) -> frozenset[str]:
     """The goals that the checker's violations are about; none if one is about no goal."""
+    plan = invalid.plan
     goal_of = {task.task: task.goal for task in plan.tasks}
     wants: dict[Condition, list[str]] = {}
     for goal in goals:
         for condition in goal.conditions:
             wants.setdefault(condition, []).append(goal.goal)
-    if checked.graph is None:
+    if invalid.graph is None:
         return frozenset()
     broken: set[str] = set()
-    for violation in checked.violations:
+    for violation in invalid.violations:
         if violation.task is not None:
             served = goal_of[violation.task]
             about = [served] if served is not None else []
@@ -116,7 +117,7 @@ def _broken_goals(plan: Plan, checked: CheckedPlan, goals: Iterable[Goal]) -> fr
         if not about:
             return frozenset()
         broken.update(about)
-    for actor, robots in able_robots(plan, checked).items():
+    for actor, robots in invalid.able.items():
         if not robots:
             broken.update(t.goal for t in plan.tasks if t.actor == actor and t.goal is not None)
     return frozenset(broken)

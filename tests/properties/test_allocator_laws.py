@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from fleet.allocators.base import AllocationProblem, NotAllocated
 from fleet.allocators.milp import MilpAllocator
-from fleet.core.checker.plan_checker import CheckedPlan
 from keyexpr_schema.payloads.plans import Plan
 
 ROBOTS = ("r0", "r1", "r2")
@@ -23,11 +22,10 @@ def problems(draw: st.DrawFn) -> AllocationProblem:
     actors = [f"a{i}" for i in range(draw(st.integers(1, 5)))]
     some = st.lists(st.sampled_from(ROBOTS), min_size=1, unique=True).map(sorted)
     pairs = [(a, b) for i, a in enumerate(actors) for b in actors[i + 1 :]]
-    world: Any = SimpleNamespace(team=ROBOTS)
+    plan = Plan(plan="p", goals=(), conditions=(), tasks=())
+    checked: Any = SimpleNamespace(plan=plan, world=SimpleNamespace(team=ROBOTS))
     return AllocationProblem(
-        plan=Plan(plan="p", goals=(), conditions=(), tasks=()),
-        world=world,
-        checked=CheckedPlan(()),
+        checked=checked,
         able={actor: tuple(draw(some)) for actor in actors},
         load={actor: draw(st.integers(1, 6)) for actor in actors},
         apart=frozenset(draw(st.lists(st.sampled_from(pairs), max_size=4)) if pairs else ()),

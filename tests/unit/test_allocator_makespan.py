@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 import pytest
+from msgspec.structs import replace
 
 from benchmarks.allocation.shops import random_shop
 from fleet.allocators.base import Allocated, Circumstances, NotAllocated
@@ -20,8 +21,9 @@ from fleet.jobshop.problem import BadShop, Block, Machine, Operation, Shop
 from fleet.jobshop.rescheduling import reschedule, without_machines
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
-from keyexpr_schema.payloads.plans import Plan
-from tests.household import bring, carrier, home, manipulator
+from keyexpr_schema.ids import actor_arg
+from keyexpr_schema.payloads.plans import Plan, Task
+from tests.household import bring, carrier, checked, home, manipulator
 
 QUICK = MakespanAllocator(deadline_s=0.2, exact=False, clock=StepClock())
 
@@ -39,12 +41,12 @@ def planned(world: WorldModel, *goals: tuple[int, str]) -> Plan:
         PlanningProblem(plan="p", goals=tuple(bring(n, where) for n, where in goals), world=world)
     )
     assert not isinstance(made, NoPlan)
-    return made
+    return made.plan
 
 
 def allocated(allocator: MakespanAllocator | MilpAllocator, plan: Plan, world: WorldModel,
               told: Circumstances | None = None) -> Allocated:  # fmt: skip
-    found = allocator.allocate(plan, world, told)
+    found = allocator.allocate(checked(plan, world), told)
     assert isinstance(found, Allocated), found
     return found
 
@@ -114,9 +116,22 @@ def test_of_equal_makespans_the_urgent_goal_is_done_first() -> None:
 
 
 def test_too_few_robots_is_a_sentence() -> None:
-    world = home((carrier("cart_1"),), cups=1)
-    plan = planned(home(cups=1), (1, "hallway"))
-    found = QUICK.allocate(plan, world)
+    """One robot has a hand and a basket, and cannot give anything to itself."""
+    one = replace(manipulator(), capabilities={**manipulator().capabilities, "basket": 1.0})
+    world = home((one,), cups=1)
+    cup = {"object": "cup_1", "place": "kitchen"}
+    calls = (
+        ("go", "navigate", "a1", (), {"to": "kitchen"}),
+        ("pick", "pick", "a1", ("go",), cup),
+        ("come", "navigate", "a2", (), {"to": "kitchen"}),
+        ("give", "place_on_robot", "a1", ("pick", "come"), {**cup, "carrier": actor_arg("a2")}),
+    )
+    tasks = tuple(
+        Task(task=t, skill=skill, actor=a, after=after, args={"robot": actor_arg(a), **args})
+        for t, skill, a, after, args in calls
+    )
+    plan = Plan(plan="p", goals=(), conditions=(), tasks=tasks)
+    found = QUICK.allocate(checked(plan, world))
     assert isinstance(found, NotAllocated)
     assert found.violations[0].sentence
 

@@ -19,8 +19,14 @@ from fleet.allocators.milp import MilpAllocator
 from fleet.allocators.min_max_load import Bound, min_max_load
 from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.allocators.solver_run import Found, available_solver, solve
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import (
+    CheckedPlan,
+    InvalidPlan,
+    check_allocation,
+    check_plan,
+)
 from fleet.core.model.world import WorldModel
+from fleet.core.schedule.actor_constraints import tasks_nobody_can_do
 from fleet.llm.client import ModelAnswer, ModelClient
 from fleet.llm.configuration import LlmConfig
 from fleet.llm.conversation import LanguageModel
@@ -28,7 +34,7 @@ from fleet.planners.base import PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from fleet.service.composition import compose
 from keyexpr_schema.payloads.plans import Plan, Task, Violation
-from tests.household import bring, carrier, fact, home, manipulator
+from tests.household import bring, carrier, checked, fact, home, manipulator
 from tests.llm_server import LlmServer, Reply
 
 PLAIN = (BalancedAllocator(), MilpAllocator(), CostBasedAllocator(), RoundRobinAllocator())
@@ -38,8 +44,8 @@ TEAM = (manipulator("r1"), manipulator("r2"), manipulator("r3"), carrier("c1"), 
 def plan_for(world: WorldModel, goals: int) -> Plan:
     wanted = [bring(n, "hallway" if n % 2 else "living_room") for n in range(1, goals + 1)]
     made = SymbolicPlanner().plan(PlanningProblem("p", tuple(wanted), world))
-    assert isinstance(made, Plan), made
-    return made
+    assert isinstance(made, CheckedPlan), made
+    return made.plan
 
 
 def loads(plan: Plan, made: Allocated) -> list[int]:
@@ -71,26 +77,24 @@ def drives(
 def test_every_allocator_passes_the_checker(allocator: Allocator) -> None:
     world = home(TEAM, cups=8)
     plan = plan_for(world, 8)
-    made = allocator.allocate(plan, world)
+    made = allocator.allocate(checked(plan, world))
     assert isinstance(made, Allocated), made
-    assert check_plan(plan, world, made.allocation, made.schedule.extra_after).valid
+    order = made.schedule.extra_after
+    assert check_allocation(plan, world, made.allocation, order) == ()
     assert set(made.allocation) == {task.actor for task in plan.tasks}
 
 
 @pytest.mark.parametrize("allocator", PLAIN, ids=lambda allocator: allocator.name)
 def test_pins_and_capabilities_bind_every_allocator(allocator: Allocator) -> None:
     world = home(TEAM)
-    made = allocator.allocate(drives("c2", "", "c2"), world)
+    made = allocator.allocate(checked(drives("c2", "", "c2"), world))
     assert isinstance(made, Allocated), made
     assert made.allocation["a0"] == made.allocation["a2"] == "c2"
-    refused = allocator.allocate(plan_for(world, 2), home((carrier(),)))
-    assert isinstance(refused, NotAllocated)
-    assert "does not have the skill" in refused.violations[0].sentence
 
 
 @pytest.mark.parametrize("allocator", PLAIN, ids=lambda allocator: allocator.name)
 def test_a_plan_without_tasks_is_allocated(allocator: Allocator) -> None:
-    made = allocator.allocate(drives(), home())
+    made = allocator.allocate(checked(drives(), home()))
     assert isinstance(made, Allocated)
     assert made.allocation == {}
 
@@ -110,7 +114,7 @@ def test_too_few_robots_are_said_with_tasks_and_names(allocator: Allocator) -> N
             task(f"give{n}", "place_on_robot", {**cup, "carrier": basket}, f"pick{n}", f"come{n}"),
         ]
     plan = Plan(plan="p", goals=(), conditions=(), tasks=tuple(rows))
-    refused = allocator.allocate(plan, world)
+    refused = allocator.allocate(checked(plan, world))
     assert isinstance(refused, NotAllocated), refused
     told = refused.violations[0].sentence
     assert "actors b1 and b2 must all be different robots" in told
@@ -126,15 +130,15 @@ def test_the_evenest_loads_are_found_where_round_robin_misses_them() -> None:
     """Free actors come first in turn, and take the one robot that the pinned ones need."""
     world = home((manipulator("r1"), manipulator("r2")))
     plan = drives("", "", "r1", "r1")
-    even = BalancedAllocator().allocate(plan, world)
-    turn = RoundRobinAllocator().allocate(plan, world)
+    even = BalancedAllocator().allocate(checked(plan, world))
+    turn = RoundRobinAllocator().allocate(checked(plan, world))
     assert isinstance(even, Allocated) and isinstance(turn, Allocated)
     assert loads(plan, even) == [2, 2]
     assert loads(plan, turn) == [3, 1]
 
 
 def test_round_robin_goes_on_where_it_stopped() -> None:
-    made = RoundRobinAllocator().allocate(drives(*[""] * 7), home(TEAM))
+    made = RoundRobinAllocator().allocate(checked(drives(*[""] * 7), home(TEAM)))
     assert isinstance(made, Allocated)
     assert list(made.allocation.values()) == ["c1", "c2", "r1", "r2", "r3", "c1", "c2"]
 
@@ -149,18 +153,18 @@ def test_cost_based_sends_the_robot_that_is_there() -> None:
         ),
     )
     # The second drive waits for the first, so it is of the next round: r2 is still the nearest.
-    made = CostBasedAllocator().allocate(drives("", "", after={1: ("t0",)}), world)
+    made = CostBasedAllocator().allocate(checked(drives("", "", after={1: ("t0",)}), world))
     assert isinstance(made, Allocated)
     assert made.allocation == {"a0": "r2", "a1": "r2"}
     # In one round every robot takes one at most.
-    made = CostBasedAllocator().allocate(drives("", ""), world)
+    made = CostBasedAllocator().allocate(checked(drives("", ""), world))
     assert isinstance(made, Allocated)
     assert set(made.allocation.values()) == {"r2", "r3"}
 
 
 def test_the_milp_breaks_ties_by_travel() -> None:
     world = home(TEAM[:2], facts=(fact("r1", "at", "living_room"), fact("r2", "at", "kitchen")))
-    made = MilpAllocator().allocate(drives(""), world)
+    made = MilpAllocator().allocate(checked(drives(""), world))
     assert isinstance(made, Allocated)
     assert made.allocation == {"a0": "r2"}
 
@@ -170,9 +174,7 @@ def test_cost_based_says_so_where_its_rounds_leave_no_robot() -> None:
     world = home(TEAM[:2], facts=(fact("r1", "at", "kitchen"), fact("r2", "at", "hallway")))
     plan = drives("", "r1", after={1: ("t0",)})
     problem = AllocationProblem(
-        plan=plan,
-        world=world,
-        checked=check_plan(plan, world),
+        checked=checked(plan, world),
         able={"a0": ("r1", "r2"), "a1": ("r1",)},
         load={"a0": 1, "a1": 1},
         apart=frozenset({("a0", "a1")}),
@@ -192,7 +194,7 @@ def test_what_is_not_proven_is_noted() -> None:
     plan = drives(*[""] * 33)
     able = {f"a{n}": names for n in range(33)}
     load = {f"a{n}": 61 + n * n % 37 for n in range(33)}
-    problem = AllocationProblem(plan, world, check_plan(plan, world), able, load, frozenset())
+    problem = AllocationProblem(checked(plan, world), able, load, frozenset())
     made = BalancedAllocator()._assign(problem)
     assert isinstance(made, Assignment)
     assert "is not proven" in made.notes[0]
@@ -208,9 +210,9 @@ class Undecided(MilpAllocator):
 
 def test_the_papers_fallback_is_off_unless_asked_for_and_says_so() -> None:
     plan, world = drives("", ""), home(TEAM[:2])
-    refused = Undecided().allocate(plan, world)
+    refused = Undecided().allocate(checked(plan, world))
     assert isinstance(refused, NotAllocated)
-    made = Undecided(fallback_round_robin=True).allocate(plan, world)
+    made = Undecided(fallback_round_robin=True).allocate(checked(plan, world))
     assert isinstance(made, Allocated)
     assert made.allocation == {"a0": "r1", "a1": "r2"}
     (note,) = made.notes
@@ -222,11 +224,12 @@ def test_the_papers_fallback_is_off_unless_asked_for_and_says_so() -> None:
 def test_tasks_that_nobody_can_do_are_named_with_what_is_lacking() -> None:
     plan = plan_for(home(), 1)
     world = home((carrier("c1"), manipulator("weak", grip_kg=0.1)))
-    refused = MilpAllocator().allocate(plan, world)
-    assert isinstance(refused, NotAllocated)
+    invalid = check_plan(plan, world)
+    assert isinstance(invalid, InvalidPlan)
+    refused = tasks_nobody_can_do(invalid)
     pick = next(row.task for row in plan.tasks if row.skill == "pick")
-    assert refused.violations[0].task == pick, "that comes first"
-    sentence = refused.violations[0].sentence
+    assert refused[0].task == pick
+    sentence = refused[0].sentence
     assert sentence.startswith(f"no robot can do task {pick}, pick: ")
     assert "c1 does not have the skill pick" in sentence
     assert "weak's grip is 0.1 kg" in sentence
@@ -297,7 +300,7 @@ def test_a_language_model_is_told_what_is_wrong_and_mends_it(client: ModelClient
     world, plan = home(TEAM[:2]), drives("", "r2")
     replies = (Reply("no idea"), answer(a0="r9", a1="r1"), answer(a0="r2", a1="r2"))
     with LlmServer(*replies) as server:
-        made = by_model(server, client).allocate(plan, world)
+        made = by_model(server, client).allocate(checked(plan, world))
     assert isinstance(made, Allocated)
     assert made.allocation == {"a0": "r2", "a1": "r2"}
     told = json.dumps(server.requests[2]["messages"])
@@ -310,7 +313,7 @@ def test_a_language_model_that_is_never_right_is_replaced_and_that_is_said(
 ) -> None:
     world, plan = home(TEAM[:2]), drives("", "")
     with LlmServer(answer(a0="r1")) as server:
-        made = by_model(server, client).allocate(plan, world)
+        made = by_model(server, client).allocate(checked(plan, world))
     assert isinstance(made, Allocated)
     assert set(made.allocation.values()) == {"r1", "r2"}
     (note,) = made.notes
@@ -324,7 +327,7 @@ def test_a_language_model_that_fails_stops_nothing() -> None:
             raise OSError("no network")
 
     model = LanguageModel(LlmConfig(model="openai/scripted"), Unreachable())
-    made = LlmAllocator(model, RoundRobinAllocator()).allocate(drives(""), home(TEAM[:2]))
+    made = LlmAllocator(model, RoundRobinAllocator()).allocate(checked(drives(""), home(TEAM[:2])))
     assert isinstance(made, Allocated)
     assert made.notes[0].endswith("asking the language model failed: no network")
 
@@ -335,7 +338,7 @@ def test_what_is_too_large_for_the_solver_is_balanced_without_it() -> None:
     plan = drives(*[""] * 1000)
     able = {f"a{n}": names for n in range(1000)}
     load = dict.fromkeys(able, 1)
-    problem = AllocationProblem(plan, world, check_plan(plan, world), able, load, frozenset())
+    problem = AllocationProblem(checked(plan, world), able, load, frozenset())
     made = MilpAllocator()._assign(problem)
     assert isinstance(made, Assignment)
     assert "too many for the solver" in made.notes[0]

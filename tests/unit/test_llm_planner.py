@@ -12,7 +12,7 @@ import pytest
 
 from fleet.allocators.base import Allocated
 from fleet.allocators.milp import MilpAllocator
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import CheckedPlan
 from fleet.core.model.world import WorldModel
 from fleet.llm.client import ModelClient
 from fleet.llm.configuration import LlmConfig
@@ -25,7 +25,7 @@ from fleet.planners.symbolic.planner import SymbolicPlanner
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.payloads.world import Object
-from tests.household import at, bring, carrier, fact, home
+from tests.household import at, bring, carrier, checked, fact, home
 from tests.llm_server import LlmServer, Reply
 
 GOALS = (bring(1, "hallway"), bring(2, "living_room"))
@@ -93,10 +93,9 @@ def solve(
     planner = LlmPlanner(LanguageModel(config(server, **fields), client), SymbolicPlanner())
     problem = PlanningProblem("p", goals, world, strategy=strategy, first_task=first_task)
     made = planner.plan(problem)
-    assert isinstance(made, Plan), made
-    assert check_plan(made, world).valid
-    assert isinstance(MilpAllocator().allocate(made, world), Allocated)
-    return made
+    assert isinstance(made, CheckedPlan), made
+    assert isinstance(MilpAllocator().allocate(checked(made.plan, world)), Allocated)
+    return made.plan
 
 
 def fell_back(plan: Plan, words: str) -> None:
@@ -361,8 +360,8 @@ def test_nobody_listens(client: ModelClient) -> None:
     made = LlmPlanner(LanguageModel(gone, client), SymbolicPlanner()).plan(
         PlanningProblem("p", GOALS, home())
     )
-    assert isinstance(made, Plan)
-    fell_back(made, "(unavailable)")
+    assert isinstance(made, CheckedPlan)
+    fell_back(made.plan, "(unavailable)")
 
 
 # --- budget --------------------------------------------------------------------------------------
@@ -498,5 +497,5 @@ def test_after_close_the_symbolic_planner_plans() -> None:
         planner = LlmPlanner(model, SymbolicPlanner())
         model.close()
         made = planner.plan(PlanningProblem("p", GOALS, home()))
-    assert isinstance(made, Plan)
-    fell_back(made, "closed")
+    assert isinstance(made, CheckedPlan)
+    fell_back(made.plan, "closed")

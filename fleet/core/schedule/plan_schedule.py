@@ -9,7 +9,7 @@ from itertools import islice, permutations
 from math import inf
 from typing import TypeVar
 
-from fleet.core.checker.plan_checker import CheckedPlan, check_plan
+from fleet.core.checker.checked_plan import CheckedPlan, check_allocation
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import Cycle, TaskGraph
 from fleet.core.model.world import WorldModel
@@ -61,14 +61,9 @@ def predicted_duration_s(action: Action, origin: Value, robot: str, world: World
     return world.work_s(robot, skill) + travel_s
 
 
-def actors_of(plan: Plan) -> tuple[str, ...]:
-    """The plan's actors in the order of their first tasks."""
-    return tuple(dict.fromkeys(task.actor for task in plan.tasks))
-
-
 def actor_groups(plan: Plan) -> tuple[tuple[str, ...], ...]:
     """Actors that depend on each other, together; groups in the order of their first tasks."""
-    leader = {actor: actor for actor in actors_of(plan)}
+    leader = {actor: actor for actor in plan.actors}
 
     def find(actor: str) -> str:
         while leader[actor] != actor:
@@ -87,18 +82,14 @@ def actor_groups(plan: Plan) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(members) for members in groups.values())
 
 
-def best_schedule(
-    plan: Plan, checked: CheckedPlan, allocation: Mapping[str, str], world: WorldModel
-) -> Schedule | None:
+def best_schedule(checked: CheckedPlan, allocation: Mapping[str, str]) -> Schedule | None:
     """The shortest schedule over orders of groups of actors, or `None` if every order deadlocks."""
-    return next(good_schedules(plan, checked, allocation, world), None)
+    return next(good_schedules(checked, allocation), None)
 
 
 def good_schedules(
-    plan: Plan,
     checked: CheckedPlan,
     allocation: Mapping[str, str],
-    world: WorldModel,
     under_way: Set[str] = frozenset(),
     ready_s: Mapping[str, float] | None = None,
 ) -> Iterator[Schedule]:
@@ -108,10 +99,10 @@ def good_schedules(
     never wait for each other in a circle. Groups with actors that are `under_way`, or that need
     their robot as it is now, come first. `ready_s` says from when on a robot is free, s.
     """
-    if checked.graph is None:
-        return
-    timetable = Timetable(checked.graph, checked.actions, allocation, world)
-    groups = [sorted(group, key=timetable.first.__getitem__) for group in actor_groups(plan)]
+    timetable = Timetable(checked.graph, checked.actions, allocation, checked.world)
+    groups = [
+        sorted(group, key=timetable.first.__getitem__) for group in actor_groups(checked.plan)
+    ]
     ahead = first_actors(checked) | under_way
     head = [group for group in groups if not ahead.isdisjoint(group)]
     rest = [group for group in groups if ahead.isdisjoint(group)]
@@ -122,16 +113,14 @@ def good_schedules(
     else:
         orders = (_swap_neighbours(timetable, head, rest, allocation), [*head, *rest])
     for order in orders:
-        found = schedule(plan, checked, allocation, world, order, ready_s)
+        found = schedule(checked, allocation, order, ready_s)
         if found is not None:
             yield found
 
 
 def valid_schedule(
-    plan: Plan,
     checked: CheckedPlan,
     allocation: Mapping[str, str],
-    world: WorldModel,
     under_way: Set[str] = frozenset(),
     ready_s: Mapping[str, float] | None = None,
 ) -> Schedule | tuple[Violation, ...]:
@@ -141,9 +130,9 @@ def valid_schedule(
     `good_schedules` for `under_way` and `ready_s`.
     """
     violations: tuple[Violation, ...] = ()
-    found_orders = good_schedules(plan, checked, allocation, world, under_way, ready_s)
+    found_orders = good_schedules(checked, allocation, under_way, ready_s)
     for found in islice(found_orders, MAX_ORDERS_CHECKED):
-        violations = check_plan(plan, world, allocation, found.extra_after).violations
+        violations = check_allocation(checked.plan, checked.world, allocation, found.extra_after)
         if not violations:
             return found
     sentence = "with this allocation robots wait for each other for ever"
@@ -188,10 +177,8 @@ def _swap(items: list[T], left: int) -> None:
 
 
 def schedule(
-    plan: Plan,
     checked: CheckedPlan,
     allocation: Mapping[str, str],
-    world: WorldModel,
     groups: Iterable[Sequence[str]],
     ready_s: Mapping[str, float] | None = None,
 ) -> Schedule | None:
@@ -200,8 +187,6 @@ def schedule(
     `ready_s` says from when on a robot is free, s.
     """
     graph = checked.graph
-    if graph is None:
-        return None
     number = {task: i for i, task in enumerate(graph.order)}
     tasks_of: dict[str, list[str]] = defaultdict(list)
     for task in graph.order:
@@ -221,7 +206,7 @@ def schedule(
         )
     except Cycle:
         return None
-    start_s, end_s = _earliest(whole, checked.actions, allocation, world, ready_s or {})
+    start_s, end_s = _earliest(whole, checked.actions, allocation, checked.world, ready_s or {})
     return Schedule(
         start_s,
         end_s,

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 from msgspec.structs import replace
 
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import check_plan
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import AT, FactKey
@@ -26,7 +26,7 @@ def without_redundant_tasks(plan: Plan, world: WorldModel) -> Plan:
     unlocated = world.with_facts(
         {FactKey(AT, robot): None for robot in world.robots if robot not in mentioned}
     )
-    if not check_plan(plan, unlocated).valid:
+    if check_plan(plan, unlocated).violations:
         unlocated = world
     for removal in (_with_successors, _alone):
         plan = _eliminated(plan, unlocated, removal)
@@ -41,7 +41,7 @@ def _eliminated(
         if all(task != row.task for row in plan.tasks):
             continue
         reduced = _without(plan, removal(graph, task))
-        if check_plan(reduced, world).valid:
+        if not check_plan(reduced, world).violations:
             plan = reduced
             graph = TaskGraph({row.task: row.after for row in plan.tasks})
     return plan

@@ -1,9 +1,9 @@
 """A running plan of 1,000 tasks on 50 robots: what an event takes, and what losing a robot takes.
 
 Run from anywhere: `python benchmarks/bench_running_plan.py` (or `make bench`). The planner's own
-core and desk, without keys: a lost robot is mended as in the field, and beside that, in the same
-run, everything is planned again, as a person's replan does. Wall times; numbers are of this machine
-and of whatever else it was doing.
+core and planning jobs, without keys: a plan is repaired after a lost robot as in the field, and
+beside that, in the same run, everything is planned again, as a person's replan does. Wall times;
+numbers are of this machine and of whatever else it was doing.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ from fleet.core import events
 from fleet.core.dispatch.delays import FACTOR, MARGIN_S
 from fleet.core.effects import MakePlan
 from fleet.core.events import PlanningSucceeded
-from fleet.core.state import OUTSTANDING, PlanEntry, Policy, State
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.state import Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
-from fleet.service.planning_job import carry_out
+from fleet.service.planning_job import run_planning_job
 from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import PlanChange
@@ -55,10 +56,12 @@ def main() -> None:
         for _ in range(DONE_BEFORE):
             running.succeed()
         each_s = (time.perf_counter() - began_s) / (2 * DONE_BEFORE)
-        before = running.entry.allocation
+        before = running.entry.outcome.allocation
         happens(running)
         entry, made = running.entry, running.made
-        moved = sum(before.get(actor, robot) != robot for actor, robot in entry.allocation.items())
+        moved = sum(
+            before.get(actor, robot) != robot for actor, robot in entry.outcome.allocation.items()
+        )
         changed = entry.change or PlanChange()
         changes = [str(n) for n in (changed.kept, changed.dropped, changed.added)]
         least = next((n.split(" is ")[-1] for n in entry.notes if "least found" in n), "")
@@ -67,7 +70,7 @@ def main() -> None:
             f"{made.planning_time_s:.2f} s",
             f"{made.makespan_s:.0f} s",
             least,
-            str(moved) if made.mended else "",
+            str(moved) if made.repaired else "",
             *changes,
         )
     console = Console(width=140)
@@ -124,7 +127,7 @@ class Running:
         self.state, effects = step(self.state, kind(**at, **fields), self.parts.skills)
         for effect in effects:
             if isinstance(effect, MakePlan):
-                made = carry_out(effect.job, self.state, self.parts, at)
+                made = run_planning_job(effect.job, self.state, self.parts, at)
                 if not isinstance(made, PlanningSucceeded):
                     raise SystemExit(f"there is no plan: {made.reason}")
                 self.made = made
@@ -158,14 +161,14 @@ class Running:
 
 
 def lost(running: Running) -> None:
-    """A robot is lost: what is left is mended."""
+    """A robot is lost: the plan is repaired."""
     robot = running.outstanding()[-1].robot
     running.tell(events.WorkerDisconnected, robot=robot, incarnation="i1")
     running.tell(events.TimerFired, wait_s=Policy().lost_after_s + 1.0)
 
 
 def late(running: Running) -> None:
-    """A robot is ten minutes late: what is left is mended."""
+    """A robot is ten minutes late: the plan is repaired."""
     record = running.outstanding()[-1]
     running.tell(events.ReportReceived, report=running.report_of(record))
     running.tell(events.TimerFired, wait_s=FACTOR * record.duration_s + MARGIN_S + 600.0)

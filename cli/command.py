@@ -88,11 +88,11 @@ class Call:
         if isinstance(drawn, str):
             typer.echo(drawn)
         else:
-            from cli.show.page import page
+            from cli.views.console import console
 
-            page().print(drawn)
+            console().print(drawn)
 
-    def say(self, sentence: str) -> None:
+    def inform(self, sentence: str) -> None:
         """A sentence for a person: on stdout, or on stderr where stdout carries JSON."""
         typer.echo(sentence, err=self.json)
 

@@ -42,17 +42,27 @@ class TooLate(CliError):
     """Something was waited for and did not happen before the deadline."""
 
 
-def check_known(what: str, name: str, known: Iterable[str], how_to_add: str) -> None:
+HOW_TO_ADD = {
+    "goal": "say one with `robotctl goal add`",
+    "plan": "make one with `robotctl plan create`",
+    "robot": "declare one with `robotctl register FILE`",
+    "place": "tell one with `robotctl world add --place`",
+}
+"""Where there is none of a kind yet: how there comes to be one."""
+
+
+def check_known(what: str, name: str, known: Iterable[str], how_to_add: str = "") -> None:
     """Do nothing if `name` is one of `known`.
 
     Raises:
         Unknown: it is not; the message suggests a near miss, lists the valid names, or says how to
-            declare the first one.
+            declare the first one (`how_to_add`, else by `HOW_TO_ADD`).
     """
     names = sorted(set(known))
     if name in names:
         return
     if not names:
+        how_to_add = how_to_add or HOW_TO_ADD.get(what, "")
         how = f"; {how_to_add}" if how_to_add else ""
         raise Unknown(f"there is no {what} {name!r}: none is known yet{how}")
     near = get_close_matches(name, names, n=1)

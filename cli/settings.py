@@ -21,7 +21,7 @@ _FIELDS = ("router", "realm", "planner")
 
 @dataclass(frozen=True)
 class PlannerSettings:
-    """How `robotctl planner` behaves where no flag says so; `None` and empty: not told.
+    """How `robotctl planner` behaves where no flag says so; `None` and empty: it is not given.
 
     Files are relative to the folder of the configuration file. `lost_after_s` is wall time [s].
     """
@@ -60,18 +60,18 @@ def load_settings(
             names where the value came from.
     """
     path = config_file(environ, cwd)
-    told = _read(path) if path else {}
+    written = _read(path) if path else {}
     chosen_routers, where = _choose(
-        routers or None, environ.get("ROBOTFLEET_ROUTER"), told.get("router"), path, "--router"
+        routers or None, environ.get("ROBOTFLEET_ROUTER"), written.get("router"), path, "--router"
     )
     chosen_realm, realm_where = _choose(
-        realm, environ.get("ROBOTFLEET_REALM"), told.get("realm"), path, "--realm"
+        realm, environ.get("ROBOTFLEET_REALM"), written.get("realm"), path, "--realm"
     )
     return Settings(
         routers=_endpoints(chosen_routers, where) or (DEFAULT_ROUTER,),
         realm=_realm(chosen_realm, realm_where),
         json=json,
-        planner=_planner(told.get("planner"), path) if path else PlannerSettings(),
+        planner=_planner(written.get("planner"), path) if path else PlannerSettings(),
     )
 
 
@@ -98,29 +98,29 @@ def _read(path: Path) -> dict[str, Any]:
     import yaml
 
     try:
-        told = yaml.safe_load(path.read_text(encoding="utf-8"))
+        written = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise BadSettings(f"cannot read {path}: {error}") from None
     except yaml.YAMLError as error:
         raise BadSettings(f"{path} is not YAML: {one_line(error)}") from None
-    if told is None:
+    if written is None:
         return {}
-    if not isinstance(told, dict):
+    if not isinstance(written, dict):
         raise BadSettings(f"{path} must hold fields such as 'router: {DEFAULT_ROUTER}'")
-    for name in told:
+    for name in written:
         if name not in _FIELDS:
             raise BadSettings(f"{path} has a field {name!r}; valid are: {', '.join(_FIELDS)}")
-    return told
+    return written
 
 
 def _choose(
-    flag: object, env: str | None, told: object, path: Path | None, name: str
+    flag: object, env: str | None, written: object, path: Path | None, name: str
 ) -> tuple[object, str]:
     if flag is not None:
         return flag, name
     if env:
         return env, f"ROBOTFLEET_{name.removeprefix('--').upper()}"
-    return told, str(path)
+    return written, str(path)
 
 
 def _endpoints(value: object, where: str) -> tuple[str, ...]:
@@ -148,36 +148,36 @@ def _realm(value: object, where: str) -> str:
     return value
 
 
-def _planner(told: object, path: Path) -> PlannerSettings:
-    if told is None:
+def _planner(written: object, path: Path) -> PlannerSettings:
+    if written is None:
         return PlannerSettings()
-    if not isinstance(told, dict):
+    if not isinstance(written, dict):
         raise BadSettings(f"{path}: planner must hold fields such as 'approval: true'")
-    for name in told:
+    for name in written:
         if name not in _PLANNER_FIELDS:
             raise BadSettings(
                 f"{path}: planner has no field {name!r}; valid are: {', '.join(_PLANNER_FIELDS)}"
             )
 
     def check(name: str, right: bool, what: str) -> None:
-        if told.get(name) is not None and not right:
-            raise BadSettings(f"{path}: planner.{name}: {told[name]!r} is not {what}")
+        if written.get(name) is not None and not right:
+            raise BadSettings(f"{path}: planner.{name}: {written[name]!r} is not {what}")
 
     for name in ("approval", "auto_plan"):
-        check(name, isinstance(told.get(name), bool), "true or false")
-    lost = told.get("lost_after_s")
+        check(name, isinstance(written.get(name), bool), "true or false")
+    lost = written.get("lost_after_s")
     is_number = isinstance(lost, int | float) and not isinstance(lost, bool)
     lost_s = float(lost or 0.0) if is_number else -1.0
     check("lost_after_s", 0.0 <= lost_s < math.inf, "a number of seconds from 0 up")
-    check("llm_config", isinstance(told.get("llm_config"), str), "the name of a file")
-    skills = told.get("skills") or []
+    check("llm_config", isinstance(written.get("llm_config"), str), "the name of a file")
+    skills = written.get("skills") or []
     skills = [skills] if isinstance(skills, str) else skills
     is_list = isinstance(skills, list) and all(isinstance(each, str) for each in skills)
     check("skills", is_list, "the name of a file or a list of such")
-    llm = told.get("llm_config")
+    llm = written.get("llm_config")
     return PlannerSettings(
-        approval=told.get("approval"),
-        auto_plan=told.get("auto_plan"),
+        approval=written.get("approval"),
+        auto_plan=written.get("auto_plan"),
         lost_after_s=None if lost is None else lost_s,
         llm_config=None if llm is None else path.parent / Path(llm).expanduser(),
         skills=tuple(path.parent / Path(each).expanduser() for each in skills),

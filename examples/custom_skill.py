@@ -25,7 +25,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from keyexpr_schema.errors import SchemaError
+from keyexpr_schema import SchemaError
 from sim.embodiment import sim_embodiment
 from workers.context import SkillContext
 from workers.errors import SkillFailed, WorkerError

@@ -13,12 +13,21 @@ import asyncio
 import sys
 import uuid
 
-from keyexpr_schema.errors import SchemaError
-from keyexpr_schema.ids import slug
-from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS, PLAN_REQUEST
-from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalAddress, GoalState
-from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
-from keyexpr_schema.transport.session import SessionConfig, open_session
+from keyexpr_schema import (
+    ENDED_GOALS,
+    GOAL_SPEC,
+    GOAL_STATUS,
+    PLAN_REQUEST,
+    Goal,
+    GoalAddress,
+    GoalState,
+    PlanRequest,
+    RequestAddress,
+    SchemaError,
+    SessionConfig,
+    open_session,
+    slug,
+)
 
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 

@@ -1,1 +1,87 @@
-"""The contract of the fleet: every key, its payload, who writes it, who reads it."""
+"""The contract of the fleet: every key, its payload, who writes it, who reads it; and a session.
+
+    from keyexpr_schema import GOAL_SPEC, Goal, GoalAddress, SessionConfig, open_session
+
+Everything is imported when it is first asked for, so that a program which wants an identifier
+checked does not load Zenoh.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from keyexpr_schema.errors import *  # noqa: F403
+    from keyexpr_schema.facts import *  # noqa: F403
+    from keyexpr_schema.ids import *  # noqa: F403
+    from keyexpr_schema.key import *  # noqa: F403
+    from keyexpr_schema.keyspace import *  # noqa: F403
+    from keyexpr_schema.payloads.durations import *  # noqa: F403
+    from keyexpr_schema.payloads.goals import *  # noqa: F403
+    from keyexpr_schema.payloads.motions import *  # noqa: F403
+    from keyexpr_schema.payloads.plans import *  # noqa: F403
+    from keyexpr_schema.payloads.requests import *  # noqa: F403
+    from keyexpr_schema.payloads.robots import *  # noqa: F403
+    from keyexpr_schema.payloads.service import *  # noqa: F403
+    from keyexpr_schema.payloads.simulation import *  # noqa: F403
+    from keyexpr_schema.payloads.tasks import *  # noqa: F403
+    from keyexpr_schema.payloads.world import *  # noqa: F403
+    from keyexpr_schema.transport.router import *  # noqa: F403
+    from keyexpr_schema.transport.session import *  # noqa: F403
+
+_NAMES = {
+    "errors": (
+        "SchemaError ForeignKey InvalidId NoAnswer NoConfigFile Unconfirmed UndecodablePayload "
+        "Unreachable"
+    ),
+    "facts": (
+        "AT HELD HOLDING LOCATED NOTHING ON SEARCHED FactKey Literal Value parse_literal "
+        "parse_value render_value"
+    ),
+    "ids": "Id check_id slug",
+    "key": "Address Component Delivery Key Payload",
+    "keyspace": (
+        "GOAL_SPEC GOAL_STATUS FACT STATEMENT STATEMENT_STATUS PLACE OBJECT ROBOT_SPEC ROBOT_STATE "
+        "ROBOT_ALIVE ORDER REPORT DURATIONS PLAN_SPEC PLAN_PROPOSAL PLAN_STATUS TASK_RECORD "
+        "PLAN_REQUEST REPLAN_REQUEST CONTROL_REQUEST ANSWER PLANNER_STATUS PLANNER_ALIVE REJECT "
+        "STORE_JOURNAL SIM_MOTION SIM_SENSES SIM_CLOCK SIM_FRAMES SIM_SCENE SIM_TRUTH SIM_CONTACTS "
+        "KEYSPACE key_of"
+    ),
+    "payloads.durations": "Durations DurationsAddress Estimate",
+    "payloads.goals": "Condition ENDED_GOALS Goal GoalAddress GoalState GoalStatus",
+    "payloads.motions": ("Detection Motion MotionKind MotionOutcome MotionState PointM Senses"),
+    "payloads.plans": (
+        "ENDED_PLANS Making Plan PlanAddress PlanChange PlanState PlanStatus Task Violation"
+    ),
+    "payloads.requests": ("Answer Control ControlRequest PlanRequest ReplanRequest RequestAddress"),
+    "payloads.robots": (
+        "Alive AliveAddress PoseMRad RobotActivity RobotAddress RobotSpec RobotState"
+    ),
+    "payloads.service": (
+        "JournalEntry PlannerAddress PlannerAliveAddress PlannerStatus Reject RejectAddress "
+        "StoreAddress StoreJournal StoreQuery"
+    ),
+    "payloads.simulation": (
+        "Body ContactCount Frame Frames MotionCall QuaternionWxyz Scene Shape ShapeKind SimAddress "
+        "SimClock SimRobotAddress Truth TruthAddress"
+    ),
+    "payloads.tasks": (
+        "ENDED_TASKS FINAL_REPORTS Order OrderAddress Report ReportAddress ReportState TaskAddress "
+        "TaskRecord TaskState Try"
+    ),
+    "payloads.world": (
+        "Fact FactAddress Object ObjectAddress Place PlaceAddress Statement StatementAddress "
+        "StatementStatus Surface"
+    ),
+    "transport.router": "run_router",
+    "transport.session": ("Change Session SessionConfig TokenChange TokenWatch Watch open_session"),
+}
+_MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}
+__all__ = sorted(_MODULES)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)

@@ -11,10 +11,11 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.core import events
 from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.state import OUTSTANDING, PlanEntry, Policy, State
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.state import Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
-from fleet.service.planning_job import carry_out
+from fleet.service.planning_job import run_planning_job
 from keyexpr_schema.facts import Value
 from keyexpr_schema.keyspace import ORDER
 from keyexpr_schema.payloads.goals import Goal
@@ -94,7 +95,7 @@ class FleetModel:
         for effect in effects:
             if isinstance(effect, MakePlan):
                 at = {"time_s": self.time_s, "wall_time_s": self.wall_s}
-                self._apply(carry_out(effect.job, self.state, PARTS, at))
+                self._apply(run_planning_job(effect.job, self.state, PARTS, at))
 
     def _check_order(self, order: Any) -> None:
         assert isinstance(order, Order)

@@ -22,8 +22,8 @@ from benchmarks.allocation.alternatives import big_m, in_turn, makespan_s, neare
 from benchmarks.allocation.shop_files import NAMES, load
 from benchmarks.allocation.shops import random_shop
 from fleet.jobshop.budget import Budget
-from fleet.jobshop.compiled import Compiled
-from fleet.jobshop.list_scheduling import construct
+from fleet.jobshop.instance import Instance
+from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.portfolio import solve
 from fleet.jobshop.problem import Machine, Shop
 from fleet.jobshop.rescheduling import reschedule, without_machines
@@ -101,30 +101,30 @@ def size(tasks: int, robots: int, travel: bool, limits_s: Sequence[float], seed:
     """One shop by all of them; none of ours may be worse than the list schedule."""
     meetings = (COALITIONS if tasks == 8 else MEETINGS) if travel else 0.0
     shop = random_shop(tasks, robots, travel, meetings, seed)
-    ready = Compiled(shop)
+    ready = Instance(shop)
     made: dict[str, float] = {}
     took: dict[str, float] = {}
     how: dict[str, str] = {}
 
-    def timed(name: str, run: Callable[[], float | None]) -> None:
+    def schedule_of(name: str, run: Callable[[], float | None]) -> None:
         began_s = time.perf_counter()
         found_s = run()
         if found_s is not None:
             made[name], took[name] = found_s, time.perf_counter() - began_s
 
-    def by_hand(choose: Callable[[Compiled], list[int] | None]) -> float | None:
+    def by_hand(choose: Callable[[Instance], list[int] | None]) -> float | None:
         machine_of = choose(ready)
         return None if machine_of is None else makespan_s(shop, machine_of)
 
     def listed() -> float | None:
-        found = construct(Compiled(shop))
-        return None if found is None else found.rated.makespan_s
+        found = list_schedule(Instance(shop))
+        return None if found is None else found.makespan_s
 
-    timed("greedy nearest", lambda: by_hand(nearest))
-    timed("round-robin", lambda: by_hand(in_turn))
-    timed("paper's MILP", lambda: by_hand(papers_milp))
-    timed("big-M MILP", lambda: big_m(ready))
-    timed("list schedule", listed)
+    schedule_of("greedy nearest", lambda: by_hand(nearest))
+    schedule_of("round-robin", lambda: by_hand(in_turn))
+    schedule_of("paper's MILP", lambda: by_hand(papers_milp))
+    schedule_of("big-M MILP", lambda: big_m(ready))
+    schedule_of("list schedule", listed)
     bound_s, proven = 0.0, False
     for limit_s in limits_s:
         name = f"makespan, {limit_s:g} s"
@@ -181,7 +181,7 @@ def mended() -> list[Mended]:
             began_s = time.perf_counter()
             made = reschedule(left, planned.machine_of, planned.order, Budget(MENDING_S), frozen)
             took_s = time.perf_counter() - began_s
-            scratch = construct(Compiled(left))
+            scratch = list_schedule(Instance(left))
             assert made is not None and scratch is not None
             pairs = zip(scratch.machine_of, planned.machine_of, strict=True)
             found.append(
@@ -191,11 +191,11 @@ def mended() -> list[Mended]:
                     planned.makespan_s,
                     planned.machine_of.count(LOST),
                     len(frozen),
-                    sum(made.timed.machine_of[b] == planned.machine_of[b] for b in frozen),
-                    made.timed.makespan_s,
+                    sum(made.schedule.machine_of[b] == planned.machine_of[b] for b in frozen),
+                    made.schedule.makespan_s,
                     made.best_makespan_s,
                     len(made.moved),
-                    scratch.rated.makespan_s,
+                    scratch.makespan_s,
                     sum(a != b for a, b in pairs),
                     took_s,
                 )

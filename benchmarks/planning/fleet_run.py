@@ -21,7 +21,7 @@ from fleet.core.state import Policy, State
 from fleet.core.step import step
 from fleet.planners import LlmInterpreter
 from fleet.service.composition import Composition
-from fleet.service.planning_job import carry_out
+from fleet.service.planning_job import run_planning_job
 from keyexpr_schema.facts import AT, ON
 from keyexpr_schema.keyspace import FACT, OBJECT, ORDER, PLACE, ROBOT_SPEC, ROBOT_STATE
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal
@@ -277,7 +277,7 @@ class FleetRun:
             self._fail(TimeoutError(f"not done after {MOST_REVISIONS} revisions"))
             return
         began_s = time.perf_counter()
-        made = carry_out(effect.job, self.state, self._parts, self._at())
+        made = run_planning_job(effect.job, self.state, self._parts, self._at())
         self.counts.planning_s += time.perf_counter() - began_s
         self.counts.revisions += 1
         if isinstance(made, events.PlanningSucceeded):

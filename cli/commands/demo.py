@@ -12,9 +12,10 @@ from cli.command import Call, command
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from cli.demo.mission_run import Demo, DemoOptions
+    from cli.demo.bring_up import DemoOptions
+    from cli.demo.mission_run import Demo
     from cli.demo.summary import Summary
-    from cli.show.live import Ticker
+    from cli.views.live import ChangePrinter
 
 app = typer.Typer(rich_markup_mode=None, add_completion=False)
 
@@ -47,13 +48,13 @@ async def demo(
     import msgspec
 
     from cli.commands.processes import BACKENDS, parse_speed
-    from cli.demo.mission_run import DemoOptions
+    from cli.demo.bring_up import DemoOptions
     from cli.errors import check_known
-    from cli.show.live import Ticker
+    from cli.views.live import ChangePrinter
     from sim.files.mission_file import load_mission
     from sim.reach import out_of_reach
 
-    check_known("backend", backend, BACKENDS, "")
+    check_known("backend", backend, BACKENDS)
     parse_speed(speed)
     loaded = load_mission(mission)
     if backend == "mujoco":
@@ -67,10 +68,10 @@ async def demo(
         view=view,
         timeout_s=timeout_s,
     )
-    summary = await _run(options, Ticker(call.json), call)
+    summary = await _run(options, ChangePrinter(call.json), call)
 
     def draw() -> RenderableType:
-        from cli.show.summary_page import summary_page
+        from cli.views.demo_summary import summary_page
 
         return summary_page(summary)
 
@@ -82,19 +83,19 @@ async def demo(
         raise typer.Exit(1)
 
 
-async def _run(options: DemoOptions, ticker: Ticker, call: Call) -> Summary:
+async def _run(options: DemoOptions, printer: ChangePrinter, call: Call) -> Summary:
     """Bring everything up, carry the mission out, take everything down, however it ends."""
     import asyncio
     import signal
 
-    from cli.demo.mission_run import running
+    from cli.demo.mission_run import running_demo
 
     me = asyncio.current_task()
-    told = False
+    terminated = False
 
     def stop() -> None:
-        nonlocal told
-        told = True
+        nonlocal terminated
+        terminated = True
         if me is not None:
             me.cancel()
 
@@ -102,21 +103,21 @@ async def _run(options: DemoOptions, ticker: Ticker, call: Call) -> Summary:
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, stop)
     call.warn(f"starting {options.mission}; logs go to {options.out}")
     try:
-        async with running(options, ticker.hear) as demo:
-            return await demo.fleet.guard(_play(demo, ticker))
+        async with running_demo(options, printer.on_change) as demo:
+            return await demo.processes.guard(_play(demo, printer))
     except asyncio.CancelledError:
-        if told:
+        if terminated:
             raise typer.Exit(128 + signal.SIGTERM) from None
         raise
 
 
-async def _play(demo: Demo, ticker: Ticker) -> Summary:
-    from cli.show.live import showing
+async def _play(demo: Demo, printer: ChangePrinter) -> Summary:
+    from cli.views.live import live_view
 
-    async with showing(demo.board, ticker):
-        await demo.give()
-        await demo.ended()
-    return await demo.judged()
+    async with live_view(demo.view, printer):
+        await demo.submit()
+        await demo.wait_until_ended()
+    return await demo.verify()
 
 
 def _new_folder(mission: str) -> Path:

@@ -11,7 +11,6 @@ from cli.parsing import Group
 
 if TYPE_CHECKING:
     from keyexpr_schema.payloads.goals import Goal, GoalStatus
-    from keyexpr_schema.transport.session import Session
 
 UNDERSTANDING_S = 10.0
 """How long the planner may take to say something of a goal."""
@@ -53,13 +52,12 @@ async def add(
     ] = 600.0,
 ) -> None:
     """Want something. The planner says what it understood, or that it did not (exit code 1)."""
-    from cli.asking import ask_planner
-    from cli.board import following
+    from cli.client.fleet_view import fleet_view
+    from cli.client.planner import ask_planner, request_name
+    from cli.client.presence import planner_alive
+    from cli.client.publish import put_goal
     from cli.errors import NotRunning, Refused
-    from cli.naming import request_name
-    from cli.presence import planner_alive
-    from cli.show.fleet_tables import GoalRow
-    from cli.telling import put_goal
+    from cli.views.goals import GoalRow
     from keyexpr_schema.keyspace import GOAL_STATUS
     from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
     from keyexpr_schema.payloads.requests import PlanRequest
@@ -80,35 +78,35 @@ async def add(
                 ),
             )
             return
-        async with following(session, (GOAL_STATUS, {"goal": spec.goal})) as board:
-            await board.until(
-                lambda: spec.goal in board.goal_status,
+        async with fleet_view(session, (GOAL_STATUS, {"goal": spec.goal})) as view:
+            await view.until(
+                lambda: spec.goal in view.goal_status,
                 timeout_s if wait else UNDERSTANDING_S,
                 f"the planner to read goal {spec.goal} (it is stored)",
             )
-            await board.until(
-                lambda: board.goal_status[spec.goal].state is not GoalState.READING,
+            await view.until(
+                lambda: view.goal_status[spec.goal].state is not GoalState.READING,
                 timeout_s if wait else READING_S,
                 f"a language model to read goal {spec.goal} (it is stored)",
             )
-            if plan and board.goal_status[spec.goal].state is GoalState.WAITING:
-                call.say(sentence(spec, board.goal_status[spec.goal]))
+            if plan and view.goal_status[spec.goal].state is GoalState.WAITING:
+                call.inform(sentence(spec, view.goal_status[spec.goal]))
                 answer = await ask_planner(
                     session, PlanRequest(request=request_name(), goals=(spec.goal,))
                 )
-                call.say(answer.sentence)
-                await board.until(
-                    lambda: board.goal_status[spec.goal].state is not GoalState.WAITING,
+                call.inform(answer.sentence)
+                await view.until(
+                    lambda: view.goal_status[spec.goal].state is not GoalState.WAITING,
                     UNDERSTANDING_S,
                     f"goal {spec.goal} to be planned",
                 )
             if wait:
-                await board.until(
-                    lambda: board.goal_status[spec.goal].state in ENDED_GOALS,
+                await view.until(
+                    lambda: view.goal_status[spec.goal].state in ENDED_GOALS,
                     timeout_s,
                     f"goal {spec.goal} to end",
                 )
-            status = board.goal_status[spec.goal]
+            status = view.goal_status[spec.goal]
     if status.state in (GoalState.REJECTED, GoalState.FAILED):
         raise Refused(
             f"goal {spec.goal} {status.state.value}: {status.reason or 'no reason given'}"
@@ -120,7 +118,7 @@ async def add(
 
 def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
     """How a goal stands and what it was understood as; how to have it planned, if it is not."""
-    from cli.show.words import meaning as meaning_of
+    from cli.views.text import meaning as meaning_of
     from keyexpr_schema.payloads.goals import GoalState
 
     means = meaning_of(status)
@@ -135,44 +133,39 @@ def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
 @command(app, "list")
 async def list_(call: Call) -> None:
     """Every goal and how it stands."""
-    from cli.show.fleet_tables import goal_rows, goals_table
+    from cli.client.fleet_view import snapshot
+    from cli.views.goals import goal_rows, goals_table
+    from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS
 
     async with call.session() as session:
-        rows = goal_rows(*await _all(session))
+        view = await snapshot(session, GOAL_SPEC, GOAL_STATUS)
+    rows = goal_rows(view.goals, view.goal_status)
     call.show(rows, lambda: goals_table(rows) if rows else "No goals.")
 
 
 @command(app, "show")
 async def show(call: Call, goal: GoalArgument) -> None:
     """One goal: its words, what they were understood to mean, how it stands."""
+    from cli.client.fleet_view import snapshot
     from cli.errors import check_known
-    from cli.show.fleet_tables import GoalRow
-    from cli.show.goal_page import goal_page
+    from cli.views.goals import GoalRow, goal_page
+    from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS
 
     async with call.session() as session:
-        goals, status = await _all(session)
-    check_known("goal", goal, goals, "say one with `robotctl goal add`")
-    row = GoalRow(goal=goal, spec=goals[goal], status=status.get(goal))
+        view = await snapshot(session, GOAL_SPEC, GOAL_STATUS)
+    check_known("goal", goal, view.goals)
+    row = GoalRow(goal=goal, spec=view.goals[goal], status=view.goal_status.get(goal))
     call.show(row, lambda: goal_page(row))
 
 
 @command(app, "delete")
 async def delete(call: Call, goal: GoalArgument) -> None:
     """Take a goal back; its plan goes on without it, and ends if it had no other goal."""
-    from cli.errors import check_known
+    from cli.client.known import check_goals
     from keyexpr_schema.keyspace import GOAL_SPEC
     from keyexpr_schema.payloads.goals import GoalAddress
 
     async with call.session() as session:
-        goals, _ = await _all(session)
-        check_known("goal", goal, goals, "say one with `robotctl goal add`")
+        await check_goals(session, [goal])
         await session.delete(GOAL_SPEC, GoalAddress(goal))
     call.show({"deleted": goal}, lambda: f"deleted goal {goal}")
-
-
-async def _all(session: Session) -> tuple[dict[str, Goal], dict[str, GoalStatus]]:
-    from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS
-
-    goals = {a.goal: spec for a, spec in (await session.list(GOAL_SPEC)).items()}
-    status = {a.goal: each for a, each in (await session.list(GOAL_STATUS)).items()}
-    return goals, status

@@ -21,26 +21,23 @@ journal_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 @command(status_app)
 async def status(call: Call) -> None:
     """The whole fleet on one page: router, planner, robots, goals, plans, unreadable values."""
-    from cli.board import FLEET, following
-    from cli.presence import planner_alive, robots_alive
-    from cli.show.fleet_tables import goal_rows, robot_row
-    from cli.show.status_page import status_page
-    from cli.telling import planner_status
-    from cli.unreadable import still_unreadable
+    from cli.client.fleet_view import FLEET_KEYS, snapshot
+    from cli.client.planner import planner_status
+    from cli.client.presence import planner_alive, robots_alive
+    from cli.client.rejects import current_rejects
+    from cli.views.goals import goal_rows
+    from cli.views.robots import robot_rows
+    from cli.views.status import status_page
     from keyexpr_schema.keyspace import REJECT
 
     async with call.session() as session:
-        async with following(session, *FLEET, REJECT) as board:
-            pass
+        view = await snapshot(session, *FLEET_KEYS, REJECT)
         planner = await planner_status(session)
         planning = await planner_alive(session)
-        alive = await robots_alive(session)
-        rejects = await still_unreadable(session, board.rejects.values())
-    robots = [
-        robot_row(name, board.specs.get(name), board.robots.get(name), name in alive)
-        for name in sorted(set(board.specs) | alive)
-    ]
-    goals = goal_rows(board.goals, board.goal_status)
+        connected = await robots_alive(session)
+        rejects = await current_rejects(session, view.rejects.values())
+    robots = robot_rows(view.robot_specs, view.robot_states, connected)
+    goals = goal_rows(view.goals, view.goal_status)
     settings = call.settings
     call.show(
         {
@@ -49,11 +46,11 @@ async def status(call: Call) -> None:
             "planner": {"running": planning, "status": planner},
             "robots": robots,
             "goals": goals,
-            "plans": list(board.plan_status.values()),
+            "plans": list(view.plan_status.values()),
             "rejects": rejects,
         },
         lambda: status_page(
-            settings.routers, settings.realm, planner, planning, robots, goals, board, rejects
+            settings.routers, settings.realm, planner, planning, robots, goals, view, rejects
         ),
     )
 
@@ -69,22 +66,22 @@ async def watch(
 
     On a terminal a picture; piped, a line a change; with --json, a JSON document a line.
     """
-    from cli.board import FLEET, SIMULATION, following
-    from cli.show.live import Ticker, showing
+    from cli.client.fleet_view import FLEET_KEYS, SIMULATION_KEYS, fleet_view
+    from cli.views.live import ChangePrinter, live_view
 
     if call.json:
         async with (
             call.session() as session,
-            following(session, *FLEET, on_change=_as_json) as all_,
+            fleet_view(session, *FLEET_KEYS, on_change=_as_json) as all_,
         ):
             await all_.forever()
-    ticker = Ticker(to_stderr=False, only=plan)
+    printer = ChangePrinter(to_stderr=False, only=plan)
     async with (
         call.session() as session,
-        following(session, *FLEET, *SIMULATION, on_change=ticker.hear) as board,
-        showing(board, ticker, plan),
+        fleet_view(session, *FLEET_KEYS, *SIMULATION_KEYS, on_change=printer.on_change) as view,
+        live_view(view, printer, plan),
     ):
-        await board.forever()
+        await view.forever()
 
 
 def _as_json(change: Change[Any, Any]) -> None:
@@ -106,13 +103,13 @@ async def journal(
 
     async with call.session() as session:
         # What a query key replies is not in its type; the key table says it is a StoreJournal.
-        told: StoreJournal = await session.ask(
+        page: StoreJournal = await session.ask(
             STORE_JOURNAL, StoreAddress(), StoreQuery(after=after, limit=limit)
         )
 
     def draw() -> RenderableType:
-        from cli.show.status_page import journal_table
+        from cli.views.status import journal_table
 
-        return journal_table(told) if told.entries else "The journal has no such entries."
+        return journal_table(page) if page.entries else "The journal has no such entries."
 
-    call.show(told, draw)
+    call.show(page, draw)

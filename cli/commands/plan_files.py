@@ -59,7 +59,7 @@ async def check(
     count with what they were understood to mean.
     """
     from cli.plans.files import read_plan
-    from cli.plans.worlds import told_world, world_of_files
+    from cli.plans.worlds import world_of_files, world_of_fleet
     from fleet.core.checker.checked_plan import check_plan
     from fleet.service.composition import load_all_skills
 
@@ -70,12 +70,12 @@ async def check(
         model = world_of_files(world, robots or (), facts or (), models)
     else:
         async with call.session() as session:
-            model = await told_world(session, models, connected)
+            model = await world_of_fleet(session, models, connected)
             plan = await _with_goals(session, plan)
     checked = check_plan(plan, model)
 
     def draw() -> RenderableType:
-        from cli.show.plan_page import violations_table
+        from cli.views.plans import violations_table
 
         if not checked.violations:
             return f"plan {plan.plan} is valid: {_size(plan, model)}"
@@ -141,11 +141,11 @@ async def propose(
     """Give the planner a plan of your own: it checks and allocates it like any other."""
     from msgspec.structs import replace
 
-    from cli.board import following
-    from cli.errors import BadArgument, NotRunning, Refused
+    from cli.client.fleet_view import fleet_view
+    from cli.client.planner import check_planner
+    from cli.errors import BadArgument, Refused
     from cli.plans.files import read_plan
-    from cli.presence import planner_alive
-    from cli.show.words import outcome
+    from cli.views.text import outcome
     from keyexpr_schema.ids import check_id
     from keyexpr_schema.keyspace import PLAN_PROPOSAL, PLAN_SPEC, PLAN_STATUS
     from keyexpr_schema.payloads.plans import PlanAddress, PlanState
@@ -161,29 +161,28 @@ async def propose(
         raise BadArgument(f"{file}: the plan has no tasks")
     of = {"plan": plan.plan}
     async with call.session() as session:
-        if not await planner_alive(session):
-            raise NotRunning("no planner is running; start one with `robotctl planner`")
-        async with following(session, (PLAN_SPEC, of), (PLAN_STATUS, of)) as board:
-            if board.plans or board.plan_status:
+        await check_planner(session)
+        async with fleet_view(session, (PLAN_SPEC, of), (PLAN_STATUS, of)) as view:
+            if view.plans or view.plan_status:
                 raise BadArgument(f"there is a plan {plan.plan} already; give yours another --id")
             await session.confirm(PLAN_PROPOSAL, PlanAddress(plan.plan), plan)
-            await board.until(
+            await view.until(
                 lambda: (
-                    plan.plan in board.plan_status
-                    and board.plan_status[plan.plan].state is not PlanState.PLANNING
+                    plan.plan in view.plan_status
+                    and view.plan_status[plan.plan].state is not PlanState.PLANNING
                 ),
                 PROPOSAL_S,
                 f"the planner to check plan {plan.plan} (it is stored)",
             )
-            status = board.plan_status[plan.plan]
-            taken = board.plans.get(plan.plan, plan)
+            status = view.plan_status[plan.plan]
+            taken = view.plans.get(plan.plan, plan)
     if status.state is PlanState.REJECTED:
         raise Refused(f"plan {plan.plan} is rejected: {outcome(status) or 'no reason given'}")
 
     def draw() -> RenderableType:
         from rich.console import Group
 
-        from cli.show.plan_tree import plan_tree
+        from cli.views.plan_tree import plan_tree
 
         hint = {
             PlanState.PROPOSED: f"; approve it with `robotctl plan approve {plan.plan}`",
@@ -228,7 +227,7 @@ async def diff(
     found = compare(before, now, finished)
 
     def draw() -> RenderableType:
-        from cli.show.plan_page import diff_page
+        from cli.views.plans import diff_page
 
         return diff_page(found)
 

@@ -14,15 +14,12 @@ from cli.parsing import FactWords, Group
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from keyexpr_schema.payloads.goals import Goal, GoalStatus
     from keyexpr_schema.payloads.plans import PlanStatus
     from keyexpr_schema.payloads.requests import Control
-    from keyexpr_schema.transport.session import Session
 
 app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, add_completion=False)
 replan_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 PlanArgument = Annotated[str, typer.Argument(metavar="PLAN", help="Its name.")]
-HOW_TO_PLAN = "make one with `robotctl plan create`"
 
 
 @app.callback()
@@ -67,13 +64,13 @@ async def create(
     ] = None,
 ) -> None:
     """Have goals turned into a plan and, unless told otherwise, carried out."""
-    from cli.asking import ask_planner
+    from cli.client.fleet_view import FleetView, snapshot
+    from cli.client.known import check_goals
+    from cli.client.planner import ask_planner, planner_status, request_name
     from cli.errors import BadArgument, check_known
-    from cli.naming import request_name
     from cli.plans.files import check_suffix, write_plan
-    from cli.telling import planner_status
     from keyexpr_schema.ids import check_id
-    from keyexpr_schema.keyspace import GOAL_SPEC
+    from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS
     from keyexpr_schema.payloads.requests import PlanRequest
 
     if fallback and allocator != "milp":
@@ -86,9 +83,7 @@ async def create(
     if name is not None:
         check_id(name, "plan")
     async with call.session() as session:
-        known = [address.goal for address in await session.list(GOAL_SPEC)]
-        for goal in goals or ():
-            check_known("goal", goal, known, "say one with `robotctl goal add`")
+        await check_goals(session, goals or ())
         can = await planner_status(session)
         if can is not None:
             # A planner that lists nothing has not said what it offers; then its answer decides.
@@ -98,7 +93,7 @@ async def create(
                 ("planner", planner, can.planners),
             ):
                 if offered:
-                    check_known(what, asked, offered, "")
+                    check_known(what, asked, offered)
         answer = await ask_planner(
             session,
             PlanRequest(
@@ -112,8 +107,7 @@ async def create(
                 dry_run=dry_run,
             ),
         )
-        if dry_run:
-            specs, status = await _goals(session)
+        view = await snapshot(session, GOAL_SPEC, GOAL_STATUS) if dry_run else FleetView()
     if answer.preview is not None and out is not None:
         write_plan(out, answer.preview)
         call.warn(f"wrote the plan to {out}")
@@ -123,10 +117,12 @@ async def create(
             return answer.sentence
         from rich.console import Group
 
-        from cli.show.plan_page import plan_page
+        from cli.views.plans import plan_page
 
-        page = plan_page(answer.preview, answer.preview_status, {}, specs, status)
-        return Group(answer.sentence, "", page)
+        preview, status = answer.preview, answer.preview_status
+        return Group(
+            answer.sentence, "", plan_page(preview, status, {}, view.goals, view.goal_status)
+        )
 
     call.show(answer, draw)
 
@@ -134,12 +130,13 @@ async def create(
 @command(app, "list")
 async def list_(call: Call) -> None:
     """Every plan and how it stands."""
-    from cli.board import following
-    from cli.show.fleet_tables import plans_table
+    from cli.client.fleet_view import snapshot
+    from cli.views.plans import plans_table
     from keyexpr_schema.keyspace import PLAN_SPEC, PLAN_STATUS
 
-    async with call.session() as session, following(session, PLAN_SPEC, PLAN_STATUS) as board:
-        plans, status = board.plans, board.plan_status
+    async with call.session() as session:
+        view = await snapshot(session, PLAN_SPEC, PLAN_STATUS)
+    plans, status = view.plans, view.plan_status
     names = sorted(set(plans) | set(status))
     call.show(
         [{"plan": name, "spec": plans.get(name), "status": status.get(name)} for name in names],
@@ -162,35 +159,34 @@ async def show(
     ] = False,
 ) -> None:
     """One plan: its tasks and who does them, what waits for what, how it was made and changed."""
-    from cli.board import FLEET, following
-    from cli.errors import BadArgument, Unknown, check_known
+    from cli.client.fleet_view import FLEET_KEYS, snapshot
+    from cli.errors import HOW_TO_ADD, BadArgument, Unknown, check_known
     from cli.plans.idle import idle_report
-    from cli.show.idle_page import idle_page
+    from cli.views.idle_time import idle_page
 
     if dot and call.json:
         raise BadArgument("--dot and --json are two forms of the same: choose one")
     if dot and analyze_idle:
         raise BadArgument("--dot draws only the graph; --analyze-idle does not go with it")
 
-    async with call.session() as session, following(session, *FLEET) as board:
-        pass
-    names = set(board.plans) | set(board.plan_status)
+    async with call.session() as session:
+        view = await snapshot(session, *FLEET_KEYS)
+    names = set(view.plans) | set(view.plan_status)
     if plan is None:
         if not names:
-            raise Unknown(f"there is no plan yet; {HOW_TO_PLAN}")
-        plan = max(names, key=lambda n: (board.changed_s(n), n))
-    check_known("plan", plan, names, HOW_TO_PLAN)
+            raise Unknown(f"there is no plan yet; {HOW_TO_ADD['plan']}")
+        plan = max(names, key=lambda n: (view.changed_s(n), n))
+    check_known("plan", plan, names)
     name = plan
-    records = {task: record for (of, task), record in board.tasks.items() if of == name}
-    spec, status = board.plans.get(name), board.plan_status.get(name)
-    idle = idle_report(spec, status, records.values(), board.specs.values()) if spec else None
+    records = {task: record for (of, task), record in view.tasks.items() if of == name}
+    spec, status = view.plans.get(name), view.plan_status.get(name)
+    idle = idle_report(spec, status, records.values(), view.robot_specs.values()) if spec else None
 
     def draw() -> RenderableType:
         from rich.console import Group
 
-        from cli.show.fleet_tables import plans_table
-        from cli.show.plan_graph import plan_dot
-        from cli.show.plan_page import plan_page, violations_table
+        from cli.views.plan_graph import plan_dot
+        from cli.views.plans import plan_page, plans_table, violations_table
 
         if spec is None and dot:
             raise Unknown(f"plan {name} has no tasks to draw: it is {_state(status)}")
@@ -201,11 +197,11 @@ async def show(
             return Group(table, "", violations_table(status.violations))
         if dot:
             return plan_dot(spec, status, records)
-        page = plan_page(spec, status, records, board.goals, board.goal_status, board.now_s)
+        page = plan_page(spec, status, records, view.goals, view.goal_status, view.now_s)
         return Group(page, "", idle_page(idle)) if analyze_idle and idle else page
 
-    told = {"plan": spec, "status": status, "tasks": list(records.values())}
-    call.show({**told, "idle": idle} if analyze_idle else told, draw)
+    data = {"plan": spec, "status": status, "tasks": list(records.values())}
+    call.show({**data, "idle": idle} if analyze_idle else data, draw)
 
 
 command(app, "check", FactWords)(check)
@@ -258,17 +254,13 @@ async def replan(
     ] = None,
 ) -> None:
     """Plan again from what is known now; what is done or running is kept."""
-    from cli.asking import ask_planner
-    from cli.errors import check_known
-    from cli.naming import request_name
-    from keyexpr_schema.keyspace import GOAL_SPEC
+    from cli.client.known import check_goals, check_plan
+    from cli.client.planner import ask_planner, request_name
     from keyexpr_schema.payloads.requests import ReplanRequest
 
     async with call.session() as session:
         await check_plan(session, plan)
-        known = [address.goal for address in await session.list(GOAL_SPEC)]
-        for goal in goals or ():
-            check_known("goal", goal, known, "say one with `robotctl goal add`")
+        await check_goals(session, goals or ())
         answer = await ask_planner(
             session,
             ReplanRequest(
@@ -278,30 +270,13 @@ async def replan(
     call.show(answer, lambda: answer.sentence)
 
 
-async def _goals(session: Session) -> tuple[dict[str, Goal], dict[str, GoalStatus]]:
-    from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS
-
-    specs = {a.goal: spec for a, spec in (await session.list(GOAL_SPEC)).items()}
-    return specs, {a.goal: each for a, each in (await session.list(GOAL_STATUS)).items()}
-
-
 def _state(status: PlanStatus | None) -> str:
     return status.state.value if status else "not there"
 
 
-async def check_plan(session: Session, plan: str) -> None:
-    """Raise `Unknown` unless there is a plan of that name."""
-    from cli.errors import check_known
-    from keyexpr_schema.keyspace import PLAN_SPEC, PLAN_STATUS
-
-    known = {address.plan for address in await session.list(PLAN_SPEC)}
-    known |= {address.plan for address in await session.list(PLAN_STATUS)}
-    check_known("plan", plan, known, HOW_TO_PLAN)
-
-
 async def _control(call: Call, control: Control, plan: str) -> None:
-    from cli.asking import ask_planner
-    from cli.naming import request_name
+    from cli.client.known import check_plan
+    from cli.client.planner import ask_planner, request_name
     from keyexpr_schema.keyspace import PLAN_PROPOSAL
     from keyexpr_schema.payloads.plans import PlanAddress
     from keyexpr_schema.payloads.requests import Control, ControlRequest

@@ -20,6 +20,8 @@ sim_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 record_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 
 T = TypeVar("T")
+SIM = "sim"
+"""The embodiment that is not a plug-in."""
 BACKENDS = ("mujoco", "kinematic")
 
 DataOption = Annotated[
@@ -46,7 +48,7 @@ def router(
     data: DataOption = None,
 ) -> None:
     """Run a Zenoh router with the fleet's durable store in it."""
-    from cli.running import end_with_parent
+    from cli.demo.child_processes import end_with_parent
     from fleet.service.router_process import run
 
     end_with_parent()
@@ -97,22 +99,22 @@ def planner(
 
     What no flag says comes from `planner:` in robotctl.yaml.
     """
-    from cli.running import end_with_parent
+    from cli.demo.child_processes import end_with_parent
     from fleet.core.state import Policy
     from fleet.service.planner_process import run
 
-    told, default = call.settings.planner, Policy()
+    settings, default = call.settings.planner, Policy()
     end_with_parent()
     run(
         endpoints=call.settings.routers,
         realm=call.settings.realm,
         data_dir=data_folder(data, "planner", call.settings.realm),
-        skill_files=tuple(skills or told.skills),
-        llm_file=llm_config or told.llm_config,
+        skill_files=tuple(skills or settings.skills),
+        llm_file=llm_config or settings.llm_config,
         policy=Policy(
-            approval=_first(approval, told.approval, default.approval),
-            auto_plan=_first(auto_plan, told.auto_plan, default.auto_plan),
-            lost_after_s=_first(lost_after_s, told.lost_after_s, default.lost_after_s),
+            approval=_first(approval, settings.approval, default.approval),
+            auto_plan=_first(auto_plan, settings.auto_plan, default.auto_plan),
+            lost_after_s=_first(lost_after_s, settings.lost_after_s, default.lost_after_s),
         ),
     )
 
@@ -124,20 +126,26 @@ def worker(
     data: DataOption = None,
     embodiment: Annotated[
         str, typer.Option("--embodiment", help="What drives the robot; `sim` or a plug-in's name.")
-    ] = "sim",
+    ] = SIM,
 ) -> None:
     """Run one robot's worker: it takes orders and carries them out."""
-    from cli.embodiments import embodiment_factory
-    from cli.running import end_with_parent
+    from cli.demo.child_processes import end_with_parent
+    from cli.errors import check_known
+    from keyexpr_schema.plug_ins import plug_in_names
+    from sim.embodiment import sim_embodiment
+    from workers.embodiment import EMBODIMENTS, installed_embodiment
     from workers.process import run
 
+    check_known("embodiment", embodiment, [SIM, *plug_in_names(EMBODIMENTS)])
     end_with_parent()
     run(
         robot=robot,
         endpoints=call.settings.routers,
         realm=call.settings.realm,
         data_dir=data_folder(data, f"worker-{robot}", call.settings.realm),
-        embodiment_factory=embodiment_factory(embodiment),
+        embodiment_factory=(
+            sim_embodiment if embodiment == SIM else installed_embodiment(embodiment)
+        ),
     )
 
 
@@ -168,11 +176,11 @@ def sim(
     """Run a simulated world with a mission's robots in it."""
     from cli.errors import BadArgument, check_known
 
-    check_known("backend", backend, BACKENDS, "")
+    check_known("backend", backend, BACKENDS)
     pace = parse_speed(speed)
     if backend != "kinematic" and (spread or failing):
         raise BadArgument("--spread and --failing are for --backend kinematic; physics needs none")
-    from cli.running import end_with_parent
+    from cli.demo.child_processes import end_with_parent
     from sim.kinematic.backend import MotionModel
     from sim.server.process import run
 
@@ -195,7 +203,7 @@ def record(
     view: Annotated[bool, typer.Option("--view", help="Show it live in Rerun, too.")] = False,
 ) -> None:
     """Record everything that happens for Rerun."""
-    from cli.running import end_with_parent
+    from cli.demo.child_processes import end_with_parent
     from fleet.timeline.process import run
 
     end_with_parent()
@@ -223,9 +231,9 @@ def parse_speed(written: str) -> float | None:
     return speed
 
 
-def _first(flag: T | None, told: T | None, default: T) -> T:
+def _first(flag: T | None, setting: T | None, default: T) -> T:
     """The first that says something."""
-    return next((each for each in (flag, told) if each is not None), default)
+    return next((each for each in (flag, setting) if each is not None), default)
 
 
 def data_folder(given: Path | None, name: str, realm: str = "") -> Path:

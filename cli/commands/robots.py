@@ -22,7 +22,7 @@ async def register(
     ],
 ) -> None:
     """Declare robots from YAML files; declaring one again replaces what was said of it."""
-    from cli.telling import check_skills
+    from cli.client.planner import check_skills
     from keyexpr_schema.keyspace import ROBOT_SPEC
     from keyexpr_schema.payloads.robots import RobotAddress
     from sim.files.mission_file import load_robot
@@ -45,15 +45,12 @@ async def unregister(
     call: Call, robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Its name.")]
 ) -> None:
     """Forget a robot: it gets no further tasks."""
-    from cli.errors import check_known
+    from cli.client.known import check_robot
     from keyexpr_schema.keyspace import ROBOT_SPEC
     from keyexpr_schema.payloads.robots import RobotAddress
 
     async with call.session() as session:
-        specs = await session.list(ROBOT_SPEC)
-        check_known(
-            "robot", robot, (a.robot for a in specs), "declare one with `robotctl register FILE`"
-        )
+        await check_robot(session, robot)
         await session.delete(ROBOT_SPEC, RobotAddress(robot))
     call.show({"unregistered": robot}, lambda: f"unregistered {robot}")
 
@@ -61,25 +58,22 @@ async def unregister(
 @command(robots_app)
 async def robots(call: Call) -> None:
     """Every robot: what it can do, whether it is connected, where it is, what it does."""
-    from cli.presence import robots_alive
-    from cli.show.fleet_tables import robot_row, robots_table
+    from cli.client.fleet_view import snapshot
+    from cli.client.presence import robots_alive
+    from cli.views.robots import robot_rows, robots_table
     from keyexpr_schema.keyspace import ROBOT_SPEC, ROBOT_STATE
 
     async with call.session() as session:
-        specs = {a.robot: spec for a, spec in (await session.list(ROBOT_SPEC)).items()}
-        states = {a.robot: state for a, state in (await session.list(ROBOT_STATE)).items()}
-        alive = await robots_alive(session)
-    rows = [
-        robot_row(name, specs.get(name), states.get(name), name in alive)
-        for name in sorted(set(specs) | alive)
-    ]
+        view = await snapshot(session, ROBOT_SPEC, ROBOT_STATE)
+        connected = await robots_alive(session)
+    rows = robot_rows(view.robot_specs, view.robot_states, connected)
     call.show(rows, lambda: robots_table(rows) if rows else "No robots are registered.")
 
 
 @command(durations_app)
 async def durations(call: Call) -> None:
     """How long each type of robot really takes, learned from its reports."""
-    from cli.show.durations_table import durations_table
+    from cli.views.robots import durations_table
     from keyexpr_schema.keyspace import DURATIONS
 
     async with call.session() as session:

@@ -29,25 +29,20 @@ async def list_(
     ] = None,
 ) -> None:
     """Tasks and how they stand."""
-    from cli.board import FLEET, following
+    from cli.client.fleet_view import FLEET_KEYS, snapshot
     from cli.errors import check_known
-    from cli.show.fleet_tables import tasks_table
-    from cli.show.words import natural
+    from cli.views.tasks import tasks_table
+    from cli.views.text import natural_order
 
-    async with call.session() as session, following(session, *FLEET) as board:
-        pass
+    async with call.session() as session:
+        view = await snapshot(session, *FLEET_KEYS)
     if plan is not None:
-        check_known(
-            "plan",
-            plan,
-            set(board.plans) | set(board.plan_status),
-            "make one with `robotctl plan create`",
-        )
+        check_known("plan", plan, view.plans.keys() | view.plan_status)
     records = sorted(
-        (record for (of, _), record in board.tasks.items() if plan in (None, of)),
-        key=lambda record: (natural(record.plan), natural(record.task)),
+        (record for (of, _), record in view.tasks.items() if plan in (None, of)),
+        key=lambda record: (natural_order(record.plan), natural_order(record.task)),
     )
-    call.show(records, lambda: tasks_table(records, board.now_s) if records else "No tasks.")
+    call.show(records, lambda: tasks_table(records, view.now_s) if records else "No tasks.")
 
 
 @command(app, "show")
@@ -57,7 +52,7 @@ async def show(
     task: Annotated[str, typer.Argument(metavar="TASK", help="Name of the task.")],
 ) -> None:
     """One task: its orders, every try of every attempt, and what was learned on the way."""
-    from cli.commands.plans import check_plan
+    from cli.client.known import check_plan
     from cli.errors import check_known
     from keyexpr_schema.keyspace import ORDER, REPORT, TASK_RECORD
 
@@ -73,7 +68,7 @@ async def show(
     def draw() -> RenderableType:
         from rich.console import Group
 
-        from cli.show.fleet_tables import reports_table, tasks_table
+        from cli.views.tasks import reports_table, tasks_table
 
         parts: list[RenderableType] = [tasks_table([record])]
         if reports:
@@ -101,12 +96,10 @@ async def add(
     ] = None,
 ) -> None:
     """Add a task to a plan; the planner checks it like any other."""
-    from cli.asking import ask_planner
-    from cli.commands.plans import check_plan
+    from cli.client.known import check_plan, check_robot
+    from cli.client.planner import ask_planner, planner_status, request_name
     from cli.errors import check_known
-    from cli.naming import request_name
-    from cli.telling import planner_status
-    from keyexpr_schema.keyspace import PLAN_SPEC, ROBOT_SPEC
+    from keyexpr_schema.keyspace import PLAN_SPEC
     from keyexpr_schema.payloads.plans import PlanAddress
     from keyexpr_schema.payloads.requests import Control, ControlRequest
 
@@ -115,13 +108,12 @@ async def add(
         await check_plan(session, plan)
         spec = await session.get(PLAN_SPEC, PlanAddress(plan))
         for name in after or ():
-            check_known("task", name, (t.task for t in spec.tasks) if spec else (), "")
+            check_known("task", name, (t.task for t in spec.tasks) if spec else ())
         if robot is not None:
-            robots = [address.robot for address in await session.list(ROBOT_SPEC)]
-            check_known("robot", robot, robots, "declare one with `robotctl register FILE`")
+            await check_robot(session, robot)
         can = await planner_status(session)
         if can is not None and can.skills:
-            check_known("skill", skill, can.skills, "")
+            check_known("skill", skill, can.skills)
         answer = await ask_planner(
             session,
             ControlRequest(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.command import Call, command
+from cli.commands.world_add import add
 from cli.parsing import Group
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ async def load(
     call: Call, file: Annotated[str, typer.Argument(metavar="FILE", help="See configs/worlds.")]
 ) -> None:
     """Tell the fleet the places and objects of a world file (not where the objects are)."""
-    from cli.telling import put_world
+    from cli.client.world import put_world
     from sim.files.world_file import load_world
     from sim.files.world_payloads import object_payloads, place_payloads
 
@@ -45,108 +46,7 @@ async def load(
     )
 
 
-@command(app, "add")
-async def add(
-    call: Call,
-    words: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="STATEMENT", help="A sentence; or RELATION SUBJECT VALUE."),
-    ] = None,
-    fact: Annotated[
-        bool, typer.Option("--fact", help="The words are a fact: RELATION SUBJECT VALUE.")
-    ] = False,
-    name: Annotated[
-        str | None, typer.Option("--id", help="Name of the statement; else made from its words.")
-    ] = None,
-    thing: Annotated[
-        str | None, typer.Option("--object", metavar="ID", help="Tell of an object, with --kind.")
-    ] = None,
-    place: Annotated[
-        str | None, typer.Option("--place", metavar="ID", help="Tell of a place.")
-    ] = None,
-    label: Annotated[
-        str | None, typer.Option("--label", help="What people call it; else its id in words.")
-    ] = None,
-    alias: Annotated[
-        list[str] | None,
-        typer.Option("--alias", metavar="NAME", help="What else they call it; repeatable."),
-    ] = None,
-    kind: Annotated[
-        str | None, typer.Option("--kind", help="What sort of object it is, such as cup.")
-    ] = None,
-    home: Annotated[
-        str | None, typer.Option("--home", metavar="PLACE", help="Where the object belongs.")
-    ] = None,
-    mass_kg: Annotated[
-        float | None, typer.Option("--mass-kg", min=0.0, help="What the object weighs; else 0.")
-    ] = None,
-    region: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--region",
-            metavar="X0,Y0,X1,Y1",
-            help="A rectangle of the place's floor, in metres; repeatable.",
-        ),
-    ] = None,
-    distance: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--distance", metavar="PLACE=METRES", help="How far another place is; repeatable."
-        ),
-    ] = None,
-) -> None:
-    """Say something of the world: a sentence, a fact, an object or a place.
-
-    "The first cup is in the kitchen."   --fact at cup_1 kitchen
-    --object cup_3 --kind cup --home kitchen   --place pantry --distance kitchen=2.5
-    """
-    from cli.errors import BadArgument
-    from cli.show.words import statement_means
-    from cli.telling import add_fact, add_statement, statement_read
-    from cli.world_things import check_options, told_object, told_place
-
-    check_options(
-        sentence=bool(words) and not fact,
-        fact=fact,
-        object=thing is not None,
-        place=place is not None,
-        given={
-            "--id": name,
-            "--label": label,
-            "--alias": alias,
-            "--kind": kind,
-            "--home": home,
-            "--mass-kg": mass_kg,
-            "--region": region,
-            "--distance": distance,
-        },
-    )
-    words = words or []
-    if fact and len(words) != 3:
-        raise BadArgument(
-            f"a fact is RELATION SUBJECT VALUE, such as 'at cup_1 kitchen'; got {len(words)} words"
-        )
-    async with call.session() as session:
-        if thing is not None:
-            kept = await told_object(
-                session, thing, kind or "", label, tuple(alias or ()), home, mass_kg
-            )
-            call.show(kept, lambda: f"stored object {kept.object}: “{kept.label}”, a {kept.kind}")
-        elif place is not None:
-            room = await told_place(
-                session, place, label, tuple(alias or ()), region or (), distance or ()
-            )
-            call.show(room, lambda: f"stored place {room.place}: “{room.label}”")
-        elif fact:
-            said = await add_fact(session, *words)
-            call.show(said, lambda: f"stored {said.literal}")
-        else:
-            told = await add_statement(session, " ".join(words), name)
-            read = await statement_read(session, told.statement)
-            call.show(
-                {"statement": told, "status": read},
-                lambda: f"stored statement {told.statement}: “{told.text}”{statement_means(read)}",
-            )
+command(app, "add")(add)
 
 
 @command(app, "list")
@@ -157,9 +57,7 @@ async def list_(call: Call) -> None:
     async with call.session() as session:
         places = sorted((await session.list(PLACE)).values(), key=lambda each: each.place)
         objects = sorted((await session.list(OBJECT)).values(), key=lambda each: each.object)
-        facts = sorted(
-            (await session.list(FACT)).values(), key=lambda each: (each.relation, each.subject)
-        )
+        facts = sorted((await session.list(FACT)).values(), key=lambda fact: fact.key)
         statements = sorted(
             (await session.list(STATEMENT)).values(), key=lambda each: each.statement
         )
@@ -168,13 +66,13 @@ async def list_(call: Call) -> None:
     def draw() -> RenderableType:
         from rich.console import Group
 
-        from cli.show import fleet_tables
+        from cli.views import world
 
         parts = [
-            fleet_tables.places_table(places) if places else "No places: load a world file.",
-            fleet_tables.objects_table(objects) if objects else "No objects.",
-            fleet_tables.facts_table(facts) if facts else "No facts.",
-            fleet_tables.statements_table(statements, read) if statements else "No statements.",
+            world.places_table(places) if places else "No places: load a world file.",
+            world.objects_table(objects) if objects else "No objects.",
+            world.facts_table(facts) if facts else "No facts.",
+            world.statements_table(statements, read) if statements else "No statements.",
         ]
         return Group(*(part for each in parts for part in (each, "")))
 

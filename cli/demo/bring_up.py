@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cli.board import Board
-from cli.demo.fleet import Fleet
+from cli.client.fleet_view import FleetView
+from cli.client.planner import check_skills
+from cli.client.world import put_world
+from cli.demo.child_processes import ChildProcesses
 from cli.errors import TooLate
-from cli.telling import check_skills, put_world
 from keyexpr_schema.errors import NoAnswer, Unreachable
 from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.key import Key
@@ -21,7 +23,6 @@ from keyexpr_schema.transport.session import Session, SessionConfig, open_sessio
 from sim.files.world_payloads import object_payloads, place_payloads
 
 if TYPE_CHECKING:
-    from cli.demo.mission_run import DemoOptions
     from sim.files.mission_file import Mission
 
 READY_S = 60.0
@@ -29,13 +30,27 @@ READY_S = 60.0
 RECORDING = "recording.rrd"
 
 
-def declare_processes(fleet: Fleet, mission: Mission, options: DemoOptions) -> None:
+@dataclass(frozen=True)
+class DemoOptions:
+    """`speed` is simulated seconds a second, or `max`; `timeout_s` bounds the plan's execution."""
+
+    mission: str
+    out: Path
+    backend: str = "mujoco"
+    speed: str = "max"
+    view: bool = False
+    timeout_s: float = 600.0
+
+
+def declare_processes(processes: ChildProcesses, mission: Mission, options: DemoOptions) -> None:
     """Say which processes a mission is made of, and which are stopped first at its end."""
     data = options.out / "data"
-    fleet.declare("router", "router", "--listen", fleet.endpoint, "--data", str(data / "router"))
+    processes.declare(
+        "router", "router", "--listen", processes.endpoint, "--data", str(data / "router")
+    )
     view = ("--view",) if options.view else ()
-    fleet.declare("record", "record", str(options.out / RECORDING), *view, layer=1)
-    fleet.declare(
+    processes.declare("record", "record", str(options.out / RECORDING), *view, layer=1)
+    processes.declare(
         "sim",
         "sim",
         options.mission,
@@ -45,17 +60,17 @@ def declare_processes(fleet: Fleet, mission: Mission, options: DemoOptions) -> N
         options.speed,
         layer=2,
     )
-    fleet.declare("planner", "planner", "--data", str(data / "planner"), layer=2)
+    processes.declare("planner", "planner", "--data", str(data / "planner"), layer=2)
     for robot in mission.robots:
         name = f"worker-{robot.spec.robot}"
-        fleet.declare(name, "worker", robot.spec.robot, "--data", str(data / name), layer=2)
+        processes.declare(name, "worker", robot.spec.robot, "--data", str(data / name), layer=2)
 
 
-async def router_up(fleet: Fleet) -> None:
+async def router_up(processes: ChildProcesses) -> None:
     """Wait until the router's store answers for its journal."""
     config = SessionConfig(
-        endpoints=(fleet.endpoint,),
-        realm=fleet.realm,
+        endpoints=(processes.endpoint,),
+        realm=processes.realm,
         component="robotctl",
         connect_timeout_s=READY_S,
     )
@@ -69,52 +84,54 @@ async def router_up(fleet: Fleet) -> None:
                     await session.wait_connected()
     except (TimeoutError, Unreachable):
         raise TooLate(
-            f"the router was not ready after {READY_S:g} s; its log is {fleet.log('router')}"
+            f"the router was not ready after {READY_S:g} s; its log is {processes.log('router')}"
         ) from None
 
 
-async def bring_up(fleet: Fleet, session: Session, board: Board, mission: Mission) -> None:
-    """Tell the store of the world and the robots, start the rest, wait until all are ready."""
+async def bring_up(
+    processes: ChildProcesses, session: Session, view: FleetView, mission: Mission
+) -> None:
+    """Store the world and the robots, start the rest, wait until all are ready."""
     await put_world(session, place_payloads(mission.world), object_payloads(mission.world))
     for robot in mission.robots:
         await session.confirm(ROBOT_SPEC, RobotAddress(robot.spec.robot), robot.spec)
-    for name in fleet.names:
-        if fleet.pid(name) is None:
-            await fleet.start(name)
+    for name in processes.names:
+        if processes.pid(name) is None:
+            await processes.start(name)
     await asyncio.gather(
-        board.until(
-            lambda: board.scene is not None and bool(board.truths),
+        view.until(
+            lambda: view.scene is not None and bool(view.truths),
             READY_S,
-            f"the simulation (log: {fleet.log('sim')})",
+            f"the simulation (log: {processes.log('sim')})",
         ),
-        _token(session, PLANNER_ALIVE, {}, "the planner", fleet.log("planner")),
+        _token(session, PLANNER_ALIVE, {}, "the planner", processes.log("planner")),
         *(
             _token(
                 session,
                 ROBOT_ALIVE,
                 {"robot": robot.spec.robot},
                 f"the worker of {robot.spec.robot}",
-                fleet.log(f"worker-{robot.spec.robot}"),
+                processes.log(f"worker-{robot.spec.robot}"),
             )
             for robot in mission.robots
         ),
         *(
-            board.until(
-                partial(_can_be_planned, board, robot.spec.robot),
+            view.until(
+                partial(_can_be_planned, view, robot.spec.robot),
                 READY_S,
                 f"{robot.spec.robot} to say where it is and what it holds "
-                f"(log: {fleet.log(f'worker-{robot.spec.robot}')})",
+                f"(log: {processes.log(f'worker-{robot.spec.robot}')})",
             )
             for robot in mission.robots
         ),
-        _recording(fleet),
+        _recording(processes),
     )
     await check_skills(session, (robot.spec for robot in mission.robots))
 
 
-def _can_be_planned(board: Board, robot: str) -> bool:
+def _can_be_planned(view: FleetView, robot: str) -> bool:
     """Whether a planner knows where the robot is and what it holds: else it can do nothing."""
-    return all(FactKey(relation, robot) in board.facts for relation in (AT, HOLDING))
+    return all(FactKey(relation, robot) in view.facts for relation in (AT, HOLDING))
 
 
 async def _token(
@@ -130,9 +147,9 @@ async def _token(
         raise TooLate(f"{who} was not ready after {READY_S:g} s; its log is {log}") from None
 
 
-async def _recording(fleet: Fleet) -> None:
+async def _recording(processes: ChildProcesses) -> None:
     """Wait until the recorder says in its log that it records: it has no key of its own."""
-    log = fleet.log("record")
+    log = processes.log("record")
     try:
         async with asyncio.timeout(READY_S):
             # A file cannot be awaited, so it is looked at until it says so.

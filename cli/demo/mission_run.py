@@ -6,18 +6,16 @@ import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cli.asking import ask_planner
-from cli.board import FLEET, SIMULATION, Board, following
-from cli.demo.bring_up import RECORDING, bring_up, declare_processes, router_up
-from cli.demo.fleet import Fleet, free_endpoint
+from cli.client.fleet_view import FLEET_KEYS, SIMULATION_KEYS, FleetView, fleet_view
+from cli.client.planner import ask_planner, request_name
+from cli.client.publish import put_goal, put_statement
+from cli.demo.bring_up import RECORDING, DemoOptions, bring_up, declare_processes, router_up
+from cli.demo.child_processes import ChildProcesses, free_endpoint
 from cli.demo.summary import Summary, task_lines, times
+from cli.demo.verdict import all_agreed, goal_verdicts
 from cli.errors import Refused, TooLate
-from cli.judge import all_agreed, judge
-from cli.naming import request_name
-from cli.telling import add_statement, put_goal
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import GoalState, GoalStatus
 from keyexpr_schema.payloads.requests import PlanRequest
@@ -34,49 +32,37 @@ PLAN_S = 120.0
 REALM = "demo"
 
 
-@dataclass(frozen=True)
-class DemoOptions:
-    """`speed` is simulated seconds a second, or `max`; `timeout_s` bounds the plan's execution."""
-
-    mission: str
-    out: Path
-    backend: str = "mujoco"
-    speed: str = "max"
-    view: bool = False
-    timeout_s: float = 600.0
-
-
 @dataclass
 class Demo:
-    """A running demo; made by `running`. `fleet` holds its processes, `board` what they say."""
+    """A running demo; made by `running_demo`. `view` is what its `processes` publish."""
 
     options: DemoOptions
     mission: Mission
-    fleet: Fleet
+    processes: ChildProcesses
     session: Session
-    board: Board
+    view: FleetView
     started_at_s: float
     """Seconds of `time.monotonic` when the first process was started."""
     goals: tuple[str, ...] = ()
     _clock_from: tuple[float, float] | None = field(default=None)
     _clock_to: tuple[float, float] | None = field(default=None)
 
-    async def give(self) -> None:
-        """Say the mission's statements and goals, and ask for one plan for all of them.
+    async def submit(self) -> None:
+        """Publish the mission's statements and goals, and ask for one plan for all of them.
 
         Raises:
             Refused: the planner does not understand a goal, or cannot plan; the message says why.
         """
         for text in self.mission.statements:
-            await add_statement(self.session, text)
+            await put_statement(self.session, text)
         given = [await put_goal(self.session, text, None) for text in self.mission.goals]
         self.goals = tuple(goal.goal for goal in given)
-        await self.board.until(
-            lambda: all(goal in self.board.goal_status for goal in self.goals),
+        await self.view.until(
+            lambda: all(goal in self.view.goal_status for goal in self.goals),
             UNDERSTAND_S,
             "the planner to read the goals",
         )
-        await self.board.until(
+        await self.view.until(
             lambda: not any(s.state is GoalState.READING for s in self._statuses().values()),
             PLAN_S,
             "a language model to read the goals",
@@ -99,22 +85,22 @@ class Demo:
             PLAN_S,
         )
 
-    async def ended(self) -> None:
+    async def wait_until_ended(self) -> None:
         """Wait until the planner has given its last word on every goal.
 
         Raises:
             TooLate: it had not after `options.timeout_s`; the message names the goals.
         """
         try:
-            await self.board.until(
-                lambda: self.board.ended(self.goals), self.options.timeout_s, "the goals to end"
+            await self.view.until(
+                lambda: self.view.ended(self.goals), self.options.timeout_s, "the goals to end"
             )
         except TooLate:
             status = self._statuses()
             still = [
                 f"{goal} ({status[goal].state.value})" if goal in status else goal
                 for goal in self.goals
-                if not self.board.ended((goal,))
+                if not self.view.ended((goal,))
             ]
             raise TooLate(
                 f"after {self.options.timeout_s:g} s these goals have not ended: "
@@ -123,37 +109,37 @@ class Demo:
         finally:
             self._clock_to = self._clock()
 
-    async def judged(self) -> Summary:
+    async def verify(self) -> Summary:
         """Wait until what is true has settled, and hold the goals against it."""
-        board = self.board
+        view = self.view
         ended_s = max((s.time_s for s in self._statuses().values()), default=0.0)
 
         # The simulation repeats every truth. Only what it said after the goals had ended counts,
         # whatever the clocks of those who reported the end.
-        old_truths, old_contacts = dict(board.truths), board.contacts
+        old_truths, old_contacts = dict(view.truths), view.contacts
 
         def settled() -> bool:
             return (
-                bool(board.truths)
-                and board.contacts is not old_contacts
+                bool(view.truths)
+                and view.contacts is not old_contacts
                 and all(
                     truth is not old_truths.get(name)
                     and truth.time_s >= ended_s
                     and (truth.settled or truth.held_by is not None)
-                    for name, truth in board.truths.items()
+                    for name, truth in view.truths.items()
                 )
             )
 
-        # Where one does not settle, the judge says which, and fails its goal.
+        # Where one does not settle, its goal's verdict says so, and fails.
         with suppress(TooLate):
-            await board.until(settled, SETTLE_S, "the objects to come to rest")
+            await view.until(settled, SETTLE_S, "the objects to come to rest")
         robots = [robot.spec.robot for robot in self.mission.robots]
-        places = {robot: senses.place for robot, senses in board.senses.items()}
+        places = {robot: senses.place for robot, senses in view.senses.items()}
         beliefs = {
-            thing: fact.value for (relation, thing), fact in board.facts.items() if relation == AT
+            thing: fact.value for (relation, thing), fact in view.facts.items() if relation == AT
         }
-        verdicts = judge(self._statuses(), board.truths, places, beliefs)
-        records = list(board.tasks.values())
+        verdicts = goal_verdicts(self._statuses(), view.truths, places, beliefs)
+        records = list(view.tasks.values())
         makespan_s, busy_s, idle_s = times(records, robots)
         recording = self.options.out / RECORDING
         return Summary(
@@ -162,11 +148,11 @@ class Demo:
             ok=len(verdicts) == len(self.goals) and all_agreed(verdicts),
             goals=verdicts,
             tasks=task_lines(records),
-            revisions={plan: status.revision for plan, status in board.plan_status.items()},
+            revisions={plan: status.revision for plan, status in view.plan_status.items()},
             makespan_s=makespan_s,
             busy_s=busy_s,
             idle_s=idle_s,
-            contacts=board.contacts,
+            contacts=view.contacts,
             wall_s=time.monotonic() - self.started_at_s,
             real_time_factor=self._real_time_factor(),
             out=str(self.options.out),
@@ -174,11 +160,11 @@ class Demo:
         )
 
     def _statuses(self) -> dict[str, GoalStatus]:
-        status = self.board.goal_status
+        status = self.view.goal_status
         return {goal: status[goal] for goal in self.goals if goal in status}
 
     def _clock(self) -> tuple[float, float] | None:
-        clock = self.board.clock
+        clock = self.view.clock
         return None if clock is None else (clock.time_s, clock.wall_time_s)
 
     def _real_time_factor(self) -> float | None:
@@ -189,13 +175,13 @@ class Demo:
 
 
 @asynccontextmanager
-async def running(
+async def running_demo(
     options: DemoOptions, on_change: Callable[[Change[Any, Any]], None] | None = None
 ) -> AsyncIterator[Demo]:
     """Start every process of a mission and wait until each shows by its keys that it is ready.
 
     At the end of the block every process is ended. Work in the block should go through
-    `demo.fleet.guard`, so that a death is noticed.
+    `demo.processes.guard`, so that a death is noticed.
 
     Raises:
         ProcessDied: a process ended before it was ready.
@@ -204,16 +190,16 @@ async def running(
     mission = load_mission(options.mission)
     options.out.mkdir(parents=True, exist_ok=True)
     started_at_s = time.monotonic()
-    fleet = Fleet(free_endpoint(), REALM, options.out)
-    declare_processes(fleet, mission, options)
-    async with fleet:
-        await fleet.start("router")
-        await fleet.guard(router_up(fleet))
-        config = SessionConfig(endpoints=(fleet.endpoint,), realm=REALM, component="robotctl")
+    processes = ChildProcesses(free_endpoint(), REALM, options.out)
+    declare_processes(processes, mission, options)
+    async with processes:
+        await processes.start("router")
+        await processes.guard(router_up(processes))
+        config = SessionConfig(endpoints=(processes.endpoint,), realm=REALM, component="robotctl")
         async with (
             open_session(config) as session,
-            following(session, *FLEET, *SIMULATION, on_change=on_change) as board,
+            fleet_view(session, *FLEET_KEYS, *SIMULATION_KEYS, on_change=on_change) as view,
         ):
-            demo = Demo(options, mission, fleet, session, board, started_at_s)
-            await fleet.guard(bring_up(fleet, session, board, mission))
+            demo = Demo(options, mission, processes, session, view, started_at_s)
+            await processes.guard(bring_up(processes, session, view, mission))
             yield demo

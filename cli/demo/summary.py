@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import msgspec
 
-from cli.judge import Verdict
+from cli.demo.verdict import GoalVerdict
 from fleet.core.schedule.idle_time import measured_idle
 from keyexpr_schema.payloads.simulation import ContactCount
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -39,7 +39,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     mission: str
     backend: str
     ok: bool
-    goals: tuple[Verdict, ...]
+    goals: tuple[GoalVerdict, ...]
     tasks: tuple[TaskLine, ...]
     revisions: dict[str, int]
     makespan_s: float
@@ -87,7 +87,7 @@ def times(
     The makespan runs from the first order to the last end. A robot is busy while at least one of
     its tasks runs (tries of earlier attempts count, too); it is idle for the rest of the makespan.
     """
-    told = measured_idle(records, robots)
-    busy_s = {robot: told.busy[robot] for robot in robots}
-    idle_s = {robot: max(0.0, told.makespan - busy) for robot, busy in busy_s.items()}
-    return told.makespan, busy_s, idle_s
+    measured = measured_idle(records, robots)
+    busy_s = {robot: measured.busy[robot] for robot in robots}
+    idle_s = {robot: max(0.0, measured.makespan - busy) for robot, busy in busy_s.items()}
+    return measured.makespan, busy_s, idle_s

@@ -61,12 +61,12 @@ def idle_report(
     from keyexpr_schema.payloads.plans import ENDED_PLANS
 
     fleet = capable(plan, robots)
-    told = list(records)
+    records = list(records)
     report = IdleReport(fleet=fleet)
     if status is None:
         return report
     allocated = {task.actor for task in plan.tasks} <= status.allocation.keys()
-    begun = any(record.started_s is not None for record in told)
+    begun = any(record.started_s is not None for record in records)
     bound_s = status.lower_bound_s
     try:
         if allocated and plan.tasks:
@@ -74,18 +74,18 @@ def idle_report(
             makespan_s = status.predicted_makespan_s or predicted.makespan
             report = msgspec.structs.replace(
                 report,
-                unit_predicted=_told(predicted_unit(plan, status.allocation)),
-                predicted=_told(predicted),
+                unit_predicted=_idle(predicted_unit(plan, status.allocation)),
+                predicted=_idle(predicted),
                 lower_bound_s=bound_s,
                 over_bound=makespan_s / bound_s if bound_s else None,
             )
         if begun:
-            measured = measured_idle(told, fleet)
+            measured = measured_idle(records, fleet)
             ended = status.state in ENDED_PLANS
             report = msgspec.structs.replace(
                 report,
-                unit_measured=_told(measured_unit(told)),
-                measured=_told(measured),
+                unit_measured=_idle(measured_unit(records)),
+                measured=_idle(measured),
                 ended=ended,
                 measured_over_bound=measured.makespan / bound_s
                 if bound_s and ended and status.revision == 1
@@ -96,5 +96,5 @@ def idle_report(
     return report
 
 
-def _told(found: IdleTime) -> Idle:
+def _idle(found: IdleTime) -> Idle:
     return Idle(makespan=found.makespan, idle=found.idle, mean=found.mean)

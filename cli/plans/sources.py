@@ -49,14 +49,14 @@ async def plan_named(session: Session, name: str) -> PlanSide:
     plan, revision = revision_of(name)
     specs = {address.plan: spec for address, spec in (await session.list(PLAN_SPEC)).items()}
     if revision is None:
-        check_known("plan", plan, specs, "make one with `robotctl plan create`")
+        check_known("plan", plan, specs)
     if plan in specs and revision in (None, specs[plan].revision):
         status = await session.get(PLAN_STATUS, PlanAddress(plan))
         return PlanSide(name=name, plan=specs[plan], allocation=status.allocation if status else {})
     assert revision is not None
     past = await _history(session, PlanAddress(plan))
     if not past and plan not in specs:
-        check_known("plan", plan, specs, "make one with `robotctl plan create`")
+        check_known("plan", plan, specs)
     if revision not in past:
         known = sorted({*past, *((specs[plan].revision,) if plan in specs else ())})
         raise Unknown(
@@ -110,11 +110,11 @@ async def _journal(session: Session) -> AsyncIterator[JournalEntry]:
     after = 0
     while True:
         # What a query key replies is not in its type; the key table says it is a StoreJournal.
-        told: StoreJournal = await session.ask(
+        page: StoreJournal = await session.ask(
             STORE_JOURNAL, StoreAddress(), StoreQuery(after=after, limit=PAGE), JOURNAL_S
         )
-        for entry in told.entries:
+        for entry in page.entries:
             yield entry
-        if not told.entries:
+        if not page.entries:
             return
-        after = told.entries[-1].number
+        after = page.entries[-1].number

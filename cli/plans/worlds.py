@@ -1,4 +1,4 @@
-"""The world that a plan is checked against: as the fleet tells it, or out of files."""
+"""The world that a plan is checked against: as the fleet has it, or out of files."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cli.client.presence import robots_alive
 from cli.errors import BadArgument, check_known
-from cli.presence import robots_alive
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import AT, HOLDING, NOTHING, parse_literal
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Session
 
 
-async def told_world(
+async def world_of_fleet(
     session: Session, skills: Mapping[str, SkillModel], only_connected: bool
 ) -> WorldModel:
     """Places, objects, robots and facts of the key-space; every robot counts as connected unless

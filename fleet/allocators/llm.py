@@ -15,21 +15,21 @@ from fleet.core.checker.checked_plan import check_allocation
 from fleet.core.schedule.plan_schedule import best_schedule
 from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
 from fleet.llm.quoting import fenced
-from fleet.llm.structured_output import Answer, enumerated, read_answer, schema_of
+from fleet.llm.structured_output import StructuredAnswer, enumerated, read_answer, schema_of
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.plans import Violation
 
 log = logging.getLogger(__name__)
 
 
-class ActorAnswer(Answer, frozen=True):
+class ActorAnswer(StructuredAnswer, frozen=True):
     """One actor's robot."""
 
     actor: str
     robot: str
 
 
-class AllocationAnswer(Answer, frozen=True):
+class AllocationAnswer(StructuredAnswer, frozen=True):
     """A robot for every actor."""
 
     robots: tuple[ActorAnswer, ...]

@@ -16,15 +16,15 @@ from fleet.allocators.milp import MilpAllocator
 from fleet.allocators.plan_shop import PlanShop, plan_shop
 from fleet.jobshop.bounds import lower_bound
 from fleet.jobshop.budget import Budget, Clock
-from fleet.jobshop.compiled import Compiled
+from fleet.jobshop.instance import Instance
 from fleet.jobshop.portfolio import solve
-from fleet.jobshop.problem import Timed
+from fleet.jobshop.problem import Schedule
 from fleet.jobshop.rescheduling import reschedule
 
 DEADLINE_S = 1.0
 """Time that the search may take, s."""
 RESCHEDULE_SHARE = 0.5
-"""Of that time, how much mending a schedule takes: robots wait meanwhile."""
+"""Of that time, how much rescheduling takes: robots wait meanwhile."""
 NOBODY = -1
 """The machine of actors whose robot is gone."""
 
@@ -60,9 +60,9 @@ class MakespanAllocator(Allocator):
         made = plan_shop(problem)
         if problem.circumstances.home:
             budget = Budget(RESCHEDULE_SHARE * self._deadline_s, self._clock)
-            mended = _mended(made, problem.circumstances, budget, self._seed)
-            if mended is not None:
-                return mended
+            rescheduled = _rescheduled(made, problem.circumstances, budget, self._seed)
+            if rescheduled is not None:
+                return rescheduled
         found = solve(made.shop, Budget(self._deadline_s, self._clock), self._exact, self._seed)
         if found is None:
             # Robots are so few that rules run into a dead end: what is left is a matching problem.
@@ -72,7 +72,7 @@ class MakespanAllocator(Allocator):
 
 
 def _assignment(
-    made: PlanShop, found: Timed, lower_bound_s: float, notes: tuple[str, ...]
+    made: PlanShop, found: Schedule, lower_bound_s: float, notes: tuple[str, ...]
 ) -> Assignment:
     """A schedule of the shop in terms of actors and robots."""
     return Assignment(
@@ -85,7 +85,9 @@ def _assignment(
     )
 
 
-def _mended(made: PlanShop, told: Circumstances, budget: Budget, seed: int) -> Assignment | None:
+def _rescheduled(
+    made: PlanShop, told: Circumstances, budget: Budget, seed: int
+) -> Assignment | None:
     """The allocation there was, with few actors in other hands."""
     machine = {robot: i for i, robot in enumerate(made.robots)}
     named = made.shop.blocks[len(made.actors) :]
@@ -101,7 +103,7 @@ def _mended(made: PlanShop, told: Circumstances, budget: Budget, seed: int) -> A
         f"rescheduled: {moved} of {len(made.actors)} actors changed hands; "
         f"with any number of changes the least found is {found.best_makespan_s:.1f} s"
     )
-    return _assignment(made, found.timed, lower_bound(Compiled(made.shop)), (note,))
+    return _assignment(made, found.schedule, lower_bound(Instance(made.shop)), (note,))
 
 
 def _by_load(chosen: Mapping[str, str] | Assignment) -> Assignment:

@@ -11,7 +11,7 @@ from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
 from fleet.core.schedule.actor_order import carried_at_end, first_actors
 from fleet.core.schedule.plan_schedule import predicted_duration_s
-from fleet.jobshop.problem import Block, Machine, Operation, Place, Shop
+from fleet.jobshop.problem import Block, Machine, Operation, Position, Shop
 from keyexpr_schema.facts import AT, FactKey, Value
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.plans import Plan
@@ -54,7 +54,7 @@ def plan_shop(problem: AllocationProblem) -> PlanShop:
         blocks = tuple(dict.fromkeys(names[name] for name in action.participants))
         for block in blocks:
             of_block.setdefault(block, []).append(i)
-        target, arrives = numbers.way(action)
+        target, arrives = numbers.travel(action)
         operations.append(
             Operation(
                 blocks=blocks,
@@ -68,13 +68,13 @@ def plan_shop(problem: AllocationProblem) -> PlanShop:
         )
     machine = {robot: i for i, robot in enumerate(robots)}
     able = {actor_arg(actor): rows for actor, rows in problem.able.items()}
-    places = _places(problem, actors)
+    positions = _positions(problem, actors)
     apart = _apart(problem, {actor: i for i, actor in enumerate(actors)})
     blocks_of = tuple(
         Block(
             operations=tuple(of_block[block]),
             machines=tuple(machine[robot] for robot in able.get(name, (name,))),
-            place=places.get(name, Place.ANYWHERE),
+            position=positions.get(name, Position.ANYWHERE),
             apart=apart.get(block, frozenset()),
         )
         for name, block in names.items()
@@ -111,7 +111,7 @@ class _Numbers:
         """Its number; one beyond the places stands for wherever the robot may be."""
         return self._sites.get(place, self._anywhere)
 
-    def way(self, action: Action) -> tuple[int | None, int | None]:
+    def travel(self, action: Action) -> tuple[int | None, int | None]:
         """Where the action's robot drives first, and where it is afterwards, if that is said."""
         travel_to = action.skill.travel_to
         target = None if travel_to is None else self._sites.get(action.args[travel_to])
@@ -120,7 +120,7 @@ class _Numbers:
         return target, self.site(moved[-1]) if moved else None
 
     def durations(self, action: Action) -> tuple[float, ...]:
-        """By kind of robot, without the way, s."""
+        """By kind of robot, without the travel, s."""
         skill = action.skill
         if skill.name not in self._durations:
             here = None if skill.travel_to is None else action.args[skill.travel_to]
@@ -150,20 +150,20 @@ def _apart(problem: AllocationProblem, block_of: Mapping[str, int]) -> dict[int,
     return {block: frozenset(others) for block, others in found.items()}
 
 
-def _places(problem: AllocationProblem, actors: tuple[str, ...]) -> dict[str, Place]:
+def _positions(problem: AllocationProblem, actors: tuple[str, ...]) -> dict[str, Position]:
     """Actors that have a load at the end come last; those that are under way, or need their robot
     as it is now and as others would not leave it, come first."""
     last = set(carried_at_end(problem.checked).values())
     first = first_actors(problem.checked)
-    places: dict[str, Place] = {}
+    positions: dict[str, Position] = {}
     for actor in actors:
         if actor in first:
-            places[actor_arg(actor)] = Place.FIRST
+            positions[actor_arg(actor)] = Position.FIRST
         elif actor in last:
-            places[actor_arg(actor)] = Place.LAST
+            positions[actor_arg(actor)] = Position.LAST
         elif actor in problem.circumstances.under_way:
-            places[actor_arg(actor)] = Place.FIRST
-    return places
+            positions[actor_arg(actor)] = Position.FIRST
+    return positions
 
 
 def _wishes(problem: AllocationProblem) -> tuple[dict[str, float], dict[str, float]]:

@@ -11,7 +11,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fleet.core.state import OUTSTANDING, PlanEntry, PlanningJob, State
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry, PlanningJob
+from fleet.core.state import State
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
     ANSWER,
@@ -77,7 +78,7 @@ Effect = Publish | Retract | MakePlan | Interpret
 
 def effects_between(old: State, new: State) -> tuple[Effect, ...]:
     """What to do so that keys and planning jobs follow the state from `old` to `new`."""
-    return (*_documents(old, new), *_told_facts(old, new), *_jobs(old, new))
+    return (*_documents(old, new), *_own_facts(old, new), *_jobs(old, new))
 
 
 def effects_of(state: State) -> tuple[Effect, ...]:
@@ -96,11 +97,11 @@ def _documents(old: State, new: State) -> Iterator[Effect]:
             {GoalAddress(goal): status for goal, status in old.goal_states.items()},
             {GoalAddress(goal): status for goal, status in new.goal_states.items()},
         )
-    if old.understood is not new.understood:
+    if old.statement_states is not new.statement_states:
         yield from _difference(
             STATEMENT_STATUS,
-            {StatementAddress(name): status for name, status in old.understood.items()},
-            {StatementAddress(name): status for name, status in new.understood.items()},
+            {StatementAddress(name): status for name, status in old.statement_states.items()},
+            {StatementAddress(name): status for name, status in new.statement_states.items()},
         )
     if old.answers is not new.answers:
         yield from _difference(
@@ -164,22 +165,23 @@ def _difference(
 
 def status_of(entry: PlanEntry) -> PlanStatus:
     """What is published of a plan."""
+    outcome = entry.outcome
     return PlanStatus(
         plan=entry.plan.plan,
         revision=entry.plan.revision,
         state=entry.state,
         goals=entry.plan.goals,
-        allocation=entry.allocation,
-        sequence=entry.sequence,
+        allocation=outcome.allocation,
+        sequence=outcome.sequence,
         made_by=entry.plan.made_by,
         allocator=entry.plan.allocator,
-        predicted_makespan_s=entry.makespan_s,
-        lower_bound_s=entry.lower_bound_s,
-        notes=entry.notes,
-        planning_time_s=entry.planning_time_s,
+        predicted_makespan_s=outcome.makespan_s,
+        lower_bound_s=outcome.lower_bound_s,
+        notes=outcome.notes,
+        planning_time_s=outcome.planning_time_s,
         making=entry.plan.making,
         change=entry.change,
-        reason=entry.replan_reason or entry.reason,
+        reason=(entry.replan and entry.replan.sentence) or entry.reason,
         violations=entry.violations,
         time_s=entry.changed_s,
     )
@@ -207,11 +209,11 @@ def _order(record: TaskRecord, entry: PlanEntry, epoch: int) -> Order:
         skill=record.skill,
         args=record.args,
         deadline_s=DEADLINE_FACTOR * record.duration_s + DEADLINE_MARGIN_S,
-        cancelled=entry.cancelling or record.task in entry.dropping,
+        cancelled=entry.cancelling or record.task in entry.unwanted,
     )
 
 
-def _told_facts(old: State, new: State) -> Iterator[Effect]:
+def _own_facts(old: State, new: State) -> Iterator[Effect]:
     if old.facts is new.facts:
         return
     for key, fact in new.facts.items():

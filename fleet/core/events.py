@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import msgspec
 
+from fleet.core.plan_entry import PlanOutcome
 from fleet.core.state import Policy
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalStatus
@@ -12,6 +16,9 @@ from keyexpr_schema.payloads.requests import Answer, ControlRequest, PlanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Report
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement
+
+At = Mapping[str, Any]
+"""When an event happened, as its fields `time_s` and `wall_time_s`."""
 
 
 class Event(msgspec.Struct, frozen=True, kw_only=True, tag_field="event", tag=True):
@@ -150,8 +157,8 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
     """A planning job ended with a checked and allocated plan.
 
     `durations_s` and `extra_after` are by task, `sequence` lists each robot's actors in order.
-    `mended` says that what was left of the plan got another allocation, `left_out` which goals it
-    does without, and why.
+    `repaired` says that the residual plan goes on, perhaps with goals planned anew beside it,
+    `left_out` which goals the plan does without, and why.
     """
 
     job: int
@@ -164,8 +171,13 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
     planning_time_s: float
     lower_bound_s: float | None = None
     notes: tuple[str, ...] = ()
-    mended: bool = False
+    repaired: bool = msgspec.field(default=False, name="mended")
     left_out: dict[str, str] = {}
+
+    @property
+    def outcome(self) -> PlanOutcome:
+        """What allocation came to."""
+        return msgspec.convert(self, PlanOutcome, from_attributes=True)
 
 
 class PlanningFailed(Event, frozen=True, kw_only=True):

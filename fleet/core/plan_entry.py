@@ -1,76 +1,137 @@
-"""Small changes to what is kept of plans and requests, used by every part of the core."""
+"""What the planner keeps of one plan, and the planning jobs that make its revisions."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from enum import Enum
+
+import msgspec
 from msgspec.structs import replace
 
-from fleet.core.handlers.goals import mark_goals
-from fleet.core.state import PlanEntry, State, put
-from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
-from keyexpr_schema.payloads.plans import PlanState, Violation
-from keyexpr_schema.payloads.requests import Answer
+from keyexpr_schema.payloads.plans import ENDED_PLANS, Plan, PlanChange, PlanState, Task, Violation
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
-
-def answer(
-    state: State,
-    request: str | None,
-    accepted: bool,
-    sentence: str,
-    plan: str | None = None,
-    violations: tuple[Violation, ...] = (),
-) -> State:
-    """Answer a request; no request, no answer."""
-    if request is None:
-        return state
-    reply = Answer(
-        request=request, accepted=accepted, sentence=sentence, plan=plan, violations=violations
-    )
-    return replace(state, answers=put(state.answers, request, reply))
+OUTSTANDING = frozenset({TaskState.ORDERED, TaskState.RUNNING})
+"""Tasks that a robot has an order for."""
 
 
-def set_entry(state: State, entry: PlanEntry) -> State:
-    """Change what is kept of a plan."""
-    return replace(
-        state, plans=put(state.plans, entry.plan.plan, replace(entry, changed_s=state.time_s))
-    )
+class ReplanScope(Enum):
+    """How much of a plan is made again."""
+
+    REALLOCATE = "reallocate"
+    """Nothing speaks against the plan: robots came, went or are late, or a goal was deleted."""
+    REPAIR = "repair"
+    """Goals that the residual plan no longer serves are planned anew, beside the rest."""
+    ANEW = "anew"
+    """Everything is planned from the facts."""
 
 
-def set_record(state: State, entry: PlanEntry, record: TaskRecord) -> State:
-    """Change what is kept of a task."""
-    return set_entry(state, replace(entry, records=put(entry.records, record.task, record)))
+class ReplanReason(msgspec.Struct, frozen=True, kw_only=True):
+    """Why a plan is made again. `number` tells reasons of one plan apart that read the same."""
+
+    scope: ReplanScope
+    number: int
+    sentence: str
 
 
-def next_task(entry: PlanEntry) -> int:
-    """The first number that no task of the plan has had."""
-    return 1 + max((int(name[1:]) for name in entry.records if name[1:].isdigit()), default=0)
+class PlanOutcome(msgspec.Struct, frozen=True, kw_only=True):
+    """What allocation came to: robots of actors, each robot's actors in order, predicted times."""
+
+    allocation: dict[str, str] = {}
+    sequence: dict[str, tuple[str, ...]] = {}
+    makespan_s: float | None = None
+    lower_bound_s: float | None = None
+    notes: tuple[str, ...] = ()
+    planning_time_s: float | None = None
 
 
-def open_goals(state: State, entry: PlanEntry) -> list[str]:
-    """The goals of the plan that have not ended."""
-    return [
-        goal
-        for goal in entry.plan.goals
-        if goal in state.goal_states and state.goal_states[goal].state not in ENDED_GOALS
-    ]
+class PlanningJob(msgspec.Struct, frozen=True, kw_only=True):
+    """Planning to be done outside the core: for goals, or of a plan that someone proposed."""
+
+    job: int
+    plan: str
+    revision: int
+    goals: tuple[str, ...]
+    strategy: str
+    planner: str
+    allocator: str
+    first_task: int
+    proposal: Plan | None = None
+    request: str | None = None
+    dry_run: bool = False
+    partial: bool = False
+    """Whether goals that cannot be reached are left out, and not the whole plan refused."""
+    residual: Plan | None = None
+    """What is left of the plan, where that may be reallocated or repaired."""
+    previous_allocation: dict[str, str] = {}
+    actor_order: tuple[str, ...] = ()
+    """The actors of the plan until now, in the order in which they were to begin."""
+    begun_actors: tuple[str, ...] = ()
+    under_way: tuple[str, ...] = ()
+    """Tasks of the plan that were under way when the job was given."""
+    reason: ReplanReason | None = None
+
+    @property
+    def reallocation(self) -> bool:
+        """Whether it suffices to allocate the residual plan again."""
+        return self.reason is not None and self.reason.scope is ReplanScope.REALLOCATE
 
 
-def give_up(state: State, entry: PlanEntry, reason: str) -> State:
-    """End a plan as failed, and with it those of its goals that are not reached."""
-    records = {
-        name: record
-        if record.state is not TaskState.WAITING
-        else replace(record, state=TaskState.CANCELLED, reason="the plan failed")
-        for name, record in entry.records.items()
-    }
-    entry = replace(
-        entry,
-        state=PlanState.FAILED,
-        reason=reason,
-        replan_reason=None,
-        records=records,
-        dropping=tuple(record.task for record in entry.outstanding()),
-        job=None,
-    )
-    state = set_entry(state, entry)
-    return mark_goals(state, entry.plan.goals, GoalState.FAILED, entry.plan.plan, reason)
+class PlanEntry(msgspec.Struct, frozen=True, kw_only=True):
+    """A plan with everything the planner keeps about it.
+
+    `records` hold the tasks of every revision; `plan` only those of the current one. With a
+    `replan` reason set, nothing more is ordered, and the plan is made again. `unwanted` are tasks
+    under way that a new revision does without; their orders are cancelled. `team` are the robots
+    that were there when the plan was made. `late` are tasks that took far longer than predicted,
+    and were reacted to. `failures` counts the tasks of each goal that failed for good,
+    `fruitless_replans` the revisions since a goal was last reached.
+    """
+
+    plan: Plan
+    state: PlanState
+    planner: str = "symbolic"
+    start: bool = True
+    records: dict[str, TaskRecord] = {}
+    outcome: PlanOutcome = PlanOutcome()
+    job: PlanningJob | None = None
+    replan: ReplanReason | None = None
+    replan_reasons: int = 0
+    """How many reasons to plan again there have been."""
+    late: tuple[str, ...] = ()
+    failures: dict[str, int] = {}
+    amendment: Task | None = None
+    """A task that someone wants added, and the request for it."""
+    amendment_request: str | None = None
+    unwanted: tuple[str, ...] = ()
+    team: tuple[str, ...] = ()
+    change: PlanChange | None = None
+    fruitless_replans: int = 0
+    cancelling: bool = False
+    reason: str | None = None
+    violations: tuple[Violation, ...] = ()
+    changed_s: float = 0.0
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing will happen to this plan any more."""
+        return self.state in ENDED_PLANS
+
+    @property
+    def next_task_number(self) -> int:
+        """The first number that no task of the plan has had."""
+        return 1 + max((int(name[1:]) for name in self.records if name[1:].isdigit()), default=0)
+
+    def current(self) -> Iterator[TaskRecord]:
+        """The records of the current revision's tasks."""
+        return (self.records[task.task] for task in self.plan.tasks if task.task in self.records)
+
+    def outstanding(self) -> list[TaskRecord]:
+        """Tasks that a robot has been told to do and has not ended."""
+        return [record for record in self.records.values() if record.state in OUTSTANDING]
+
+    def to_replan(self, scope: ReplanScope, sentence: str) -> PlanEntry:
+        """The entry with a new reason to make the plan again, in place of one before."""
+        number = self.replan_reasons + 1
+        reason = ReplanReason(scope=scope, number=number, sentence=sentence)
+        return replace(self, replan=reason, replan_reasons=number)

@@ -2,32 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TypeVar
 
 import msgspec
 
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
+from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.language import Vocabulary
 from fleet.language.vocabulary import SkillPhrase
 from keyexpr_schema.facts import AT, HOLDING, ON, FactKey
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
-from keyexpr_schema.payloads.plans import ENDED_PLANS, Plan, PlanChange, PlanState, Task, Violation
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.robots import RobotSpec
-from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
 K = TypeVar("K")
 T = TypeVar("T")
 
-OUTSTANDING = frozenset({TaskState.ORDERED, TaskState.RUNNING})
-
 
 class Policy(msgspec.Struct, frozen=True, kw_only=True):
-    """How the planner was told to behave.
+    """How the planner is to behave.
 
     `approval`: a person has to approve every new plan. `auto_plan`: goals that wait are planned
     without being asked for, into a running plan where there is one. `interpreter`: sentences that
@@ -42,93 +39,6 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     skill_phrases: tuple[SkillPhrase, ...] = msgspec.field(default=(), name="deeds")
 
 
-class PlanningJob(msgspec.Struct, frozen=True, kw_only=True):
-    """Planning to be done outside the core: for goals, or of a plan that someone proposed."""
-
-    job: int
-    plan: str
-    revision: int
-    goals: tuple[str, ...]
-    strategy: str
-    planner: str
-    allocator: str
-    first_task: int
-    proposal: Plan | None = None
-    request: str | None = None
-    dry_run: bool = False
-    partial: bool = False
-    """Whether goals that cannot be reached are left out, and not the whole plan refused."""
-    remaining: Plan | None = None
-    """What is left of the plan, where that may do, with goals planned alone that it fails."""
-    outside: bool = False
-    """Whether nothing speaks against the plan, so that another allocation of what is left does."""
-    home: dict[str, str] = {}
-    """The robot of each actor until now."""
-    sequence: tuple[str, ...] = ()
-    """The actors in the order in which they were to begin."""
-    begun: tuple[str, ...] = ()
-    """Actors that their robots have begun to be."""
-    running: tuple[str, ...] = ()
-    """Tasks of the plan that were under way when the job was given."""
-    reason: str | None = None
-    """Why the plan is made again."""
-
-
-class PlanEntry(msgspec.Struct, frozen=True, kw_only=True):
-    """A plan with everything the planner keeps about it.
-
-    `records` hold the tasks of every revision; `plan` only those of the current one.
-    `replan_reason` set means: order nothing more, and plan again. What is left is mended, if that
-    can be, unless it is also `anew_reason`. If it is also `outside_reason`, it says nothing against
-    the plan: robots came, went or are late, a goal was deleted. `dropping` are tasks that are under
-    way and no longer wanted; their orders are cancelled. `team` are the robots that were there when
-    the plan was made. `late` are tasks that took far longer than predicted, and were reacted to.
-    `failures` counts the tasks of each goal that failed for good.
-    """
-
-    plan: Plan
-    state: PlanState
-    planner: str = "symbolic"
-    start: bool = True
-    records: dict[str, TaskRecord] = {}
-    allocation: dict[str, str] = {}
-    sequence: dict[str, tuple[str, ...]] = {}
-    job: PlanningJob | None = None
-    replan_reason: str | None = None
-    anew_reason: str | None = None
-    outside_reason: str | None = None
-    late: tuple[str, ...] = ()
-    failures: dict[str, int] = {}
-    amendment: Task | None = None
-    """A task that someone wants added, and the request for it."""
-    amendment_request: str | None = None
-    dropping: tuple[str, ...] = ()
-    team: tuple[str, ...] = ()
-    change: PlanChange | None = None
-    replans: int = 0
-    cancelling: bool = False
-    reason: str | None = None
-    violations: tuple[Violation, ...] = ()
-    makespan_s: float | None = None
-    lower_bound_s: float | None = None
-    notes: tuple[str, ...] = ()
-    planning_time_s: float | None = None
-    changed_s: float = 0.0
-
-    @property
-    def ended(self) -> bool:
-        """Whether nothing will happen to this plan any more."""
-        return self.state in ENDED_PLANS
-
-    def current(self) -> Iterator[TaskRecord]:
-        """The records of the current revision's tasks."""
-        return (self.records[task.task] for task in self.plan.tasks if task.task in self.records)
-
-    def outstanding(self) -> list[TaskRecord]:
-        """Tasks that a robot has been told to do and has not ended."""
-        return [record for record in self.records.values() if record.state in OUTSTANDING]
-
-
 class State(msgspec.Struct, frozen=True, kw_only=True):
     """What the planner knows."""
 
@@ -139,14 +49,15 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     goals: dict[str, Goal] = {}
     goal_states: dict[str, GoalStatus] = {}
     statements: dict[str, Statement] = {}
-    understood: dict[str, StatementStatus] = {}
+    statement_states: dict[str, StatementStatus] = {}
     places: dict[str, Place] = {}
     objects: dict[str, Object] = {}
     robots: dict[str, RobotSpec] = {}
     facts: dict[FactKey, Fact] = {}
     durations: dict[str, Durations] = {}
     """Learned from reports, by type of robot."""
-    alive: dict[str, tuple[str, ...]] = {}
+    connected: dict[str, tuple[str, ...]] = {}
+    """The runs of each robot's worker that are connected."""
     gone_since: dict[str, float] = {}
     """Unix time [s] at which the last worker of a robot went away."""
     plans: dict[str, PlanEntry] = {}
@@ -192,12 +103,12 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
 
     def team(self) -> tuple[str, ...]:
         """The robots that can be planned with, in a fixed order."""
-        return tuple(sorted(robot for robot in self.alive if self.ready(robot)))
+        return tuple(sorted(robot for robot in self.connected if self.ready(robot)))
 
     def ready(self, robot: str) -> bool:
         """Whether a robot can be planned with: connected, and what its hand holds is known."""
         spec = self.robots.get(robot)
-        if spec is None or not self.alive.get(robot):
+        if spec is None or not self.connected.get(robot):
             return False
         return "grip" not in spec.capabilities or self.fact(HOLDING, robot) is not None
 

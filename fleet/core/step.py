@@ -1,4 +1,4 @@
-"""The pure heart of the planner: `step(state, event, skills)` gives the next state and effects.
+"""The planner's pure core: `step(state, event, skills)` gives the next state and effects.
 
 It is total: whatever the outside world sends, it returns. It asks no clock and opens no socket;
 time comes in with the events. So a journal of events replays to the same state and effects.
@@ -12,33 +12,48 @@ from typing import Any
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.dispatch import dispatcher, replan_triggers
+from fleet.core.dispatch import dispatcher
 from fleet.core.effects import Effect, effects_between
 from fleet.core.events import Event
-from fleet.core.handlers import goals, plan_results, reports, requests
+from fleet.core.handlers import (
+    goals,
+    plan_results,
+    planner,
+    reports,
+    requests,
+    robots,
+    statements,
+    world,
+)
 from fleet.core.model.preconditions import Skills
 from fleet.core.state import State
 
-_NEWS: dict[type[Event], Callable[[State, Any], State]] = {
+_Handler = Callable[[State, Any, Skills], State]
+_HANDLERS: dict[type[Event], _Handler] = {
+    events.PlannerStarted: planner.planner_started,
+    events.PriorStateLoaded: planner.prior_state_loaded,
+    events.TimerFired: planner.timer_fired,
     events.GoalPut: goals.goal_put,
     events.GoalDeleted: goals.goal_deleted,
-    events.FactDeleted: goals.fact_deleted,
-    events.StatementPut: goals.statement_put,
-    events.StatementDeleted: goals.statement_deleted,
-    events.PlacePut: goals.place_put,
-    events.PlaceDeleted: goals.place_deleted,
-    events.ObjectPut: goals.object_put,
-    events.ObjectDeleted: goals.object_deleted,
-    events.RobotRegistered: goals.robot_registered,
-    events.RobotUnregistered: goals.robot_unregistered,
-    events.WorkerConnected: goals.worker_connected,
-    events.WorkerDisconnected: goals.worker_disconnected,
-    events.PriorStateLoaded: goals.prior_state_loaded,
     events.GoalInterpreted: goals.goal_interpreted,
+    events.StatementPut: statements.statement_put,
+    events.StatementDeleted: statements.statement_deleted,
+    events.FactPut: world.fact_put,
+    events.FactDeleted: world.fact_deleted,
+    events.PlacePut: world.place_put,
+    events.PlaceDeleted: world.place_deleted,
+    events.ObjectPut: world.object_put,
+    events.ObjectDeleted: world.object_deleted,
+    events.RobotRegistered: robots.robot_registered,
+    events.RobotUnregistered: robots.robot_unregistered,
+    events.WorkerConnected: robots.worker_connected,
+    events.WorkerDisconnected: robots.worker_disconnected,
+    events.ReportReceived: reports.report_received,
     events.PlanRequested: requests.plan_requested,
     events.ReplanRequested: requests.replan_requested,
     events.ControlRequested: requests.control_requested,
     events.PlanProposed: requests.plan_proposed,
+    events.PlanningSucceeded: plan_results.planning_succeeded,
     events.PlanningFailed: plan_results.planning_failed,
 }
 
@@ -53,28 +68,11 @@ def step(state: State, event: Event, skills: Skills) -> tuple[State, tuple[Effec
         time_s=max(state.time_s, event.time_s),
         wall_time_s=max(state.wall_time_s, event.wall_time_s),
     )
-    told = _take_in(now, event, skills)
-    settled = dispatcher.advance(told, skills)
+    handled = _HANDLERS[type(event)](now, event, skills)
+    settled = dispatcher.advance(handled, skills)
     if settled is now:
         return state, ()
     return settled, effects_between(state, settled)
-
-
-def _take_in(state: State, event: Event, skills: Skills) -> State:
-    match event:
-        case events.PlannerStarted():
-            return replace(
-                state, epoch=event.epoch, incarnation=event.incarnation, policy=event.policy
-            )
-        case events.PlanningSucceeded():
-            return plan_results.planning_succeeded(state, event, skills)
-        case events.FactPut():
-            return replan_triggers.fact_put(state, event, skills)
-        case events.ReportReceived():
-            return reports.report_received(state, event, skills)
-        case events.TimerFired():
-            return state
-    return _NEWS[type(event)](state, event)
 
 
 def replay(journal: Iterable[Event], skills: Skills, state: State | None = None) -> State:

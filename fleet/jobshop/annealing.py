@@ -1,4 +1,5 @@
-"""Simulated annealing on the order of knots and the machines of blocks, along the critical path.
+"""Simulated annealing on the order of components and the machines of blocks, along the critical
+path.
 
 Kirkpatrick, Gelatt, Vecchi 1983; moves at the critical path as in van Laarhoven, Aarts, Lenstra
 1992. A candidate is given up as soon as it is sure to be refused: the threshold is drawn first.
@@ -11,9 +12,8 @@ from math import inf, log
 from random import Random
 
 from fleet.jobshop.budget import Budget
-from fleet.jobshop.compiled import Compiled
-from fleet.jobshop.list_scheduling import Answer
-from fleet.jobshop.timing import rate
+from fleet.jobshop.forward_pass import Solution, evaluate
+from fleet.jobshop.instance import Instance
 
 HOT, COLD = 0.02, 0.0002
 """Temperatures at the beginning and the end, as shares of the makespan."""
@@ -26,13 +26,13 @@ REASSIGN, SWAP = 0.45, 0.6
 """Of all moves so many (and then up to so many) give a block another machine (swap two machines);
 the rest change the order."""
 EXPLORE = 0.15
-"""Share of moves that start anywhere and not on the critical path."""
+"""Share of moves that start anyrank and not on the critical path."""
 NEAR = 1e-9
 
 
 def anneal(
-    shop: Compiled,
-    begin: Answer,
+    instance: Instance,
+    begin: Solution,
     budget: Budget,
     bound_s: float = 0.0,
     seed: int = 0,
@@ -40,19 +40,19 @@ def anneal(
     home: Sequence[int] | None = None,
     frozen: frozenset[int] = frozenset(),
     stopped: Callable[[], bool] = lambda: False,
-) -> Answer:
+) -> Solution:
     """The best found from `begin` until the `budget` is over or the bound is met.
 
     With `home` machines, every block away from home costs `move_price_s`. Blocks in `frozen` keep
     their machine. It ends as soon as `stopped` says so. The answer is never worse than `begin`.
     """
     random = Random(seed)
-    search = _Search(shop, begin, random, move_price_s, home, frozen)
+    search = _Search(instance, begin, random, move_price_s, home, frozen)
     share = FIRST_COOLING
     while not budget.over:
         if search.run(budget.part(share, SHORTEST_S), bound_s, stopped):
             break
-        search = _Search(shop, search.best, random, move_price_s, home, frozen)
+        search = _Search(instance, search.best, random, move_price_s, home, frozen)
         share = LATER_COOLING
     return search.best
 
@@ -60,22 +60,22 @@ def anneal(
 class _Search:
     def __init__(
         self,
-        shop: Compiled,
-        begin: Answer,
+        instance: Instance,
+        begin: Solution,
         random: Random,
         move_price_s: float,
         home: Sequence[int] | None,
         frozen: frozenset[int],
     ) -> None:
-        self.shop, self.random = shop, random
+        self.instance, self.random = instance, random
         self.price_s, self.home, self.frozen = move_price_s, home, frozen
         self.order = list(begin.order)
         self.machine_of = list(begin.machine_of)
-        self.ends = begin.rated.ends_s
-        self.makespan = begin.rated.makespan_s
-        self.cost = begin.rated.cost + self._moves_price()
+        self.end_s = begin.end_s
+        self.makespan = begin.makespan_s
+        self.cost = begin.cost + self._moves_price()
         self.best, self.best_cost = begin, self.cost
-        self.where = [0] * len(self.order)
+        self.index_of = [0] * len(self.order)
         self.critical: list[int] = []
         self._index(0, len(self.order))
         self._trace()
@@ -86,7 +86,7 @@ class _Search:
         scale = self.makespan or 1.0
         tries = 0
         temperature = HOT * scale
-        exact = self.price_s == 0.0 and not self.shop.has_due and len(self.order) > 0
+        exact = self.price_s == 0.0 and not self.instance.has_due and len(self.order) > 0
         if len(self.order) == 0:
             return True
         while True:
@@ -94,7 +94,7 @@ class _Search:
                 spent = budget.spent
                 if spent >= 1.0:
                     return False
-                if exact and self.best.rated.makespan_s <= bound_s * (1 + NEAR) + NEAR:
+                if exact and self.best.makespan_s <= bound_s * (1 + NEAR) + NEAR:
                     return True
                 if tries % 512 == 0 and stopped():
                     return True
@@ -116,7 +116,7 @@ class _Search:
 
     def _reassign(self, limit: float) -> None:
         block = self._block()
-        machines = self.shop.shop.blocks[block].machines
+        machines = self.instance.shop.blocks[block].machines
         if len(machines) < 2 or block in self.frozen:
             return
         old = self.machine_of[block]
@@ -131,7 +131,7 @@ class _Search:
         one = self._block()
         other = self.random.randrange(len(self.machine_of))
         a, b = self.machine_of[one], self.machine_of[other]
-        blocks = self.shop.shop.blocks
+        blocks = self.instance.shop.blocks
         if a == b or one in self.frozen or other in self.frozen:
             return
         if b not in blocks[one].machines or a not in blocks[other].machines:
@@ -141,15 +141,15 @@ class _Search:
             self.machine_of[one], self.machine_of[other] = a, b
 
     def _apart(self, block: int, machine: int) -> bool:
-        return any(self.machine_of[o] == machine for o in self.shop.shop.blocks[block].apart)
+        return any(self.machine_of[o] == machine for o in self.instance.shop.blocks[block].apart)
 
     def _shift(self, limit: float) -> None:
-        """Move a knot before, or behind, another one of its machine; or anywhere near."""
+        """Move a component before, or behind, another one of its machine; or anywhere near."""
         block = self._block()
-        knot = self.shop.knot_of[block]
-        now = self.where[knot]
+        component = self.instance.component_of[block]
+        now = self.index_of[component]
         machine = self.machine_of[block]
-        mine = [self.where[self.shop.knot_of[b]] for b in self.critical]
+        mine = [self.index_of[self.instance.component_of[b]] for b in self.critical]
         near = [p for p in mine if p != now and self._on(p, machine)]
         span = max(2, len(self.order) // 8)
         to = self.random.choice(near) if near and self.random.random() < 0.7 else (
@@ -157,28 +157,29 @@ class _Search:
         )  # fmt: skip
         to = min(max(to, 0), len(self.order) - 1)
         if to < now:
-            to = max([to, *(self.where[k] + 1 for k in self.shop.knot_befores[knot])])
+            befores = self.instance.component_predecessors[component]
+            to = max([to, *(self.index_of[k] + 1 for k in befores)])
         else:
-            to = min([to, *(self.where[k] - 1 for k in self.shop.knot_laters[knot])])
+            laters = self.instance.component_successors[component]
+            to = min([to, *(self.index_of[k] - 1 for k in laters)])
         if to == now:
             return
-        self._move(knot, now, to)
+        self._move(component, now, to)
         if not self._try(limit):
-            self._move(knot, to, now)
+            self._move(component, to, now)
 
     def _on(self, position: int, machine: int) -> bool:
-        return any(
-            self.machine_of[b] == machine for b in self.shop.knot_blocks[self.order[position]]
-        )
+        blocks = self.instance.component_blocks[self.order[position]]
+        return any(self.machine_of[block] == machine for block in blocks)
 
-    def _move(self, knot: int, now: int, to: int) -> None:
+    def _move(self, component: int, now: int, to: int) -> None:
         del self.order[now]
-        self.order.insert(to, knot)
+        self.order.insert(to, component)
         self._index(min(now, to), max(now, to) + 1)
 
     def _index(self, begin: int, end: int) -> None:
         for position in range(begin, end):
-            self.where[self.order[position]] = position
+            self.index_of[self.order[position]] = position
 
     def _moves_price(self) -> float:
         if self.home is None or self.price_s == 0.0:
@@ -189,58 +190,58 @@ class _Search:
 
     def _try(self, limit: float) -> bool:
         price = self._moves_price()
-        found = rate(self.shop, self.order, self.machine_of, limit - price)
+        found = evaluate(self.instance, self.order, self.machine_of, limit - price)
         if found is None:
             return False
         self.cost = found.cost + price
-        self.ends, self.makespan = found.ends_s, found.makespan_s
+        self.end_s, self.makespan = found.end_s, found.makespan_s
         self._trace()
         if self.cost < self.best_cost - NEAR:
             self.best_cost = self.cost
-            self.best = Answer(list(self.order), list(self.machine_of), found)
+            self.best = found._replace(order=list(self.order), machine_of=list(self.machine_of))
         return True
 
     def _trace(self) -> None:
-        """The blocks on one critical path, from the last end back along what steps waited for."""
-        shop, ends = self.shop, self.ends
+        """The blocks on one critical path: from the last end back along what was waited for."""
+        instance, end_s = self.instance, self.end_s
         self.critical = []
-        if not ends:
+        if not end_s:
             return
-        step = max(range(len(ends)), key=ends.__getitem__)
+        op = max(range(len(end_s)), key=end_s.__getitem__)
         seen: set[int] = set()
-        kinds = shop.kinds
-        while step not in seen:
-            seen.add(step)
-            mine = shop.blocks_of[step]
+        kinds = instance.kinds
+        while op not in seen:
+            seen.add(op)
+            mine = instance.blocks_of[op]
             self.critical.extend(b for b in mine if b not in self.critical[-2:])
-            latest = max(shop.befores[step], key=ends.__getitem__, default=-1)
-            after_s = ends[latest] if latest >= 0 else -inf
-            length = shop.durations[step][kinds[self.machine_of[mine[0]]]]
-            start_s = ends[step] - length
-            if latest >= 0 and (after_s >= start_s - NEAR or shop.steps_of[mine[0]][0] != step):
-                step = latest
+            latest = max(instance.predecessors[op], key=end_s.__getitem__, default=-1)
+            after_s = end_s[latest] if latest >= 0 else -inf
+            length = instance.durations_s[op][kinds[self.machine_of[mine[0]]]]
+            start_s = end_s[op] - length
+            opens = instance.operations_of[mine[0]][0] == op
+            if latest >= 0 and (after_s >= start_s - NEAR or not opens):
+                op = latest
                 continue
-            before = self._previous(mine, step, after_s)
+            before = self._previous(mine, op, after_s)
             if before < 0 and latest < 0:
                 return
-            step = before if before >= 0 else latest
+            op = before if before >= 0 else latest
 
-    def _previous(self, mine: Sequence[int], step: int, after_s: float) -> int:
-        """The last step of the block that the machine did just before, if it ended later."""
-        shop, ends = self.shop, self.ends
+    def _previous(self, mine: Sequence[int], op: int, after_s: float) -> int:
+        """The last operation of the block that the machine did just before, if it ended later."""
+        instance, end_s = self.instance, self.end_s
         best, latest = -1, max(after_s, 0.0)
         for block in mine:
-            if shop.steps_of[block][0] != step:
+            if instance.operations_of[block][0] != op:
                 continue
             machine = self.machine_of[block]
-            position = self.where[shop.knot_of[block]]
+            position = self.index_of[instance.component_of[block]]
             for back in range(position - 1, max(-1, position - 400), -1):
-                found = [
-                    b for b in shop.knot_blocks[self.order[back]] if self.machine_of[b] == machine
-                ]
+                blocks = instance.component_blocks[self.order[back]]
+                found = [b for b in blocks if self.machine_of[b] == machine]
                 if found:
-                    end = ends[shop.steps_of[found[-1]][-1]]
+                    end = end_s[instance.operations_of[found[-1]][-1]]
                     if end > latest:
-                        best, latest = shop.steps_of[found[-1]][-1], end
+                        best, latest = instance.operations_of[found[-1]][-1], end
                     break
         return best

@@ -4,9 +4,10 @@ Run as a script by `fleet.jobshop.cpsat`, with nothing of this package imported.
 is printed for every better solution, so that whoever ends the process early has the best so far;
 the last line has the status and the proven bound.
 
-The model: a start and an end for every step; every block chooses a machine, or a pool of machines
-that are alike. Without travel a pool is one cumulative, a single machine one no-overlap. With
-travel every machine is a circuit through its blocks, and the way is part of the first step.
+The model: a start and an end for every operation; every block chooses a machine, or a pool of
+machines that are alike. Without travel a pool is one cumulative, a single machine one
+no-overlap. With travel every machine is a circuit through its blocks, and the travel is part of the
+first operation.
 """
 
 from __future__ import annotations
@@ -32,14 +33,14 @@ def main() -> None:
     # one that proves most; beside it all that makes a schedule shorter goes on.
     solver.parameters.extra_subsolvers.append("objective_lb_search")
 
-    tell_each = type(
-        "TellEach",
+    print_each = type(
+        "PrintEach",
         (cp_model.CpSolverSolutionCallback,),
-        {"on_solution_callback": lambda self: _tell(model.answer(self.value))},
+        {"on_solution_callback": lambda self: _print_row(model.answer(self.value))},
     )
-    status = solver.solve(model.model, tell_each())
+    status = solver.solve(model.model, print_each())
     bound = solver.best_objective_bound if status != cp_model.MODEL_INVALID else 0
-    _tell({"status": solver.status_name(status), "bound": bound})
+    _print_row({"status": solver.status_name(status), "bound": bound})
 
 
 def _cp_model() -> Any:
@@ -59,7 +60,7 @@ def _cp_model() -> Any:
     return cp_model
 
 
-def _tell(row: dict[str, Any]) -> None:
+def _print_row(row: dict[str, Any]) -> None:
     print(json.dumps(row), flush=True)  # noqa: T201 (standard output is the way out)
 
 
@@ -71,15 +72,15 @@ class Model:
         self.model = model = cp.CpModel()
         self.horizon = horizon = data["horizon"]
         self.top = model.new_int_var(data["bound"], horizon, "")
-        self.starts = [model.new_int_var(0, horizon, "") for _ in data["steps"]]
-        self.ends = [model.new_int_var(0, horizon, "") for _ in data["steps"]]
+        self.starts = [model.new_int_var(0, horizon, "") for _ in data["operations"]]
+        self.ends = [model.new_int_var(0, horizon, "") for _ in data["operations"]]
         self.lits: list[dict[int, Any]] = []
-        self.ways: dict[int, list[tuple[Any, int]]] = {}
-        """By group: arcs of its circuit with the way that comes before the block they lead to."""
-        for step, row in enumerate(data["steps"]):
-            for before in row["befores"]:
-                model.add(self.starts[step] >= self.ends[before])
-            model.add(self.top >= self.ends[step] + row["tail"])
+        self.travels: dict[int, list[tuple[Any, int]]] = {}
+        """By group: arcs of its circuit with the travel before the block they lead to."""
+        for op, row in enumerate(data["operations"]):
+            for before in row["predecessors"]:
+                model.add(self.starts[op] >= self.ends[before])
+            model.add(self.top >= self.ends[op] + row["tail"])
         for block in data["blocks"]:
             lits = {group: model.new_bool_var("") for group in block["groups"]}
             model.add_exactly_one(lits.values())
@@ -100,13 +101,13 @@ class Model:
         self._hint()
 
     def _durations(self) -> None:
-        """A step takes what its machine's kind takes, and at least that where it travels."""
+        """An operation takes what its machine's kind takes, and at least that where it travels."""
         groups = self.data["groups"]
-        for step, row in enumerate(self.data["steps"]):
+        for op, row in enumerate(self.data["operations"]):
             lits = self.lits[row["block"]]
             kinds = {groups[group]["kind"] for group in lits}
             durations = row["durations"]
-            start, end = self.starts[step], self.ends[step]
+            start, end = self.starts[op], self.ends[op]
             flexible = row["target"] >= 0 and self.data["travel"] is not None
             if len({durations[kind] for kind in kinds}) == 1:
                 fixed = durations[next(iter(kinds))]
@@ -118,8 +119,8 @@ class Model:
                 self.model.add(end == start + fixed)
 
     def _span(self, block: int) -> tuple[Any, Any]:
-        steps = self.data["blocks"][block]["steps"]
-        return self.starts[steps[0]], self.ends[steps[-1]]
+        operations = self.data["blocks"][block]["operations"]
+        return self.starts[operations[0]], self.ends[operations[-1]]
 
     def _cumulatives(self) -> None:
         model, groups = self.model, self.data["groups"]
@@ -128,21 +129,21 @@ class Model:
             group
             for block, lits in zip(self.data["blocks"], self.lits, strict=True)
             for group in lits
-            if block["place"] == 0
+            if block["position"] == 0
         )
         for number, block in enumerate(self.data["blocks"]):
             begin, end = self._span(number)
-            single = len(block["steps"]) == 1 and block["place"] == 1
+            single = len(block["operations"]) == 1 and block["position"] == 1
             # A block that must be first has the machine from the start, one that must be last keeps
             # it to the end. Where several must be first, they come before the others one by one
             # (`_ahead`); in a pool of machines that is left open, and looked at in the answer.
-            closes = end if block["place"] < 2 else self.horizon
+            closes = end if block["position"] < 2 else self.horizon
             for group, lit in self.lits[number].items():
-                opens = 0 if block["place"] == 0 and firsts[group] == 1 else begin
+                opens = 0 if block["position"] == 0 and firsts[group] == 1 else begin
                 if groups[group]["ready"]:
                     model.add(begin >= groups[group]["ready"]).only_enforce_if(lit)
                 if single:
-                    row = self.data["steps"][block["steps"][0]]
+                    row = self.data["operations"][block["operations"][0]]
                     size = row["durations"][groups[group]["kind"]]
                 else:
                     size = model.new_int_var(0, self.horizon, "")
@@ -159,10 +160,10 @@ class Model:
     def _ahead(self, group: int) -> None:
         """On this one machine, blocks that must be first end before others begin."""
         mine = [(b, lits[group]) for b, lits in enumerate(self.lits) if group in lits]
-        place = [block["place"] for block in self.data["blocks"]]
+        position = [block["position"] for block in self.data["blocks"]]
         for first, first_lit in mine:
             for other, other_lit in mine:
-                if place[first] == 0 and place[other] != 0:
+                if position[first] == 0 and position[other] != 0:
                     begins, ends = self._span(other)[0], self._span(first)[1]
                     self.model.add(begins >= ends).only_enforce_if([first_lit, other_lit])
 
@@ -181,11 +182,11 @@ class Model:
                 first, last = model.new_bool_var(""), model.new_bool_var("")
                 arcs += [(0, here, first), (here, 0, last)]
                 self._follows(block, number, first, group["ready"], travel[group["site"]])
-                if row["place"] == 2:
+                if row["position"] == 2:
                     continue
                 for there, other in enumerate(mine, start=1):
-                    follows = data["blocks"][other]["place"]
-                    if here == there or follows < row["place"]:
+                    follows = data["blocks"][other]["position"]
+                    if here == there or follows < row["position"]:
                         continue
                     arc = model.new_bool_var("")
                     arcs.append((here, there, arc))
@@ -202,22 +203,22 @@ class Model:
             mine = [b for b, lits in enumerate(self.lits) if number in lits]
             if not mine:
                 continue
-            steps = [data["blocks"][b]["steps"] for b in mine]
-            head = min(heads[row[0]] for row in steps)
-            tail = min(data["steps"][row[-1]]["tail"] for row in steps)
+            operations = [data["blocks"][b]["operations"] for b in mine]
+            head = min(heads[row[0]] for row in operations)
+            tail = min(data["operations"][row[-1]]["tail"] for row in operations)
             if group["ready"] + tail <= data["bound"]:
                 # A machine that is free later than that may well have nothing to do.
                 head = max(head, group["ready"])
-            work = [sum(self._least(step, b, group["kind"]) for step in row)
-                    for b, row in zip(mine, steps, strict=True)]  # fmt: skip
+            work = [sum(self._least(op, b, group["kind"]) for op in row)
+                    for b, row in zip(mine, operations, strict=True)]  # fmt: skip
             total = sum(s * self.lits[b][number] for b, s in zip(mine, work, strict=True))
-            total += sum(way * arc for arc, way in self.ways.get(number, ()))
+            total += sum(way * arc for arc, way in self.travels.get(number, ()))
             self.model.add(total <= group["size"] * (self.top - head - tail))
 
-    def _least(self, step: int, block: int = -1, kind: int = 0) -> int:
-        """What a step takes without its way: a block's own on this kind of machine, else on the
-        fastest."""
-        row = self.data["steps"][step]
+    def _least(self, op: int, block: int = -1, kind: int = 0) -> int:
+        """What an operation takes without its travel: a block's own on this kind of machine, else
+        on the fastest."""
+        row = self.data["operations"][op]
         durations: list[int] = row["durations"]
         if row["block"] == block:
             return durations[kind]
@@ -225,23 +226,23 @@ class Model:
         return min(durations[int(groups[group]["kind"])] for group in self.lits[row["block"]])
 
     def _heads(self) -> list[int]:
-        """Before which no step starts."""
-        steps = self.data["steps"]
-        heads = [-1] * len(steps)
-        left = list(range(len(steps)))
+        """Before which no op starts."""
+        operations = self.data["operations"]
+        heads = [-1] * len(operations)
+        left = list(range(len(operations)))
         while left:
             waiting = []
-            for step in left:
-                befores = steps[step]["befores"]
+            for op in left:
+                befores = operations[op]["predecessors"]
                 if any(heads[before] < 0 for before in befores):
-                    waiting.append(step)
+                    waiting.append(op)
                     continue
                 ends = (heads[before] + self._least(before) for before in befores)
-                heads[step] = max(ends, default=0)
+                heads[op] = max(ends, default=0)
             left = waiting
         return heads
 
-    def _follows(self, block: int, number: int, arc: Any, free: Any, ways: list[int]) -> None:
+    def _follows(self, block: int, number: int, arc: Any, free: Any, travel: list[int]) -> None:
         """With this arc, the block comes after `free` on the machine `number`."""
         group = self.data["groups"][number]
         begin, _ = self._span(block)
@@ -249,17 +250,17 @@ class Model:
         entry = self.data["blocks"][block]["entry"]
         if entry < 0:
             return
-        row = self.data["steps"][entry]
-        way = ways[row["target"]]
-        self.ways.setdefault(number, []).append((arc, way))
+        row = self.data["operations"][entry]
+        way = travel[row["target"]]
+        self.travels.setdefault(number, []).append((arc, way))
         size = row["durations"][group["kind"]] + way
         self.model.add(self.ends[entry] >= self.starts[entry] + size).only_enforce_if(arc)
 
     def _hint(self) -> None:
         hint = self.data["hint"]
-        for step, start in enumerate(hint["starts"]):
-            self.model.add_hint(self.starts[step], start)
-            self.model.add_hint(self.ends[step], hint["ends"][step])
+        for op, start in enumerate(hint["starts"]):
+            self.model.add_hint(self.starts[op], start)
+            self.model.add_hint(self.ends[op], hint["ends"][op])
         for lits, chosen in zip(self.lits, hint["groups"], strict=True):
             for group, lit in lits.items():
                 self.model.add_hint(lit, group == chosen)

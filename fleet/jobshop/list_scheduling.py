@@ -1,8 +1,9 @@
-"""Schedules at once: list scheduling by upward rank, and dispatch rules between rank and nearness.
+"""Schedules at once: list scheduling by upward rank, and dispatching rules between rank and
+nearness.
 
-Upward rank and earliest finish are HEFT (Topcuoglu, Hariri, Wu 2002). The dispatch rule takes, of
-what is ready, the knot with the least `start + travel - alpha · rank`: 0 is "what can start first",
-a large alpha is list scheduling.
+Upward rank and earliest finish are HEFT (Topcuoglu, Hariri, Wu 2002). The dispatching rule takes,
+of what is ready, the component with the least `start + travel - alpha · rank`: 0 is "what can start
+first", a large alpha is list scheduling.
 """
 
 from __future__ import annotations
@@ -14,203 +15,220 @@ from random import Random
 from typing import NamedTuple
 
 from fleet.jobshop.budget import Budget
-from fleet.jobshop.compiled import Compiled
-from fleet.jobshop.problem import Place
-from fleet.jobshop.timing import Rated, rate
+from fleet.jobshop.forward_pass import LAST, PartialSchedule, Solution
+from fleet.jobshop.instance import Instance
 
 ALPHAS = (0.1, 0.5, 1.0, 2.0, 0.2, 0.0, 0.3, 0.03, 0.7, 0.05, 0.4, 5.0)
 """Tried one after the other while there is time; spread around those that won most often."""
 CANDIDATES = 48
-"""Ready knots that a dispatch rule looks at, those of highest rank."""
-LAST = int(Place.LAST)
+"""Ready components that a dispatching rule looks at, those of highest rank."""
+ALWAYS = 200
+"""Operations up to which every rule is tried whatever the time: a few milliseconds each."""
+AT_LEAST = 50
+"""Tries at random, where rules find nothing, whatever the time."""
 
 
-class Answer(NamedTuple):
-    """A solution: knots in order, a machine for every block, and what it is worth."""
-
-    order: list[int]
-    machine_of: list[int]
-    rated: Rated
-
-
-def construct(
-    shop: Compiled,
+def list_schedule(
+    instance: Instance,
     alpha: float | None = None,
     at_random: Random | None = None,
     budget: Budget | None = None,
-) -> Answer | None:
-    """Place one ready knot after the other; without `alpha` the one of highest rank (HEFT).
+) -> Solution | None:
+    """Place one ready component after the other; without `alpha` the one of highest rank (HEFT).
 
     `at_random` takes any machine that will do, instead of the one where a block ends first.
     Deterministic. `None` if it leads to where some block finds no machine, or if the `budget` is
     over before it is done.
     """
-    board = Board(shop, at_random)
+    partial = GreedySchedule(instance, at_random)
     order: list[int] = []
-    missing = [len(befores) for befores in shop.knot_befores]
+    missing = [len(befores) for befores in instance.component_predecessors]
     ready: list[tuple[int, float, int]] = []
-    guesses: dict[int, Guess] = {}
-    for knot, count in enumerate(missing):
+    expected: dict[int, Placement] = {}
+
+    def is_ready(component: int) -> None:
+        rank_s = instance.component_rank_s[component]
+        insort(ready, (instance.component_position[component], -rank_s, component))
+
+    for component, count in enumerate(missing):
         if count == 0:
-            insort(ready, (shop.knot_place[knot], -shop.knot_rank[knot], knot))
+            is_ready(component)
     while ready:
         if len(order) % 256 == 255 and budget is not None and budget.over:
             return None
-        at = 0 if alpha is None else board.choose(ready, guesses, alpha)
-        knot = ready.pop(at)[2]
-        guesses.pop(knot, None)
-        changed = board.place(knot)
-        if changed is None:
+        at = 0 if alpha is None else partial.choose(ready, expected, alpha)
+        component = ready.pop(at)[2]
+        expected.pop(component, None)
+        if not partial.add(component):
             return None
-        order.append(knot)
+        order.append(component)
         if alpha is not None:
-            board.update(guesses, changed)
-        for later in shop.knot_laters[knot]:
+            partial.update(expected, component)
+        for later in instance.component_successors[component]:
             missing[later] -= 1
             if missing[later] == 0:
-                insort(ready, (shop.knot_place[later], -shop.knot_rank[later], later))
-    rated = rate(shop, order, board.machine_of)
-    return None if rated is None else Answer(order, board.machine_of, rated)
+                is_ready(later)
+    return partial.solution(order)
 
 
-class Guess(NamedTuple):
-    """Where a ready block would be done best: finish [s], start [s] with the way, machine."""
+def dispatching_rules(instance: Instance, best: Solution | None, budget: Budget) -> Solution | None:
+    """The best of the list schedule `best` and dispatching rules, tried until the `budget` is over.
+
+    Those that are tried at small sizes take no time worth counting.
+    """
+    for alpha in ALPHAS:
+        small = len(instance.predecessors) <= ALWAYS
+        if best is not None and not small and budget.over:
+            break
+        found = list_schedule(instance, alpha, budget=None if small or best is None else budget)
+        if found is not None and (best is None or found.cost < best.cost):
+            best = found
+    return best
+
+
+def random_restarts(instance: Instance, budget: Budget, seed: int) -> Solution | None:
+    """Some schedule where rules run into dead ends: blocks of a component in other orders, machines
+    at random for one component after the other."""
+    random = Random(seed)
+    tries = 0
+    while tries < AT_LEAST or not budget.over:
+        tries += 1
+        for together in instance.component_blocks:
+            random.shuffle(together)
+        found = list_schedule(instance, random.choice((None, *ALPHAS)), at_random=random)
+        if found is not None:
+            return found
+    return None
+
+
+class Placement(NamedTuple):
+    """A machine for a block, and when it would start, after the travel, and finish there [s]."""
 
     finish_s: float
     start_s: float
     machine: int
 
 
-class Board:
-    """What is placed so far."""
+class GreedySchedule(PartialSchedule):
+    """Chooses a machine for every block as it is placed."""
 
-    def __init__(self, shop: Compiled, at_random: Random | None = None) -> None:
-        self.shop, self.random = shop, at_random
-        machines = shop.shop.machines
-        self.free = [machine.ready_s for machine in machines]
-        self.site = [machine.site for machine in machines]
-        self.taken = [0] * len(machines)
-        self.ends = [0.0] * len(shop.befores)
-        self.machine_of = [-1] * len(shop.shop.blocks)
-        self.eligible = [frozenset(block.machines) for block in shop.shop.blocks]
+    def __init__(self, instance: Instance, at_random: Random | None = None) -> None:
+        super().__init__(instance)
+        self.random = at_random
+        self.eligible = [frozenset(block.machines) for block in instance.shop.blocks]
+
+    def add(self, component: int) -> bool:
+        """Place the component; `False` if one of its blocks has no machine, or on deadlock."""
+        for block in self.instance.component_blocks[component]:
+            found = self.best(block)
+            if found is None:
+                return False
+            self.machine_of[block] = found.machine
+        return self.extend((component,))
 
     def ready_s(self, block: int) -> float:
         """When what the block waits for, and is placed, has ended."""
-        first = self.shop.steps_of[block][0]
-        return max((self.ends[before] for before in self.shop.befores[first]), default=0.0)
+        first = self.instance.operations_of[block][0]
+        befores = self.instance.predecessors[first]
+        return max((self.end_s[before] for before in befores), default=0.0)
 
-    def guess(self, block: int, machine: int, ready_s: float) -> Guess:
+    def placement(self, block: int, machine: int, ready_s: float) -> Placement:
         """The block on this machine."""
-        shop = self.shop
-        kind = shop.kinds[machine]
-        free_s = self.free[machine]
-        start_s = free_s if free_s > ready_s else ready_s
-        target = shop.entry[block]
+        instance = self.instance
+        start_s = max(self.free_s[machine], ready_s)
+        target = instance.entry[block]
         if target >= 0:
-            start_s += shop.shop.travel_s[kind][self.site[machine]][target]
-        own = shop.own_s[block]
-        return Guess(start_s + (own[kind] if own else 0.0), start_s, machine)
+            kind = instance.kinds[machine]
+            start_s += instance.shop.travel_s[kind][self.site[machine]][target]
+        return Placement(start_s + instance.length_s(block, machine), start_s, machine)
 
-    def best(self, block: int) -> Guess | None:
+    def allowed(self, block: int) -> Sequence[int]:
+        """Machines that the block may be placed on now."""
+        instance = self.instance
+        row = instance.shop.blocks[block]
+        others = {self.machine_of[other] for other in row.apart}
+        others |= {self.machine_of[other] for other in instance.cannot_precede[block]}
+        if not others and not instance.has_positions:
+            return row.machines
+        position = instance.positions[block]
+        return [
+            m
+            for m in row.machines
+            if m not in others and self.position[m] != LAST and self.position[m] <= position
+        ]
+
+    def best(self, block: int) -> Placement | None:
         """The machine on which the block ends first; of equals the one that idles least before."""
-        shop = self.shop
-        others = {self.machine_of[other] for other in shop.shop.blocks[block].apart}
-        others |= {self.machine_of[other] for other in shop.not_ahead[block]}
-        machines: Sequence[int] = shop.shop.blocks[block].machines
-        if others or shop.has_places:
-            place = shop.places[block]
-            machines = [m for m in machines if m not in others and self._open(m, place)]
+        machines = self.allowed(block)
         if not machines:
             return None
         ready_s = self.ready_s(block)
-        if self.random is not None:
-            return self.guess(block, self.random.choice(machines), ready_s)
-        machine = self._first_done(block, machines, ready_s)
-        return self.guess(block, machine, ready_s)
+        machine = (
+            self._first_done(block, machines, ready_s)
+            if self.random is None
+            else self.random.choice(machines)
+        )
+        return self.placement(block, machine, ready_s)
 
     def _first_done(self, block: int, machines: Sequence[int], ready_s: float) -> int:
-        """`guess` for all machines, of which the least is taken: the innermost loop of all."""
-        shop = self.shop
-        kinds, free, site = shop.kinds, self.free, self.site
-        own = shop.own_s[block] or (0.0,) * (max(kinds) + 1)
-        target, travel_s = shop.entry[block], shop.shop.travel_s
+        """`placement` for all machines, of which the least is taken: the innermost loop of all."""
+        instance = self.instance
+        kinds, free, site = instance.kinds, self.free_s, self.site
+        own_s = instance.own_s[block] or (0.0,) * (max(kinds) + 1)
+        target, travel_s = instance.entry[block], instance.shop.travel_s
         best, least_s, latest_s = -1, inf, -inf
         for machine in machines:
             free_s = free[machine]
             if free_s > least_s:
                 continue
             kind = kinds[machine]
-            finish_s = (free_s if free_s > ready_s else ready_s) + own[kind]
+            finish_s = (free_s if free_s > ready_s else ready_s) + own_s[kind]
             if target >= 0:
                 finish_s += travel_s[kind][site[machine]][target]
             if finish_s < least_s or (finish_s == least_s and free_s > latest_s):
                 best, least_s, latest_s = machine, finish_s, free_s
         return best
 
-    def _open(self, machine: int, place: int) -> bool:
-        return self.taken[machine] != LAST and self.taken[machine] <= place
-
     def choose(
-        self, ready: Sequence[tuple[int, float, int]], guesses: dict[int, Guess], alpha: float
+        self,
+        ready: Sequence[tuple[int, float, int]],
+        expected: dict[int, Placement],
+        alpha: float,
     ) -> int:
-        """The index in `ready` of the knot that the dispatch rule takes."""
+        """The index in `ready` of the component that the dispatching rule takes."""
         chosen, least = 0, inf
-        first_place = ready[0][0]
-        for index, (place, minus_rank, knot) in enumerate(ready[:CANDIDATES]):
-            if place > first_place:
+        first_position = ready[0][0]
+        for index, (position, minus_rank_s, component) in enumerate(ready[:CANDIDATES]):
+            if position > first_position:
                 break
-            found = guesses.get(knot)
+            found = expected.get(component)
             if found is None:
-                found = self.best(self.shop.knot_blocks[knot][0])
+                found = self.best(self.instance.component_blocks[component][0])
                 if found is None:
                     continue
-                guesses[knot] = found
-            score = found.start_s + alpha * minus_rank
+                expected[component] = found
+            score = found.start_s + alpha * minus_rank_s
             if score < least:
                 chosen, least = index, score
         return chosen
 
-    def update(self, guesses: dict[int, Guess], changed: set[int]) -> None:
-        """A machine only gets busier, so a guess stands unless its machine, or a nearer one, is
-        among the changed."""
-        for knot, found in list(guesses.items()):
-            if found.machine in changed:
-                del guesses[knot]
-                continue
-            block = self.shop.knot_blocks[knot][0]
-            if self.shop.entry[block] < 0:
-                continue
-            for machine in changed:
-                if machine in self.eligible[block]:
-                    other = self.guess(block, machine, self.ready_s(block))
-                    if other.finish_s < found.finish_s:
-                        del guesses[knot]
-                        break
+    def update(self, expected: dict[int, Placement], placed: int) -> None:
+        """Forget what is different now that a component is placed.
 
-    def place(self, knot: int) -> set[int] | None:
-        """Give every block of the knot a machine; the machines used, or `None` if one has none."""
-        shop = self.shop
-        changed: set[int] = set()
-        for block in shop.knot_blocks[knot]:
-            found = self.best(block)
-            if found is None:
-                return None
-            self.machine_of[block] = found.machine
-            changed.add(found.machine)
-        for step in shop.flow[knot]:
-            machine = self.machine_of[step.block]
-            kind = shop.kinds[machine]
-            time = max((self.ends[before] for before in step.befores), default=0.0)
-            for block in step.opens:
-                opened = self.machine_of[block]
-                time = max(time, self.free[opened])
-                self.taken[opened] = shop.places[block]
-            time += step.duration_s[kind]
-            if step.target >= 0:
-                time += shop.shop.travel_s[kind][self.site[machine]][step.target]
-            if step.arrives >= 0:
-                self.site[machine] = step.arrives
-            self.ends[step.number] = time
-            for block in step.closes:
-                self.free[self.machine_of[block]] = time
-        return changed
+        A machine only gets busier, so a placement is as it was unless its machine, or a nearer one,
+        is among those used.
+        """
+        used = {self.machine_of[block] for block in self.instance.component_blocks[placed]}
+        for component, found in list(expected.items()):
+            if found.machine in used:
+                del expected[component]
+                continue
+            block = self.instance.component_blocks[component][0]
+            if self.instance.entry[block] < 0:
+                continue
+            ready_s = self.ready_s(block)
+            if any(
+                self.placement(block, machine, ready_s).finish_s < found.finish_s
+                for machine in used & self.eligible[block]
+            ):
+                del expected[component]

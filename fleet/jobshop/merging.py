@@ -1,14 +1,25 @@
-"""From operations to steps: ways inside blocks folded into durations, chains merged into one."""
+"""Operations that always follow each other on the same machines merged into one; travel inside a
+block made part of the duration.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf
+from typing import NamedTuple
 
 from fleet.jobshop.problem import BadShop, Shop
 
-Row = tuple[tuple[int, ...], tuple[float, ...], int, int, float, float]
-"""Blocks, durations by kind, target, arrives, weight, due."""
+
+class Row(NamedTuple):
+    """An operation, or several merged. Durations are by machine kind; sites may be -1: none."""
+
+    blocks: tuple[int, ...]
+    duration_s: tuple[float, ...]
+    target: int
+    arrives: int
+    weight: float
+    due_s: float
 
 
 def with_chains(shop: Shop) -> list[list[int]]:
@@ -23,64 +34,69 @@ def with_chains(shop: Shop) -> list[list[int]]:
     return [sorted(rows) for rows in befores]
 
 
-def single(shop: Shop, befores: list[list[int]]) -> tuple[list[int], list[list[int]], list[Row]]:
-    """Every operation a step of its own: owners, what each waits for, and rows."""
-    return list(range(len(befores))), befores, _rows(shop)
+def single(
+    shop: Shop, predecessors: list[list[int]]
+) -> tuple[list[int], list[list[int]], list[Row]]:
+    """Every operation by itself: which one it is, what each waits for, and rows."""
+    return list(range(len(predecessors))), predecessors, _rows(shop)
 
 
 def _rows(shop: Shop) -> list[Row]:
-    """Of each operation; the way between two operations of a block is part of the duration."""
-    rows: list[Row] = [
-        (o.blocks, o.duration_s, -1 if o.target is None else o.target,
-         -1 if o.arrives is None else o.arrives, o.weight, o.due_s)
+    """Of each operation; the travel between two operations of a block is part of the duration."""
+    rows = [
+        Row(o.blocks, o.duration_s, -1 if o.target is None else o.target,
+            -1 if o.arrives is None else o.arrives, o.weight, o.due_s)
         for o in shop.operations
     ]  # fmt: skip
     for number, block in enumerate(shop.blocks):
-        where = -1
+        site = -1
         for op in block.operations:
-            mine, duration, target, arrives, weight, due = rows[op]
-            if mine[0] != number:
+            row = rows[op]
+            if row.blocks[0] != number:
                 continue
-            if target >= 0 and where >= 0:
-                duration = tuple(
-                    d + shop.travel_s[kind][where][target] for kind, d in enumerate(duration)
+            if row.target >= 0 and site >= 0:
+                lasts_s = tuple(
+                    duration_s + shop.travel_s[kind][site][row.target]
+                    for kind, duration_s in enumerate(row.duration_s)
                 )
-                rows[op] = (mine, duration, -1, arrives, weight, due)
-            where = arrives if arrives >= 0 else where
+                rows[op] = row._replace(duration_s=lasts_s, target=-1)
+            site = row.arrives if row.arrives >= 0 else site
     return rows
 
 
 def merged(
-    shop: Shop, befores: list[list[int]], order: Sequence[int]
+    shop: Shop, predecessors: list[list[int]], order: Sequence[int]
 ) -> tuple[list[int], list[list[int]], list[Row]]:
-    """Merge operations that always follow each other directly on the same machines."""
+    """For each operation of the shop the merged one; of those, what each waits for, and rows."""
     rows = _rows(shop)
-    laters = [0] * len(rows)
-    for before in befores:
-        for b in before:
-            laters[b] += 1
+    successors = [0] * len(rows)
+    for befores in predecessors:
+        for before in befores:
+            successors[before] += 1
     owner = [-1] * len(rows)
-    steps: list[Row] = []
-    step_befores: list[list[int]] = []
+    made: list[Row] = []
+    made_predecessors: list[list[int]] = []
     for op in order:
-        row = rows[op]
-        before = befores[op]
-        if len(before) == 1 and laters[before[0]] == 1 and rows[before[0]][0] == row[0]:
-            step = owner[before[0]]
-            head = steps[step]
-            free = head[4] == 0 and head[5] == inf and (row[2] < 0 or head[2] < 0)
-            if free:
-                owner[op] = step
-                steps[step] = (
-                    row[0],
-                    tuple(a + b for a, b in zip(head[1], row[1], strict=True)),
-                    max(head[2], row[2]),
-                    row[3] if row[3] >= 0 else head[3],
-                    row[4],
-                    row[5],
+        row, befores = rows[op], predecessors[op]
+        if len(befores) == 1 and successors[befores[0]] == 1:
+            number = owner[befores[0]]
+            head = made[number]
+            plain = head.weight == 0 and head.due_s == inf
+            if (
+                plain
+                and rows[befores[0]].blocks == row.blocks
+                and (row.target < 0 or head.target < 0)
+            ):
+                owner[op] = number
+                made[number] = row._replace(
+                    duration_s=tuple(
+                        a + b for a, b in zip(head.duration_s, row.duration_s, strict=True)
+                    ),
+                    target=max(head.target, row.target),
+                    arrives=row.arrives if row.arrives >= 0 else head.arrives,
                 )
                 continue
-        owner[op] = len(steps)
-        steps.append(row)
-        step_befores.append(sorted({owner[b] for b in before}))
-    return owner, step_befores, steps
+        owner[op] = len(made)
+        made.append(row)
+        made_predecessors.append(sorted({owner[before] for before in befores}))
+    return owner, made_predecessors, made

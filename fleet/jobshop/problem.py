@@ -14,7 +14,7 @@ from enum import IntEnum
 from math import inf, isfinite
 
 
-class Place(IntEnum):
+class Position(IntEnum):
     """Where in its machine's sequence a block may stand."""
 
     FIRST = 0
@@ -49,7 +49,7 @@ class Block:
 
     operations: tuple[int, ...]
     machines: tuple[int, ...]
-    place: Place = Place.ANYWHERE
+    position: Position = Position.ANYWHERE
     apart: frozenset[int] = frozenset()
     """Blocks that must be on other machines."""
 
@@ -99,7 +99,7 @@ class Shop:
 
 
 @dataclass(frozen=True)
-class Timed:
+class Schedule:
     """A schedule: the machine of every block, the order of blocks, when operations end [s].
 
     Every machine takes its blocks in the order in which they stand in `order`. `lower_bound_s` is

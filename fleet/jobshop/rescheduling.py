@@ -1,4 +1,4 @@
-"""A schedule mended after a machine is lost or late, with few blocks changing hands.
+"""A schedule repaired after a machine is lost or late, with few blocks changing machines.
 
 Candidates: the old order gone through again for a range of targets, where everybody stays who does
 not stand in the way of the target; the orphans put where there is time; a schedule from scratch;
@@ -15,12 +15,12 @@ from math import inf
 
 from fleet.jobshop.annealing import anneal
 from fleet.jobshop.budget import Budget
-from fleet.jobshop.compiled import Compiled
-from fleet.jobshop.list_scheduling import Answer, construct
-from fleet.jobshop.portfolio import blocks_in_order
-from fleet.jobshop.problem import BadShop, Place, Shop, Timed
-from fleet.jobshop.timing import rate, timed
-from fleet.jobshop.warm_start import keep
+from fleet.jobshop.forward_pass import Solution, evaluate
+from fleet.jobshop.instance import Instance
+from fleet.jobshop.list_scheduling import list_schedule
+from fleet.jobshop.portfolio import schedule_in_order
+from fleet.jobshop.problem import BadShop, Position, Schedule, Shop
+from fleet.jobshop.warm_start import warm_start
 
 WITHIN = 0.02
 """Share of the best makespan that fewer moves may cost."""
@@ -28,21 +28,21 @@ PRICE = 0.002
 """Share of the makespan that one move costs while annealing: ten moves for `WITHIN`."""
 TARGETS = (1.0, 0.99, 0.98, 0.97, 0.995, 0.985, 0.975, 0.96, 0.95, 0.94)
 """Of the longest makespan that is allowed; tried one after the other."""
-TARGETS_SHARE, REPAIR_SHARE, SHORTEN_SHARE = 0.4, 0.5, 0.6
+TARGETS_SHARE, ORPHANS_SHARE, SHORTEN_SHARE = 0.4, 0.5, 0.6
 MORE_TARGETS_SHARE, TAKE_BACK_SHARE = 0.75, 0.85
-"""When each step is over, as a share of the time."""
+"""When each stage is over, as a share of the time."""
 TRIED = 4
 """Machines that are tried for an orphan: those that are done first."""
 
 
 @dataclass(frozen=True)
 class Rescheduled:
-    """The mended schedule; `moved` are blocks that are not where they were.
+    """The schedule as it is now; `moved` are blocks that are not where they were.
 
     `best_makespan_s` is the shortest found whatever it moves.
     """
 
-    timed: Timed
+    schedule: Schedule
     moved: tuple[int, ...]
     best_makespan_s: float
 
@@ -70,7 +70,7 @@ def reschedule(
     frozen: frozenset[int] = frozenset(),
     seed: int = 0,
 ) -> Rescheduled | None:
-    """Mend the schedule `home` (machine of each block) and `order` (of blocks) for the `shop` as
+    """Repair the schedule `home` (machine of each block) and `order` (of blocks) for the `shop` as
     it is now.
 
     Blocks whose home is not among their machines any more are orphans. Blocks in `frozen` are under
@@ -80,41 +80,34 @@ def reschedule(
     Raises:
         BadShop: a frozen block cannot be done by its machine.
     """
-    shop = _pinned(shop, home, frozen)
-    ready = Compiled(shop)
-    knots = _knots_in_order(ready, order)
-    first = [construct(ready), keep(ready, knots, home, inf)]
-    found = [answer for answer in first if answer is not None]
-    if not found and (repaired := _repair(ready, home, knots, budget)) is not None:
-        found.append(repaired)
-    if not found:
+    instance = Instance(_pinned(shop, home, frozen))
+    search = _Rescheduling(instance, home, _components_in_order(instance, order), frozen, seed)
+    if not search.begin(budget):
         return None
-    mending = _Mending(ready, home, knots, frozen, found, seed)
-    mending.keep_to_targets(budget.until(TARGETS_SHARE))
-    mending.repair(budget.until(REPAIR_SHARE))
-    mending.shorten(budget.until(SHORTEN_SHARE))
-    mending.keep_to_targets(budget.until(MORE_TARGETS_SHARE))
-    chosen = mending.move_less(budget.until(TAKE_BACK_SHARE), budget)
-    answer = timed(shop, blocks_in_order(ready, chosen), chosen.machine_of)
-    assert answer is not None, "an order of knots has no deadlock"
-    return Rescheduled(answer, tuple(_moved(chosen.machine_of, home)), mending.best_s)
+    search.keep_to_targets(budget.until(TARGETS_SHARE))
+    search.place_orphans(budget.until(ORPHANS_SHARE))
+    search.shorten(budget.until(SHORTEN_SHARE))
+    search.keep_to_targets(budget.until(MORE_TARGETS_SHARE))
+    chosen = search.move_less(budget.until(TAKE_BACK_SHARE), budget)
+    schedule = schedule_in_order(instance, chosen)
+    return Rescheduled(schedule, tuple(_moved(chosen.machine_of, home)), search.best_s)
 
 
-class _Mending:
+class _Rescheduling:
     """Everything found so far, and ways to find more."""
 
     def __init__(
         self,
-        shop: Compiled,
+        instance: Instance,
         home: Sequence[int],
-        knots: Sequence[int],
+        order: list[int],
         frozen: frozenset[int],
-        found: list[Answer],
         seed: int,
     ) -> None:
-        self.shop, self.home, self.knots, self.frozen = shop, home, knots, frozen
-        self.found, self.seed = found, seed
-        self.kept: list[Answer] = []
+        self.instance, self.home, self.order, self.frozen = instance, home, order, frozen
+        self.seed = seed
+        self.found: list[Solution] = []
+        self.kept: list[Solution] = []
         """Of those found, the ones that keep to a target."""
         self.targeted_s = 0.0
         """The limit that targets were last taken from."""
@@ -122,16 +115,24 @@ class _Mending:
     @property
     def best_s(self) -> float:
         """The shortest makespan found, whatever it moves."""
-        return min(answer.rated.makespan_s for answer in self.found)
+        return min(solution.makespan_s for solution in self.found)
 
     @property
     def limit_s(self) -> float:
         """The longest makespan that fewer moves may lead to."""
         return self.best_s * (1 + WITHIN)
 
+    def begin(self, budget: Budget) -> bool:
+        """From scratch, and with everybody at home who can be; whether there is any schedule."""
+        self._add(list_schedule(self.instance))
+        self._add(warm_start(self.instance, self.order, self.home, inf))
+        if not self.found:
+            self.place_orphans(budget)
+        return bool(self.found)
+
     def keep_to_targets(self, budget: Budget) -> None:
         """Everybody stays where the target can be met. That may miss it by a little, where there
-        are ways or partners, so that shorter ones are tried, too."""
+        is travel or are partners, so that shorter ones are tried, too."""
         tried = 0
         while tried < len(TARGETS):
             if self.met and budget.over:
@@ -143,7 +144,7 @@ class _Mending:
                 break
             target_s = TARGETS[tried] * self.targeted_s
             tried += 1
-            made = keep(self.shop, self.knots, self.home, target_s)
+            made = warm_start(self.instance, self.order, self.home, target_s)
             if made is not None:
                 self.found.append(made)
                 self.kept.append(made)
@@ -152,38 +153,38 @@ class _Mending:
     def met(self) -> bool:
         """Whether keeping to a target has led to a schedule that is short enough."""
         limit_s = self.limit_s
-        return any(answer.rated.makespan_s <= limit_s for answer in self.kept)
+        return any(solution.makespan_s <= limit_s for solution in self.kept)
 
-    def repair(self, budget: Budget) -> None:
+    def place_orphans(self, budget: Budget) -> None:
         """Only orphans move."""
-        made = _repair(self.shop, self.home, self.knots, budget)
-        if made is not None:
-            self.found.append(made)
+        self._add(_orphans_placed(self.instance, self.home, self.order, budget))
 
     def shorten(self, budget: Budget) -> None:
         """Search for a shorter schedule at any number of moves, from one that has few: what comes
         out of a new one would set a limit that only new ones meet."""
         begin = self.kept if self.met else self.found
-        shortest = min(begin, key=lambda answer: answer.rated.makespan_s)
-        self.found.append(anneal(self.shop, shortest, budget, 0.0, self.seed, frozen=self.frozen))
+        shortest = min(begin, key=lambda solution: solution.makespan_s)
+        self._add(anneal(self.instance, shortest, budget, 0.0, self.seed, frozen=self.frozen))
 
-    def move_less(self, take_back: Budget, budget: Budget) -> Answer:
-        """The answer with the fewest moves within the limit, and fewer if that can be."""
+    def move_less(self, take_back: Budget, budget: Budget) -> Solution:
+        """The solution with the fewest moves within the limit, and fewer if that can be."""
         chosen = self._chosen()
-        chosen = _taken_back(self.shop, chosen, self.home, self.limit_s, take_back)
+        chosen = _taken_back(self.instance, chosen, self.home, self.limit_s, take_back)
         self.found.append(chosen)
         price_s = PRICE * self.best_s
-        priced = anneal(
-            self.shop, chosen, budget, 0.0, self.seed + 1, price_s, self.home, self.frozen
-        )
-        self.found.append(priced)
+        seed = self.seed + 1
+        self._add(anneal(self.instance, chosen, budget, 0.0, seed, price_s, self.home, self.frozen))
         return self._chosen()
 
-    def _chosen(self) -> Answer:
+    def _add(self, solution: Solution | None) -> None:
+        if solution is not None:
+            self.found.append(solution)
+
+    def _chosen(self) -> Solution:
         limit_s = self.limit_s
         return min(
-            (answer for answer in self.found if answer.rated.makespan_s <= limit_s),
-            key=lambda a: (len(_moved(a.machine_of, self.home)), a.rated.makespan_s),
+            (solution for solution in self.found if solution.makespan_s <= limit_s),
+            key=lambda s: (len(_moved(s.machine_of, self.home)), s.makespan_s),
         )
 
 
@@ -192,10 +193,11 @@ def _pinned(shop: Shop, home: Sequence[int], frozen: frozenset[int]) -> Shop:
     for number in frozen:
         if home[number] not in blocks[number].machines:
             raise BadShop(f"block {number} is under way on a machine that cannot do it")
+        last = blocks[number].position == Position.LAST
         blocks[number] = replace(
             blocks[number],
             machines=(home[number],),
-            place=Place.LAST if blocks[number].place == Place.LAST else Place.FIRST,
+            position=Position.LAST if last else Position.FIRST,
         )
     return replace(shop, blocks=tuple(blocks))
 
@@ -204,65 +206,64 @@ def _moved(machine_of: Sequence[int], home: Sequence[int]) -> list[int]:
     return [b for b, (now, was) in enumerate(zip(machine_of, home, strict=True)) if now != was]
 
 
-def _repair(
-    shop: Compiled, home: Sequence[int], knots: Sequence[int], budget: Budget
-) -> Answer | None:
+def _orphans_placed(
+    instance: Instance, home: Sequence[int], order: list[int], budget: Budget
+) -> Solution | None:
     """Everything stays but the orphans, the one of highest rank first; they go where there is least
     to do, and while there is time, where the makespan is least."""
-    blocks = shop.shop.blocks
+    blocks = instance.shop.blocks
     machine_of = list(home)
     orphans = [b for b, block in enumerate(blocks) if home[b] not in block.machines]
-    orphans.sort(key=lambda b: -shop.knot_rank[shop.knot_of[b]])
-    busy = [machine.ready_s for machine in shop.shop.machines]
+    orphans.sort(key=lambda b: -instance.component_rank_s[instance.component_of[b]])
+    busy_s = [machine.ready_s for machine in instance.shop.machines]
     for block, machine in enumerate(home):
         if machine in blocks[block].machines:
-            busy[machine] += _length_s(shop, block, machine)
+            busy_s[machine] += instance.length_s(block, machine)
     for block in orphans:
-        machine_of[block] = min(blocks[block].machines, key=busy.__getitem__)
-        busy[machine_of[block]] += _length_s(shop, block, machine_of[block])
-    best = rate(shop, knots, machine_of)
+        machine_of[block] = min(blocks[block].machines, key=busy_s.__getitem__)
+        busy_s[machine_of[block]] += instance.length_s(block, machine_of[block])
+    best = evaluate(instance, order, machine_of)
     for block in orphans:
         if budget.over:
             break
         now = machine_of[block]
-        for machine in sorted(blocks[block].machines, key=busy.__getitem__)[:TRIED]:
+        for machine in sorted(blocks[block].machines, key=busy_s.__getitem__)[:TRIED]:
             if any(machine_of[other] == machine for other in blocks[block].apart):
                 continue
             machine_of[block] = machine
-            found = rate(shop, knots, machine_of, best.cost if best else inf)
+            found = evaluate(instance, order, machine_of, best.cost if best else inf)
             if found is not None and (best is None or found.cost < best.cost):
-                length_s = _length_s(shop, block, machine)
-                busy[now] -= length_s
-                busy[machine] += length_s
+                length_s = instance.length_s(block, machine)
+                busy_s[now] -= length_s
+                busy_s[machine] += length_s
                 best, now = found, machine
         machine_of[block] = now
     apart = any(machine_of[o] == machine_of[b] for b, row in enumerate(blocks) for o in row.apart)
-    return None if best is None or apart else Answer(list(knots), machine_of, best)
+    return None if best is None or apart else best._replace(machine_of=machine_of)
 
 
-def _length_s(shop: Compiled, block: int, machine: int) -> float:
-    own = shop.own_s[block]
-    return own[shop.kinds[machine]] if own else 0.0
-
-
-def _knots_in_order(shop: Compiled, order: Sequence[int]) -> list[int]:
-    """Knots in the order in which the last of their blocks begins, mended where something that
-    comes before stands behind; blocks that must be first come first, the others' order stays."""
+def _components_in_order(instance: Instance, order: Sequence[int]) -> list[int]:
+    """Components in the order in which the last of their blocks begins, repaired where something
+    that comes before stands behind; blocks that must be first come first, the others' order stays.
+    """
     at = {block: i for i, block in enumerate(order)}
     key = {
-        knot: (shop.knot_place[knot] != Place.FIRST, max(at.get(b, len(at)) for b in blocks))
-        for knot, blocks in enumerate(shop.knot_blocks)
+        component: (
+            instance.component_position[component] != Position.FIRST,
+            max(at.get(b, len(at)) for b in blocks),
+        )
+        for component, blocks in enumerate(instance.component_blocks)
     }
     done: set[int] = set()
     result: list[int] = []
-    for knot in sorted(key, key=key.__getitem__):
-        stack = [knot]
+    for component in sorted(key, key=key.__getitem__):
+        stack = [component]
         while stack:
             top = stack[-1]
             if top in done:
                 stack.pop()
                 continue
-            waits = [k for k in shop.knot_befores[top] if k not in done]
+            waits = [k for k in instance.component_predecessors[top] if k not in done]
             if waits:
                 stack.extend(waits)
             else:
@@ -272,23 +273,21 @@ def _knots_in_order(shop: Compiled, order: Sequence[int]) -> list[int]:
 
 
 def _taken_back(
-    shop: Compiled, answer: Answer, home: Sequence[int], limit_s: float, budget: Budget
-) -> Answer:
+    instance: Instance, begin: Solution, home: Sequence[int], limit_s: float, budget: Budget
+) -> Solution:
     """Moves undone one by one, as long as the makespan stays within the limit."""
-    machine_of, rated = list(answer.machine_of), answer.rated
-    for block in _moved(machine_of, home):
-        row = shop.shop.blocks[block]
+    best = begin
+    for block in _moved(begin.machine_of, home):
+        row = instance.shop.blocks[block]
         if budget.over:
             break
         if home[block] not in row.machines or any(
-            machine_of[other] == home[block] for other in row.apart
+            best.machine_of[other] == home[block] for other in row.apart
         ):
             continue
-        now = machine_of[block]
+        machine_of = [*best.machine_of]
         machine_of[block] = home[block]
-        found = rate(shop, answer.order, machine_of)
-        if found is None or found.makespan_s > limit_s:
-            machine_of[block] = now
-        else:
-            rated = found
-    return Answer(answer.order, machine_of, rated)
+        found = evaluate(instance, best.order, machine_of)
+        if found is not None and found.makespan_s <= limit_s:
+            best = found
+    return best

@@ -5,8 +5,8 @@ that exist. Every word must be used by the grammar; what is not understood is re
 sentence that says which words those are and what is known. `docs/language.md` has the grammar.
 """
 
-from fleet.language.goals import Reading, goal_conditions, read_goal
-from fleet.language.statements import statement_facts
-from fleet.language.vocabulary import Vocabulary
+from fleet.language.goals.parser import Reading, read_goal
+from fleet.language.statements.parser import statement_facts
+from fleet.language.vocabulary import SkillPhrase, Vocabulary
 
-__all__ = ["Reading", "Vocabulary", "goal_conditions", "read_goal", "statement_facts"]
+__all__ = ["Reading", "SkillPhrase", "Vocabulary", "read_goal", "statement_facts"]

@@ -15,12 +15,12 @@ from keyexpr_schema.payloads.world import Object, Place
 class SkillPhrase(msgspec.Struct, frozen=True, kw_only=True):
     """A skill that can be asked for by name: "vacuum the hallway".
 
-    `sort` is what it is done to, `object` or `place`; `wants` are the relations and values that
-    hold of it then.
+    `type`, `object` or `place`, is that of what it is done to; `wants` are the relations and values
+    that hold of it then.
     """
 
     verb: str
-    sort: str
+    type: str = msgspec.field(name="sort")
     wants: tuple[tuple[str, Value], ...]
 
 

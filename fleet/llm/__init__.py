@@ -5,10 +5,10 @@ from fleet.llm.budget import Budget
 from fleet.llm.client import ModelClient
 from fleet.llm.configuration import LlmConfig, load_llm_config
 from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
-from fleet.llm.structured_output import Answer, read_answer, schema_of
+from fleet.llm.structured_output import StructuredAnswer, read_answer, schema_of
 
 __all__ = [
-    "Answer",
+    "StructuredAnswer",
     "BadLlmConfig",
     "Budget",
     "GivenUp",

@@ -18,7 +18,7 @@ MAX_STARTS = 50
 T = TypeVar("T")
 
 
-class Answer(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class StructuredAnswer(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Base of what a model may say: a field that is not asked for is an error."""
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from fleet.core import events
-from fleet.core.events import Event
+from fleet.core.events import At, Event
 from fleet.core.state import State
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import (
@@ -23,9 +23,6 @@ from keyexpr_schema.keyspace import (
     STATEMENT,
 )
 from keyexpr_schema.transport.watch import Change
-
-At = Mapping[str, Any]
-"""`time_s` and `wall_time_s` of an event."""
 
 _PUT: dict[str, Callable[[Any, At], Event]] = {
     GOAL_SPEC.name: lambda v, at: events.GoalPut(goal=v, **at),

@@ -1,4 +1,4 @@
-"""The planner's shell: keys become events, events go through the core, effects are carried out."""
+"""The planner service: keys become events, events go through the core, effects are carried out."""
 
 from __future__ import annotations
 
@@ -16,29 +16,23 @@ from fleet.core import events
 from fleet.core.dispatch.delays import SAME_CLOCK_S
 from fleet.core.dispatch.dispatcher import next_timer
 from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, effects_of
-from fleet.core.events import Event
+from fleet.core.events import At, Event
 from fleet.core.model.skill_phrases import phrases_of
-from fleet.core.state import PlanningJob, Policy, State
+from fleet.core.plan_entry import PlanningJob
+from fleet.core.state import Policy, State
 from fleet.core.step import replay, step
 from fleet.errors import Superseded
+from fleet.service.catch_up import prior_state, stale_documents, until_synced
 from fleet.service.composition import Composition
 from fleet.service.event_journal import EventJournal
-from fleet.service.event_translation import WATCHED, At, event_of, missed_deletions
+from fleet.service.event_translation import WATCHED, event_of, missed_deletions
 from fleet.service.outbox import Outbox
-from fleet.service.planning_job import carry_out
-from keyexpr_schema.key import Key
+from fleet.service.planning_job import run_planning_job
 from keyexpr_schema.keyspace import (
-    ANSWER,
-    DURATIONS,
-    GOAL_STATUS,
-    ORDER,
-    PLAN_SPEC,
-    PLAN_STATUS,
     PLANNER_ALIVE,
     PLANNER_STATUS,
     ROBOT_ALIVE,
     SIM_CLOCK,
-    TASK_RECORD,
 )
 from keyexpr_schema.payloads.service import PlannerAddress, PlannerAliveAddress, PlannerStatus
 from keyexpr_schema.transport.session import Session, TokenWatch, Watch
@@ -53,17 +47,18 @@ class PlannerService:
         self,
         session: Session,
         journal: EventJournal,
-        parts: Composition,
+        composition: Composition,
         policy: Policy | None = None,
     ) -> None:
         self._session = session
         self._journal = journal
-        self._parts = parts
-        self._interpreter = parts.interpreter
+        self._composition = composition
+        self._skills = composition.skills
+        self._interpreter = composition.interpreter
         self._policy = replace(
             policy or Policy(),
             interpreter=self._interpreter.configured,
-            skill_phrases=phrases_of(parts.skills),
+            skill_phrases=phrases_of(composition.skills),
         )
         self._incarnation = uuid.uuid4().hex[:12]
         self._state = State()
@@ -87,7 +82,7 @@ class PlannerService:
         """
         number, snapshot = self._journal.snapshot()
         first_run = self._journal.empty
-        self._state = replay(self._journal.events(number), self._parts.skills, snapshot)
+        self._state = replay(self._journal.events(number), self._skills, snapshot)
         async with AsyncExitStack() as stack:
             watch = await stack.enter_async_context(
                 self._session.watch(*WATCHED, SIM_CLOCK, PLANNER_STATUS)
@@ -95,22 +90,22 @@ class PlannerService:
             tokens = await stack.enter_async_context(self._session.watch_tokens(ROBOT_ALIVE))
             await stack.enter_async_context(self._outbox.running())
             if first_run:
-                await self._take_over()
+                self._apply(await prior_state(self._session, self._at()))
             await self._take_charge()
             await stack.enter_async_context(
                 self._session.token(PLANNER_ALIVE, PlannerAliveAddress(self._incarnation))
             )
             await self._catch_up(watch, tokens)
-            leftovers = await self._leftovers()
-            self._speak()
-            self._carry_out(leftovers)
+            stale = await stale_documents(self._session, self._state)
+            self._go_live()
+            self._carry_out(stale)
             if ready is not None:
                 ready.set()
             try:
                 async with asyncio.TaskGroup() as tasks:
                     tasks.create_task(self._listen(watch))
-                    tasks.create_task(self._count_robots(tokens))
-                    tasks.create_task(self._work())
+                    tasks.create_task(self._watch_workers(tokens))
+                    tasks.create_task(self._take_events())
             except* Superseded as group:
                 raise group.exceptions[0] from None
             finally:
@@ -122,23 +117,6 @@ class PlannerService:
         if abs(now_s - self._time_s) < SAME_CLOCK_S:
             self._time_s = now_s  # no simulation: the fleet's clock goes on without messages, too
         return {"time_s": self._time_s, "wall_time_s": now_s}
-
-    async def _take_over(self) -> None:
-        """Without a journal: what an earlier planner answered and ended is not done again, and what
-        it learned is not forgotten."""
-        answers = await self._session.list(ANSWER)
-        goals = await self._session.list(GOAL_STATUS)
-        plans = await self._session.list(PLAN_STATUS)
-        durations = await self._session.list(DURATIONS)
-        self._apply(
-            events.PriorStateLoaded(
-                answers=tuple(answers.values()),
-                goals=tuple(goals.values()),
-                plans=tuple(address.plan for address in plans),
-                durations=tuple(durations.values()),
-                **self._at(),
-            )
-        )
 
     async def _take_charge(self) -> None:
         # Listed, not got: a value there that is none must not keep the planner from starting.
@@ -155,29 +133,28 @@ class PlannerService:
             PlannerStatus(
                 epoch=epoch,
                 incarnation=self._incarnation,
-                planners=tuple(self._parts.planners),
-                strategies=self._parts.strategies,
-                allocators=tuple(self._parts.allocators),
-                skills=tuple(self._parts.skills),
+                planners=tuple(self._composition.planners),
+                strategies=self._composition.strategies,
+                allocators=tuple(self._composition.allocators),
+                skills=tuple(self._skills),
             ),
             timeout_s=3600.0,
         )
 
     async def _catch_up(self, watch: Watch, tokens: TokenWatch[Any]) -> None:
-        """Take in everything stored, and what went away while no planner was there."""
+        """Hear of everything stored, and of what went away while no planner was there."""
         seen: set[str] = set()
-        synced = asyncio.ensure_future(watch.synced())
-        async for change in _until(watch, synced):
+        async for change in until_synced(watch):
             seen.add(change.key.build(change.address))
-            self._take_in(change)
+            self._on_change(change)
         for event in missed_deletions(self._state, seen, self._at()):
             self._apply(event)
         here: set[tuple[str, str]] = set()
-        async for token in _until(tokens, asyncio.ensure_future(tokens.synced())):
-            self._token(token)
+        async for token in until_synced(tokens):
+            self._on_token(token)
             if token.alive:
                 here.add((token.address.robot, token.address.incarnation))
-        for robot, runs in self._state.alive.items():
+        for robot, runs in self._state.connected.items():
             for run in runs:
                 if (robot, run) not in here:
                     self._apply(
@@ -187,7 +164,7 @@ class PlannerService:
         while not self._inbox.empty():
             self._apply(self._inbox.get_nowait())
 
-    def _speak(self) -> None:
+    def _go_live(self) -> None:
         """From now on effects are carried out; those of the catching up all at once.
 
         Until here nothing was ordered, since a report that is not read yet could forbid it.
@@ -196,40 +173,11 @@ class PlannerService:
         self._held = None
         self._carry_out((*held, *effects_of(self._state)))
 
-    async def _leftovers(self) -> list[Retract]:
-        """Documents of ours in the store that the state does not have.
-
-        A planner that was killed between its journal and a deletion leaves such; one that lost
-        its journal leaves its orders, which nobody would ever follow up.
-        """
-        wanted = {
-            effect.key.build(effect.address)
-            for effect in effects_of(self._state)
-            if isinstance(effect, Publish)
-        }
-        ours: tuple[Key[Any, Any], ...] = (
-            ORDER,
-            TASK_RECORD,
-            PLAN_SPEC,
-            PLAN_STATUS,
-            GOAL_STATUS,
-        )
-        return [
-            Retract(key, address)
-            for key in ours
-            for address in await self._session.list(key, timeout_s=60.0)
-            if key.build(address) not in wanted
-            and getattr(address, "plan", None) not in self._past_plans(key)
-        ]
-
-    def _past_plans(self, key: Key[Any, Any]) -> tuple[str, ...]:
-        return () if key is ORDER else self._state.past_plans
-
     async def _listen(self, watch: Watch) -> None:
         async for change in watch:
-            self._take_in(change)
+            self._on_change(change)
 
-    def _take_in(self, change: Any) -> None:
+    def _on_change(self, change: Any) -> None:
         if change.key is SIM_CLOCK:
             self._time_s = change.value.time_s
         elif change.key is PLANNER_STATUS:
@@ -243,16 +191,16 @@ class PlannerService:
             self._time_s = max(self._time_s, _report_time_s(event))
             self._inbox.put_nowait(event)
 
-    async def _count_robots(self, tokens: TokenWatch[Any]) -> None:
+    async def _watch_workers(self, tokens: TokenWatch[Any]) -> None:
         async for token in tokens:
-            self._token(token)
+            self._on_token(token)
 
-    def _token(self, token: Any) -> None:
+    def _on_token(self, token: Any) -> None:
         kind = events.WorkerConnected if token.alive else events.WorkerDisconnected
         robot, incarnation = token.address.robot, token.address.incarnation
         self._inbox.put_nowait(kind(robot=robot, incarnation=incarnation, **self._at()))
 
-    async def _work(self) -> None:
+    async def _take_events(self) -> None:
         """Take events one after the other; wake up when a timer of the state runs out."""
         while True:
             timer = next_timer(self._state)
@@ -264,7 +212,7 @@ class PlannerService:
             self._apply(event)
 
     def _apply(self, event: Event) -> None:
-        state, effects = step(self._state, event, self._parts.skills)
+        state, effects = step(self._state, event, self._skills)
         if state is self._state:
             return
         self._journal.append(event, state)
@@ -278,11 +226,11 @@ class PlannerService:
         self._outbox.send(e for e in effects if isinstance(e, Publish | Retract))
         for effect in effects:
             if isinstance(effect, MakePlan):
-                self._at_the_desk(self._make_plan(effect.job))
+                self._in_background(self._make_plan(effect.job))
             elif isinstance(effect, Interpret):
-                self._at_the_desk(self._interpret(effect))
+                self._in_background(self._interpret(effect))
 
-    def _at_the_desk(self, work: Coroutine[Any, Any, None]) -> None:
+    def _in_background(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.create_task(work)
         self._planning.add(task)
         task.add_done_callback(self._planning.discard)
@@ -290,7 +238,9 @@ class PlannerService:
     async def _make_plan(self, job: PlanningJob) -> None:
         at = self._at()
         try:
-            event: Event = await asyncio.to_thread(carry_out, job, self._state, self._parts, at)
+            event: Event = await asyncio.to_thread(
+                run_planning_job, job, self._state, self._composition, at
+            )
         except Exception as error:
             log.exception("planning job %d", job.job)
             event = events.PlanningFailed(
@@ -299,28 +249,13 @@ class PlannerService:
         self._inbox.put_nowait(event)
 
     async def _interpret(self, effect: Interpret) -> None:
-        words = self._state.vocabulary()
-        read = await asyncio.to_thread(self._interpreter.interpret, effect.text, words)
-        said: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
-        self._inbox.put_nowait(events.GoalInterpreted(goal=effect.goal, **said, **self._at()))
+        vocabulary = self._state.vocabulary()
+        read = await asyncio.to_thread(self._interpreter.interpret, effect.text, vocabulary)
+        meaning: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
+        self._inbox.put_nowait(events.GoalInterpreted(goal=effect.goal, **meaning, **self._at()))
 
 
 def _report_time_s(event: Event) -> float:
     if isinstance(event, events.ReportReceived):
         return event.report.ended_s or event.report.started_s or 0.0
     return 0.0
-
-
-async def _until(iterator: Any, done: asyncio.Future[None]) -> Any:
-    """Items of an async iterator until `done` is done and nothing more lies ready."""
-    while True:
-        item = asyncio.ensure_future(anext(iterator))
-        await asyncio.wait((item, done), return_when=asyncio.FIRST_COMPLETED)
-        if not item.done():
-            # One more turn of the loop: what lay ready when `done` came is still taken.
-            await asyncio.sleep(0)
-            if not item.done():
-                item.cancel()
-                await asyncio.gather(item, return_exceptions=True)
-                return
-        yield item.result()

@@ -37,8 +37,8 @@ def run(
         level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(name)s: %(message)s"
     )
     try:
-        parts = compose(skill_files, llm_file)
-        asyncio.run(_run(endpoints, realm, data_dir, parts, policy))
+        composition = compose(skill_files, llm_file)
+        asyncio.run(_run(endpoints, realm, data_dir, composition, policy))
     except (FleetError, SchemaError) as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201
         raise SystemExit(1) from None
@@ -48,7 +48,7 @@ async def _run(
     endpoints: tuple[str, ...],
     realm: str,
     data_dir: Path,
-    parts: Composition,
+    composition: Composition,
     policy: Policy | None,
 ) -> None:
     config = SessionConfig(
@@ -59,14 +59,14 @@ async def _run(
         async with open_session(config) as session:
             ready = asyncio.Event()
             service = asyncio.create_task(
-                PlannerService(session, journal, parts, policy).run(ready)
+                PlannerService(session, journal, composition, policy).run(ready)
             )
             for number in (signal.SIGTERM, signal.SIGINT):
                 loop.add_signal_handler(number, service.cancel)
             waiting = asyncio.create_task(ready.wait())
             await asyncio.wait((service, waiting), return_when=asyncio.FIRST_COMPLETED)
             waiting.cancel()
-            warming = asyncio.create_task(asyncio.to_thread(parts.language_model.warm))
+            warming = asyncio.create_task(asyncio.to_thread(composition.language_model.warm))
             if ready.is_set():
                 print(f"planner ready in realm {realm}", flush=True)  # noqa: T201
             try:
@@ -75,5 +75,5 @@ async def _run(
                 return
             finally:
                 # Ends calls to a model that are under way, so that no thread keeps the process.
-                parts.language_model.close()
+                composition.language_model.close()
                 warming.cancel()

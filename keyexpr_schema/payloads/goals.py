@@ -69,6 +69,7 @@ class GoalState(str, Enum):
 
 
 ENDED_GOALS = frozenset({GoalState.REACHED, GoalState.FAILED, GoalState.REJECTED})
+"""States that a goal does not leave."""
 
 
 class GoalStatus(Payload, frozen=True, kw_only=True):

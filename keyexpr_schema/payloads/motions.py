@@ -13,6 +13,7 @@ from keyexpr_schema.key import Payload
 from keyexpr_schema.payloads.robots import PoseMRad
 
 PointM = tuple[float, float, float]
+"""`(x, y, z)` [m], world frame."""
 
 
 class MotionKind(str, Enum):

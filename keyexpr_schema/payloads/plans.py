@@ -103,6 +103,7 @@ class PlanState(str, Enum):
 ENDED_PLANS = frozenset(
     {PlanState.SUCCEEDED, PlanState.FAILED, PlanState.REJECTED, PlanState.CANCELLED}
 )
+"""States that a plan does not leave."""
 
 
 class Violation(Payload, frozen=True, kw_only=True):

@@ -8,6 +8,7 @@ from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
 
 PoseMRad = tuple[float, float, float]
+"""`(x [m], y [m], yaw [rad])`, world frame."""
 
 
 class RobotAddress(Address, frozen=True):

@@ -13,6 +13,7 @@ from keyexpr_schema.key import Address, Payload
 from keyexpr_schema.payloads.motions import Motion, PointM
 
 QuaternionWxyz = tuple[float, float, float, float]
+"""An orientation, `(w, x, y, z)`."""
 
 
 class SimAddress(Address, frozen=True):

@@ -45,6 +45,7 @@ class TaskState(str, Enum):
 
 
 ENDED_TASKS = frozenset({TaskState.SUCCEEDED, TaskState.FAILED, TaskState.CANCELLED})
+"""States that a task does not leave."""
 
 
 class Try(Payload, frozen=True, kw_only=True):
@@ -116,6 +117,7 @@ class ReportState(str, Enum):
 
 
 FINAL_REPORTS = frozenset(ReportState) - {ReportState.STARTED}
+"""States after which nothing more is reported of an attempt."""
 
 
 class Report(Payload, frozen=True, kw_only=True):

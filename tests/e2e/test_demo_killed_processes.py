@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from cli.demo.mission_run import Demo, DemoOptions, running
+from cli.demo.bring_up import DemoOptions
+from cli.demo.mission_run import Demo, running_demo
 from cli.demo.summary import Summary
 from keyexpr_schema.errors import ForeignKey
 from keyexpr_schema.keyspace import REPORT, STORE_JOURNAL
@@ -36,23 +37,23 @@ async def mission_with_a_death(
     """Kill `victim` while `robot` carries out `skill`, start it again, and see it through."""
     speed = "max" if backend == "mujoco" else "10"
     options = DemoOptions(mission=mission, out=out, backend=backend, speed=speed, timeout_s=150.0)
-    async with running(options) as demo:
+    async with running_demo(options) as demo:
 
         def busy() -> bool:
             return any(
                 (record.state, record.skill, record.robot) == (TaskState.RUNNING, skill, robot)
-                for record in demo.board.tasks.values()
+                for record in demo.view.tasks.values()
             )
 
         async def play() -> tuple[Summary, Reports]:
-            await demo.give()
-            await demo.board.until(busy, 60.0, f"{robot} to {skill}")
-            await demo.fleet.kill(victim)
-            await demo.fleet.start(victim)
-            await demo.ended()
-            return await demo.judged(), await all_reports(demo)
+            await demo.submit()
+            await demo.view.until(busy, 60.0, f"{robot} to {skill}")
+            await demo.processes.kill(victim)
+            await demo.processes.start(victim)
+            await demo.wait_until_ended()
+            return await demo.verify(), await all_reports(demo)
 
-        return await demo.fleet.guard(play())
+        return await demo.processes.guard(play())
 
 
 async def all_reports(demo: Demo) -> Reports:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, Vocabulary, read_goal, statement_facts
-from fleet.language.tokens import words_in
+from fleet.language.words.tokens import words_in
 from keyexpr_schema.payloads.world import Object, Place
 from tests.household import carrier, manipulator
 from tests.language_house import WORDS as NAMES

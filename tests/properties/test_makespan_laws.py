@@ -7,27 +7,24 @@ from itertools import permutations, product
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
-from scipy.optimize import linear_sum_assignment
 
-from fleet.jobshop.bounds import bound_with_ways, lower_bound
-from fleet.jobshop.branch_and_bound import exhaust
+from fleet.jobshop.bounds import bound_with_travel, lower_bound
+from fleet.jobshop.branch_and_bound import branch_and_bound
 from fleet.jobshop.budget import Budget, StepClock
-from fleet.jobshop.compiled import Compiled
-from fleet.jobshop.cpsat import installed
+from fleet.jobshop.cpsat import helps, installed, request_of
 from fleet.jobshop.cpsat_process import Model
-from fleet.jobshop.cpsat_request import helps, request_of
-from fleet.jobshop.graphs import cheapest_assignment
-from fleet.jobshop.list_scheduling import construct
-from fleet.jobshop.portfolio import blocks_in_order, solve
-from fleet.jobshop.problem import BadShop, Block, Machine, Operation, Place, Shop, Timed
+from fleet.jobshop.forward_pass import schedule_of
+from fleet.jobshop.instance import Instance
+from fleet.jobshop.list_scheduling import list_schedule
+from fleet.jobshop.portfolio import schedule_in_order, solve
+from fleet.jobshop.problem import BadShop, Block, Machine, Operation, Position, Schedule, Shop
 from fleet.jobshop.rescheduling import WITHIN, reschedule, without_machines
-from fleet.jobshop.timing import timed
-from fleet.jobshop.warm_start import keep
+from fleet.jobshop.warm_start import warm_start
 
 NEAR = 1e-6
 TWO_THAT_MUST_BE_FIRST = Shop(
     (Operation((0,), (1.0,)), Operation((1, 0), (1.0,)), Operation((2,), (1.0,))),
-    (Block((0, 1), (1,)), Block((1,), (0,), Place.FIRST), Block((2,), (0,), Place.FIRST)),
+    (Block((0, 1), (1,)), Block((1,), (0,), Position.FIRST), Block((2,), (0,), Position.FIRST)),
     (Machine(), Machine(), Machine()),
 )
 SITES = 3
@@ -74,7 +71,7 @@ def shops(draw: st.DrawFn, most_blocks: int = 4) -> Shop:
             )
             for one in with_:
                 members[one].append(here)
-    places = st.sampled_from([Place.ANYWHERE] * 5 + [Place.FIRST, Place.LAST])
+    places = st.sampled_from([Position.ANYWHERE] * 5 + [Position.FIRST, Position.LAST])
     blocks = tuple(
         Block(tuple(ops), rows, draw(places)) for ops, rows in zip(members, able, strict=True)
     )
@@ -90,7 +87,7 @@ def steps(seconds: float) -> Budget:
     return Budget(seconds, StepClock())
 
 
-def wrong(shop: Shop, found: Timed) -> str | None:
+def wrong(shop: Shop, found: Schedule) -> str | None:
     """What is not right about a schedule, told without the code that made it."""
     for number, block in enumerate(shop.blocks):
         if found.machine_of[number] not in block.machines:
@@ -105,12 +102,12 @@ def wrong(shop: Shop, found: Timed) -> str | None:
             return f"operation {number} starts too early"
     for machine, row in enumerate(shop.machines):
         mine = [b for b in found.order if found.machine_of[b] == machine]
-        free_s, site, place = row.ready_s, row.site, Place.FIRST
+        free_s, site, place = row.ready_s, row.site, Position.FIRST
         for block in mine:
             operations = shop.blocks[block].operations
-            if place == Place.LAST or shop.blocks[block].place < place:
+            if place == Position.LAST or shop.blocks[block].position < place:
                 return f"block {block} stands in the wrong place"
-            place = shop.blocks[block].place
+            place = shop.blocks[block].position
             if found.start_s[operations[0]] < free_s - NEAR:
                 return f"machine {machine} is in two places"
             for number in operations:
@@ -127,10 +124,10 @@ def wrong(shop: Shop, found: Timed) -> str | None:
     return None
 
 
-def every_schedule(shop: Shop) -> list[Timed]:
+def every_schedule(shop: Shop) -> list[Schedule]:
     """All that are right, machine by machine and order by order."""
     tried = (
-        timed(shop, order, machine_of)
+        schedule_of(shop, order, machine_of)
         for machine_of in product(*(block.machines for block in shop.blocks))
         for order in permutations(range(len(shop.blocks)))
     )
@@ -140,7 +137,7 @@ def every_schedule(shop: Shop) -> list[Timed]:
 def sound(shop: Shop) -> bool:
     """Whether operations do not wait for each other in a circle."""
     try:
-        Compiled(shop)
+        Instance(shop)
     except BadShop:
         return False
     return True
@@ -150,7 +147,7 @@ def sound(shop: Shop) -> bool:
 @given(shops())
 def test_schedules_are_right_and_bounds_hold(shop: Shop) -> None:
     assume(sound(shop))
-    ready = Compiled(shop)
+    ready = Instance(shop)
     found = solve(shop, steps(0.02), exact=False)
     everything = every_schedule(shop)
     if found is None:
@@ -158,20 +155,20 @@ def test_schedules_are_right_and_bounds_hold(shop: Shop) -> None:
     assert wrong(shop, found) is None
     least_s = min(one.makespan_s for one in everything)
     assert lower_bound(ready) <= least_s + NEAR
-    assert bound_with_ways(ready) <= least_s + NEAR
+    assert bound_with_travel(ready) <= least_s + NEAR
     assert found.lower_bound_s <= least_s + NEAR
     assert least_s <= found.makespan_s + NEAR
-    listed = construct(ready)
-    assert listed is None or found.makespan_s <= listed.rated.makespan_s + NEAR
+    listed = list_schedule(ready)
+    assert listed is None or found.makespan_s <= listed.makespan_s + NEAR
 
 
 @settings(max_examples=100, deadline=None)
 @given(shops())
 def test_where_blocks_are_free_and_alone_there_is_always_an_answer(shop: Shop) -> None:
     assume(sound(shop) and all(len(o.blocks) == 1 for o in shop.operations))
-    assume(all(block.place == Place.ANYWHERE for block in shop.blocks))
-    ready = Compiled(shop)
-    assume(all(len(together) == 1 for together in ready.knot_blocks))
+    assume(all(block.position == Position.ANYWHERE for block in shop.blocks))
+    ready = Instance(shop)
+    assume(all(len(together) == 1 for together in ready.component_blocks))
     assert solve(shop, steps(0.0), exact=False) is not None
 
 
@@ -179,17 +176,16 @@ def test_where_blocks_are_free_and_alone_there_is_always_an_answer(shop: Shop) -
 @given(shops(most_blocks=4))
 def test_what_looked_at_every_schedule_is_as_short_as_brute_force(shop: Shop) -> None:
     assume(sound(shop))
-    ready = Compiled(shop)
-    begin = construct(ready)
+    ready = Instance(shop)
+    begin = list_schedule(ready)
     assume(begin is not None)
     assert begin is not None
-    found = exhaust(ready, begin)
+    found = branch_and_bound(ready, begin)
     if found is None:
         return
-    order = blocks_in_order(ready, found.answer)
-    made = timed(shop, order, found.answer.machine_of)
-    assert made is not None and wrong(shop, made) is None
-    assert made.makespan_s <= begin.rated.makespan_s + NEAR
+    made = schedule_in_order(ready, found.solution)
+    assert wrong(shop, made) is None
+    assert made.makespan_s <= begin.makespan_s + NEAR
     if found.proven:
         least_s = min(one.makespan_s for one in every_schedule(shop))
         assert abs(made.makespan_s - least_s) <= NEAR
@@ -199,7 +195,7 @@ def test_what_looked_at_every_schedule_is_as_short_as_brute_force(shop: Shop) ->
 @given(shops(most_blocks=3))
 def test_cp_sat_agrees_with_brute_force(shop: Shop) -> None:
     assume(sound(shop) and solve(shop, steps(0.0), exact=False) is not None)
-    found = solve(shop, Budget(NEVER_S) if helps(Compiled(shop)) else steps(0.05))
+    found = solve(shop, Budget(NEVER_S) if helps(Instance(shop)) else steps(0.05))
     assert found is not None
     assert wrong(shop, found) is None
     least_s = min(one.makespan_s for one in every_schedule(shop))
@@ -217,8 +213,8 @@ def test_the_model_of_cp_sat_has_the_optimum_of_brute_force(shop: Shop) -> None:
     from ortools.sat.python import cp_model
 
     assume(sound(shop))
-    ready = Compiled(shop)
-    hint = construct(ready)
+    ready = Instance(shop)
+    hint = list_schedule(ready)
     if hint is None or not helps(ready):
         return
     data = request_of(ready, hint, lower_bound(ready), until_s=0.0, seed=0)
@@ -237,14 +233,14 @@ def test_the_model_of_cp_sat_has_the_optimum_of_brute_force(shop: Shop) -> None:
 def test_who_can_stay_stays(shop: Shop) -> None:
     """With no machine gone and the old makespan as the target nobody moves, and nothing is late."""
     assume(sound(shop))
-    ready = Compiled(shop)
-    listed = construct(ready)
+    ready = Instance(shop)
+    listed = list_schedule(ready)
     assume(listed is not None)
     assert listed is not None
-    again = keep(ready, listed.order, listed.machine_of, listed.rated.makespan_s)
+    again = warm_start(ready, listed.order, listed.machine_of, listed.makespan_s)
     assert again is not None
     assert again.machine_of == listed.machine_of
-    assert again.rated.makespan_s <= listed.rated.makespan_s + NEAR
+    assert again.makespan_s <= listed.makespan_s + NEAR
 
 
 @settings(max_examples=60, deadline=None)
@@ -262,28 +258,10 @@ def test_a_mended_schedule_is_right_and_moves_little(shop: Shop, data: st.DataOb
     found = reschedule(left, planned.machine_of, planned.order, steps(0.03))
     if found is None:
         return
-    assert wrong(left, found.timed) is None
+    assert wrong(left, found.schedule) is None
     orphans = {b for b, machine in enumerate(planned.machine_of) if machine == lost}
     assert orphans <= set(found.moved)
-    assert found.timed.makespan_s <= found.best_makespan_s * (1 + WITHIN) + NEAR
+    assert found.schedule.makespan_s <= found.best_makespan_s * (1 + WITHIN) + NEAR
     assert set(found.moved) == {
-        b for b, m in enumerate(found.timed.machine_of) if m != planned.machine_of[b]
+        b for b, m in enumerate(found.schedule.machine_of) if m != planned.machine_of[b]
     }
-
-
-@settings(max_examples=200, deadline=None)
-@given(
-    st.integers(1, 7).flatmap(
-        lambda rows: st.integers(rows, 8).flatmap(
-            lambda columns: st.lists(
-                st.lists(st.integers(0, 9).map(float), min_size=columns, max_size=columns),
-                min_size=rows,
-                max_size=rows,
-            )
-        )
-    )
-)
-def test_the_cheapest_assignment_is_scipys(costs: list[list[float]]) -> None:
-    rows, columns = linear_sum_assignment(costs)
-    cheapest = sum(costs[i][j] for i, j in zip(rows, columns, strict=True))
-    assert abs(cheapest_assignment(costs) - cheapest) < NEAR

@@ -13,9 +13,9 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.allocators.milp import MilpAllocator
 from fleet.core.model.world import WorldModel
 from fleet.jobshop.budget import Budget, StepClock
-from fleet.jobshop.compiled import Compiled
 from fleet.jobshop.cpsat import CpSat, installed
-from fleet.jobshop.list_scheduling import construct
+from fleet.jobshop.instance import Instance
+from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.portfolio import solve
 from fleet.jobshop.problem import BadShop, Block, Machine, Operation, Shop
 from fleet.jobshop.rescheduling import reschedule, without_machines
@@ -153,8 +153,8 @@ def test_without_or_tools_the_rest_goes_on(monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.skipif(not installed(), reason="OR-Tools is an extra: cp-sat")
 def test_cp_sat_is_ended_in_the_middle() -> None:
-    ready = Compiled(random_shop(40, 4))
-    hint = construct(ready)
+    ready = Instance(random_shop(40, 4))
+    hint = list_schedule(ready)
     assert hint is not None
     run = CpSat(ready, hint, 0.0, time.time() + 60.0, 0)
     assert not run.ended
@@ -172,12 +172,12 @@ def test_a_lost_robot_moves_little() -> None:
     assert before is not None
     left = without_machines(shop, frozenset({2}))
     found = reschedule(left, before.machine_of, before.order, steps(1.0))
-    afresh = construct(Compiled(left))
+    afresh = list_schedule(Instance(left))
     assert found is not None and afresh is not None
     orphans = before.machine_of.count(2)
     moved_afresh = sum(a != b for a, b in zip(afresh.machine_of, before.machine_of, strict=True))
     assert orphans <= len(found.moved) < moved_afresh / 2
-    assert found.timed.makespan_s <= found.best_makespan_s * 1.02 + 1e-6
+    assert found.schedule.makespan_s <= found.best_makespan_s * 1.02 + 1e-6
 
 
 def test_work_under_way_stays_and_comes_first() -> None:
@@ -195,8 +195,8 @@ def test_work_under_way_stays_and_comes_first() -> None:
     assert found is not None and frozen
     for block in frozen:
         machine = before.machine_of[block]
-        assert found.timed.machine_of[block] == machine
-        mine = [b for b in found.timed.order if found.timed.machine_of[b] == machine]
+        assert found.schedule.machine_of[block] == machine
+        mine = [b for b in found.schedule.order if found.schedule.machine_of[b] == machine]
         assert mine[0] == block
 
 
@@ -207,7 +207,7 @@ def test_a_shop_that_contradicts_itself_is_refused() -> None:
     with pytest.raises(BadShop, match="does not exist"):
         Shop((one,), (Block((0,), (3,)),), (Machine(),))
     with pytest.raises(BadShop, match="circle"):
-        Compiled(
+        Instance(
             Shop(
                 (Operation((0,), (1.0,), after=(1,)), Operation((1,), (1.0,), after=(0,))),
                 (Block((0,), (0,)), Block((1,), (0,))),

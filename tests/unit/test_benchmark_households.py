@@ -22,7 +22,7 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.core.checker.checked_plan import check_plan
 from fleet.jobshop.budget import Budget, StepClock
-from fleet.jobshop.compiled import Compiled
+from fleet.jobshop.instance import Instance
 from fleet.jobshop.portfolio import solve
 from tests.household import checked
 
@@ -84,7 +84,7 @@ def test_idle_time_cannot_be_less_than_at_the_bound() -> None:
 @pytest.mark.parametrize("travel", [False, True])
 def test_alternatives_are_schedules_and_none_is_below_the_bound(travel: bool) -> None:
     shop = random_shop(12, 3, travel, 0.3 if travel else 0.0)
-    ready = Compiled(shop)
+    ready = Instance(shop)
     best = solve(shop, Budget(0.5, StepClock()), exact=False)
     assert best is not None
     for choose in (nearest, in_turn, papers_milp):

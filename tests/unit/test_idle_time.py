@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cli.plans.idle import idle_report
-from cli.show.idle_page import idle_page
-from cli.show.page import page
+from cli.views.console import console
+from cli.views.idle_time import idle_page
 from fleet.core.model.task_graph import Cycle
 from fleet.core.schedule.idle_time import (
     IdleTime,
@@ -147,7 +147,7 @@ def test_steps_are_at_least_the_longest_chain_and_the_largest_share(
 
 def drawn(report) -> str:  # type: ignore[no-untyped-def]
     file = io.StringIO()
-    page(file).print(idle_page(report))
+    console(file).print(idle_page(report))
     return file.getvalue()
 
 

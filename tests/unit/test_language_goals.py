@@ -8,7 +8,7 @@ import pytest
 from msgspec import structs
 
 from fleet.errors import NotUnderstood
-from fleet.language import Vocabulary, goal_conditions, read_goal
+from fleet.language import Vocabulary, read_goal
 from keyexpr_schema.payloads.world import Object
 from tests.language_house import OBJECTS, PLACES, ROBOTS, WORDS, shown
 
@@ -325,13 +325,13 @@ def test_goals_are_understood(text: str, expected: str) -> None:
 
 
 def test_the_first_stage_alone() -> None:
-    conditions = goal_conditions("Bring cup 1 to the hallway, then find cup 2", WORDS)
+    conditions = read_goal("Bring cup 1 to the hallway, then find cup 2", WORDS).stages[0]
     assert [str(c) for c in conditions] == ["at(cup_1) = hallway"]
 
 
 def test_where_something_comes_from_is_presumed_and_no_part_of_the_goal() -> None:
     reading = read_goal("Take cup 1 from the kitchen to the hallway", WORDS)
-    assert reading.presumed == (("at", "cup_1", "kitchen"),)
+    assert reading.presumed == ((("at", "cup_1"), "kitchen"),)
     assert shown(reading) == "at(cup_1) = hallway"
 
 

@@ -7,7 +7,8 @@ import pytest
 from fleet.core import events
 from fleet.core.dispatch.delays import FACTOR, MARGIN_S, next_lateness
 from fleet.core.dispatch.dispatcher import next_timer
-from fleet.core.state import PlanEntry, Policy
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.state import Policy
 from keyexpr_schema.facts import HOLDING, FactKey
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import GoalState
@@ -81,7 +82,7 @@ def test_what_a_lost_robot_had_in_its_hand_fails_that_goal_only() -> None:
     (failed,) = [g for g, s in model.state.goal_states.items() if s.state is GoalState.FAILED]
     assert f"g{str(held).removeprefix('cup_')}" == failed
     assert f"at({held})" in (model.state.goal_states[failed].reason or "")
-    assert any(f"goal {failed} is left out" in note for note in entry(model).notes)
+    assert any(f"goal {failed} is left out" in note for note in entry(model).outcome.notes)
     begun = {order.task: order.robot for order in model.orders()}
     assert begun.items() <= before.items()
     model.finish()
@@ -158,7 +159,7 @@ def test_a_task_added_to_a_running_plan_leaves_orders_with_the_robots_that_have_
         model.tell(events.ControlRequested, request=request)
         assert model.state.answers[name].accepted
         for record in entry(model).current():
-            assert record.robot == entry(model).allocation[record.actor]
+            assert record.robot == entry(model).outcome.allocation[record.actor]
     model.finish()
     assert entry(model).state is PlanState.SUCCEEDED
 
@@ -169,7 +170,7 @@ def test_a_robot_that_is_busy_with_another_plan_counts_as_busy() -> None:
     (first,) = model.orders()
     model.start(first)
     model.plan(bring(2, "hallway"))
-    robots = set(model.state.plans["plan-2"].allocation.values())
+    robots = set(model.state.plans["plan-2"].outcome.allocation.values())
     assert robots == {"r1", "r2"} - {first.robot}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fleet.core import events
 from fleet.core.effects import Interpret, MakePlan, Publish
-from fleet.core.handlers.plan_results import MAX_REPLANS
+from fleet.core.revision.replanning import MAX_REPLANS
 from fleet.core.state import Policy, State
 from fleet.core.step import step
 from keyexpr_schema.facts import AT, FactKey

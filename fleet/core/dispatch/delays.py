@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from fleet.core.state import PlanEntry, State
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.state import State
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 FACTOR = 2.0
@@ -36,7 +37,7 @@ def next_lateness(state: State) -> float | None:
     times = [
         at_s
         for entry in state.plans.values()
-        if not entry.ended and entry.job is None and entry.replan_reason is None
+        if not entry.ended and entry.job is None and entry.replan is None
         for record in _that_matter(entry)
         if (at_s := late_at_s(record)) is not None
     ]

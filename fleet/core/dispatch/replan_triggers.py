@@ -4,37 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from msgspec.structs import replace
-
-from fleet.core import events
-from fleet.core.handlers.goals import believe
 from fleet.core.model.preconditions import Skills, action_of
 from fleet.core.model.skills import Action
-from fleet.core.plan_entry import set_entry
-from fleet.core.state import OUTSTANDING, PlanEntry, State
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
+from fleet.core.state import State
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import GoalState
-from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact
 
 
-def fact_put(state: State, event: events.FactPut, skills: Skills) -> State:
-    """Believe the fact: its key holds the latest word. A plan that it contradicts is made again."""
-    fact = event.fact
-    changed = believe(state, fact)
-    if changed is state:
-        return state
-    state = changed
-    for entry in state.plans.values():
-        if entry.state is PlanState.RUNNING and entry.replan_reason is None:
-            reason = _contradiction(entry, fact, skills)
-            if reason is not None:
-                state = set_entry(state, replace(entry, replan_reason=reason))
-    return state
-
-
-def _contradiction(entry: PlanEntry, fact: Fact, skills: Skills) -> str | None:
+def contradiction(entry: PlanEntry, fact: Fact, skills: Skills) -> str | None:
     """Why a fact is against the plan: a task needs it otherwise, and nothing before it changes it.
 
     What a robot says of the work it is doing is part of that work.
@@ -93,7 +73,7 @@ def why_replan(state: State, entry: PlanEntry, skills: Skills) -> str | None:
 
 
 def new_robots(state: State, entry: PlanEntry) -> PlanEntry | None:
-    """The entry with the wish that robots take part that came since the plan was made.
+    """The entry with robots that came since the plan was made as a reason to replan.
 
     More of a kind that is there already can share what is left. A new kind may help in ways that
     the plan knows nothing of, so that everything is planned again.
@@ -103,6 +83,5 @@ def new_robots(state: State, entry: PlanEntry) -> PlanEntry | None:
         return None
     reason = f"{' and '.join(new)} can help now"
     kinds = {state.robots[robot].model for robot in entry.team if robot in state.robots}
-    if all(state.robots[robot].model in kinds for robot in new):
-        return replace(entry, replan_reason=reason, outside_reason=reason)
-    return replace(entry, replan_reason=reason, anew_reason=reason)
+    of_known_kinds = all(state.robots[robot].model in kinds for robot in new)
+    return entry.to_replan(ReplanScope.REALLOCATE if of_known_kinds else ReplanScope.ANEW, reason)

@@ -1,4 +1,4 @@
-"""What reports of workers mean for a plan's tasks."""
+"""Workers' reports: what they mean for a plan's tasks."""
 
 from __future__ import annotations
 
@@ -6,12 +6,20 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
-from fleet.core.handlers.goals import believe, believe_if_newer, mark_goals, without_goal
 from fleet.core.model.durations import learn
 from fleet.core.model.preconditions import Skills, action_of, unmet_before
 from fleet.core.model.skills import Action
-from fleet.core.plan_entry import give_up, open_goals, set_record
-from fleet.core.state import OUTSTANDING, PlanEntry, State, put
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
+from fleet.core.state import State, put
+from fleet.core.updates import (
+    believe,
+    believe_if_newer,
+    give_up,
+    mark_goals,
+    open_goals,
+    set_record,
+    without_goal,
+)
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.tasks import Report, ReportState, TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact
@@ -23,7 +31,7 @@ MAX_ATTEMPTS = 3
 
 
 def report_received(state: State, event: events.ReportReceived, skills: Skills) -> State:
-    """Take in what a worker says; a report of an attempt that is not current only brings facts."""
+    """A report of an attempt that is not current only brings facts."""
     report = event.report
     for fact in report.facts:
         state = believe_if_newer(state, fact)
@@ -115,19 +123,19 @@ def _learned(state: State, record: TaskRecord, report: Report, action: Action | 
 
 def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) -> State:
     record = _ended(record, report, TaskState.FAILED)
-    if entry.ended or record.task in entry.dropping:
+    if entry.ended or record.task in entry.unwanted:
         return set_record(state, entry, record)
     reason = f"{record.task} ({record.skill}) failed: {report.reason}"
-    entry = replace(entry, replan_reason=reason)
+    entry = entry.to_replan(ReplanScope.REPAIR, reason)
     if record.goal is not None and record.goal in entry.plan.goals:
         count = entry.failures.get(record.goal, 0) + 1
         entry = replace(entry, failures=put(entry.failures, record.goal, count))
         if count >= MAX_FAILURES:
-            told = f"given up after {count} failed tasks; the last: {reason}"
+            sentence = f"given up after {count} failed tasks; the last: {reason}"
             if open_goals(state, entry) == [record.goal]:
                 entry = replace(entry, records=put(entry.records, record.task, record))
-                return give_up(state, entry, told)
-            state = mark_goals(state, (record.goal,), GoalState.FAILED, entry.plan.plan, told)
+                return give_up(state, entry, sentence)
+            state = mark_goals(state, (record.goal,), GoalState.FAILED, entry.plan.plan, sentence)
             entry = replace(entry, plan=without_goal(state, entry.plan, record.goal))
     return set_record(state, entry, record)
 
@@ -136,7 +144,7 @@ def _interrupted(
     state: State, entry: PlanEntry, record: TaskRecord, report: Report, skills: Skills
 ) -> State:
     """A worker came back in the middle of an attempt: the world decides what it is worth."""
-    if entry.ended or record.task in entry.dropping:
+    if entry.ended or record.task in entry.unwanted:
         return set_record(state, entry, _ended(record, report, TaskState.CANCELLED))
     action = action_of(record, skills)
     if action is None:

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.handlers.goals import active_plan_of, mark_goals
-from fleet.core.plan_entry import answer, next_task, set_entry
-from fleet.core.state import PlanEntry, PlanningJob, State, put, without
+from fleet.core.model.preconditions import Skills
+from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanScope
+from fleet.core.state import State, put, without
+from fleet.core.updates import active_plan_of, answer, mark_goals, set_entry
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState, Task
 from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest
 
-AUTO = "auto-"
-"""How the names of requests begin that nobody made: goals that wait are planned by themselves."""
 
-
-def plan_requested(state: State, event: events.PlanRequested) -> State:
+def plan_requested(state: State, event: events.PlanRequested, skills: Skills) -> State:
     """Start to plan for the goals asked for, or say why not."""
-    ask = event.request
+    return _start_planning(state, event.request)
+
+
+def _start_planning(state: State, ask: PlanRequest, partial: bool = False) -> State:
+    """`partial`: goals that cannot be reached are left out, and not the whole plan refused."""
     if (
         ask.request in state.answers
         or ask.request in state.previews
@@ -29,11 +33,7 @@ def plan_requested(state: State, event: events.PlanRequested) -> State:
         )
     ):
         return state
-    goals = ask.goals or tuple(
-        goal
-        for goal in sorted(state.goals, key=lambda g: (state.goals[g].ordinal, g))
-        if state.goal_states[goal].state is GoalState.WAITING and not active_plan_of(state, goal)
-    )
+    goals = ask.goals or tuple(_waiting_goals(state))
     if reason := _why_not_plan(state, ask.plan, goals):
         return answer(state, ask.request, False, reason)
     name = ask.plan or _new_plan_name(state)
@@ -48,7 +48,7 @@ def plan_requested(state: State, event: events.PlanRequested) -> State:
         first_task=1,
         request=ask.request,
         dry_run=ask.dry_run,
-        partial=ask.request.startswith(AUTO),
+        partial=partial,
     )
     if ask.dry_run:
         return replace(state, jobs=job.job, previews=put(state.previews, ask.request, job))
@@ -89,6 +89,13 @@ def _why_not_plan(state: State, plan: str | None, goals: tuple[str, ...]) -> str
     return None
 
 
+def _waiting_goals(state: State) -> Iterator[str]:
+    """Goals that no plan works on, in their order."""
+    for goal in sorted(state.goals, key=lambda g: (state.goals[g].ordinal, g)):
+        if state.goal_states[goal].state is GoalState.WAITING and not active_plan_of(state, goal):
+            yield goal
+
+
 def _new_plan_name(state: State) -> str:
     number = 1
     while f"plan-{number}" in state.plans or f"plan-{number}" in state.past_plans:
@@ -96,7 +103,7 @@ def _new_plan_name(state: State) -> str:
     return f"plan-{number}"
 
 
-def plan_proposed(state: State, event: events.PlanProposed) -> State:
+def plan_proposed(state: State, event: events.PlanProposed, skills: Skills) -> State:
     """Take a plan that someone put into planning: it is checked and allocated like any other."""
     plan = event.plan
     if plan.plan in state.plans or plan.plan in state.past_plans:
@@ -116,7 +123,7 @@ def plan_proposed(state: State, event: events.PlanProposed) -> State:
     return set_entry(replace(state, jobs=job.job), entry)
 
 
-def replan_requested(state: State, event: events.ReplanRequested) -> State:
+def replan_requested(state: State, event: events.ReplanRequested, skills: Skills) -> State:
     """Plan again from what is known now."""
     ask = event.request
     if ask.request in state.answers:
@@ -133,26 +140,14 @@ def replan_requested(state: State, event: events.ReplanRequested) -> State:
         return answer(state, ask.request, False, reason)
     goals = tuple(dict.fromkeys([*entry.plan.goals, *ask.goals]))
     # What a person asks for is no sign that the world does not go along: counting begins anew.
-    entry = replace(
-        entry,
-        plan=replace(entry.plan, goals=goals),
-        replan_reason=ask.reason,
-        anew_reason=ask.reason,
-        replans=0,
-    )
-    state = set_entry(state, entry)
+    entry = replace(entry, plan=replace(entry.plan, goals=goals), fruitless_replans=0)
+    state = set_entry(state, entry.to_replan(ReplanScope.ANEW, ask.reason))
     return answer(state, ask.request, True, f"plan {ask.plan} is made again", ask.plan)
 
 
-def take_waiting_goals(state: State) -> State:
+def plan_waiting_goals(state: State) -> State:
     """Goals that wait go into the running plan, or, where none runs, into a new one."""
-    waiting = tuple(
-        goal
-        for goal in sorted(state.goals, key=lambda g: (state.goals[g].ordinal, g))
-        if state.goal_states[goal].state is GoalState.WAITING
-        and state.goal_states[goal].reason is None
-        and active_plan_of(state, goal) is None
-    )
+    waiting = tuple(g for g in _waiting_goals(state) if state.goal_states[g].reason is None)
     if not waiting:
         return state
     if any(entry.state is PlanState.PLANNING for entry in state.plans.values()):
@@ -160,22 +155,19 @@ def take_waiting_goals(state: State) -> State:
     for entry in state.plans.values():
         if entry.state is PlanState.RUNNING and not entry.cancelling:
             goals = (*entry.plan.goals, *waiting)
+            entry = replace(entry, plan=replace(entry.plan, goals=goals))
             reason = f"{', '.join(waiting)} came up"
-            entry = replace(entry, plan=replace(entry.plan, goals=goals), replan_reason=reason)
-            return set_entry(state, entry)
-    request = PlanRequest(request=f"{AUTO}{state.jobs + 1}", goals=waiting)
-    asked = events.PlanRequested(
-        request=request, time_s=state.time_s, wall_time_s=state.wall_time_s
-    )
-    return plan_requested(state, asked)
+            return set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason))
+    request = PlanRequest(request=f"auto-{state.jobs + 1}", goals=waiting)
+    return _start_planning(state, request, partial=True)
 
 
 def _no_plan(state: State, plan: str) -> str:
     return f"there is no plan {plan}; known are {', '.join(sorted(state.plans)) or 'none'}"
 
 
-def control_requested(state: State, event: events.ControlRequested) -> State:
-    """Start, cancel, delete or extend a plan, or say why not."""
+def control_requested(state: State, event: events.ControlRequested, skills: Skills) -> State:
+    """Start, approve, cancel, delete or extend a plan, or say why not."""
     ask = event.request
     if ask.request in state.answers or any(
         entry.amendment_request == ask.request for entry in state.plans.values()
@@ -184,45 +176,45 @@ def control_requested(state: State, event: events.ControlRequested) -> State:
     entry = state.plans.get(ask.plan)
     if entry is None:
         return answer(state, ask.request, False, _no_plan(state, ask.plan))
-    if ask.control is Control.START:
-        if entry.state is not PlanState.READY:
-            return answer(
-                state,
-                ask.request,
-                False,
-                f"plan {ask.plan} is {entry.state.value}; only a ready plan can be started",
-            )
-        state = set_entry(state, replace(entry, state=PlanState.RUNNING, start=True))
+    return _CONTROLS[ask.control](state, entry, ask)
+
+
+def _start(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
+    if entry.state is not PlanState.READY:
+        sentence = f"plan {ask.plan} is {entry.state.value}; only a ready plan can be started"
+        return answer(state, ask.request, False, sentence)
+    state = set_entry(state, replace(entry, state=PlanState.RUNNING, start=True))
+    state = mark_goals(state, entry.plan.goals, GoalState.RUNNING, ask.plan)
+    return answer(state, ask.request, True, f"plan {ask.plan} is running", ask.plan)
+
+
+def _approve(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
+    if entry.state is not PlanState.PROPOSED:
+        sentence = f"plan {ask.plan} is {entry.state.value}; only a proposed plan is approved"
+        return answer(state, ask.request, False, sentence)
+    to = PlanState.RUNNING if entry.start else PlanState.READY
+    state = set_entry(state, replace(entry, state=to))
+    if entry.start:
         state = mark_goals(state, entry.plan.goals, GoalState.RUNNING, ask.plan)
-        return answer(state, ask.request, True, f"plan {ask.plan} is running", ask.plan)
-    if ask.control is Control.APPROVE:
-        if entry.state is not PlanState.PROPOSED:
-            sentence = f"plan {ask.plan} is {entry.state.value}; only a proposed plan is approved"
-            return answer(state, ask.request, False, sentence)
-        to = PlanState.RUNNING if entry.start else PlanState.READY
-        state = set_entry(state, replace(entry, state=to))
-        if entry.start:
-            state = mark_goals(state, entry.plan.goals, GoalState.RUNNING, ask.plan)
-        return answer(state, ask.request, True, f"plan {ask.plan} is {to.value}", ask.plan)
-    if ask.control is Control.CANCEL:
-        if entry.ended:
-            return answer(state, ask.request, False, f"plan {ask.plan} is {entry.state.value}")
-        waiting = entry.job.request if entry.job is not None else None
-        state = answer(state, waiting, False, f"plan {ask.plan} was cancelled while it was made")
-        state = set_entry(state, replace(entry, cancelling=True, job=None))
-        return answer(state, ask.request, True, f"plan {ask.plan} is being cancelled", ask.plan)
-    if ask.control is Control.DELETE:
-        if not entry.ended and entry.state not in (PlanState.READY, PlanState.PROPOSED):
-            return answer(
-                state,
-                ask.request,
-                False,
-                f"plan {ask.plan} is {entry.state.value}; cancel it before deleting it",
-            )
-        state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None)
-        state = replace(state, plans=without(state.plans, ask.plan))
-        return answer(state, ask.request, True, f"plan {ask.plan} is deleted")
-    return _add_task(state, entry, ask)
+    return answer(state, ask.request, True, f"plan {ask.plan} is {to.value}", ask.plan)
+
+
+def _cancel(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
+    if entry.ended:
+        return answer(state, ask.request, False, f"plan {ask.plan} is {entry.state.value}")
+    waiting = entry.job.request if entry.job is not None else None
+    state = answer(state, waiting, False, f"plan {ask.plan} was cancelled while it was made")
+    state = set_entry(state, replace(entry, cancelling=True, job=None))
+    return answer(state, ask.request, True, f"plan {ask.plan} is being cancelled", ask.plan)
+
+
+def _delete(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
+    if not entry.ended and entry.state not in (PlanState.READY, PlanState.PROPOSED):
+        sentence = f"plan {ask.plan} is {entry.state.value}; cancel it before deleting it"
+        return answer(state, ask.request, False, sentence)
+    state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None)
+    state = replace(state, plans=without(state.plans, ask.plan))
+    return answer(state, ask.request, True, f"plan {ask.plan} is deleted")
 
 
 def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
@@ -246,7 +238,7 @@ def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
             f"name the robot that does it as the request's robot, not as robot={ask.args['robot']}"
         )
         return answer(state, ask.request, False, sentence)
-    number = next_task(entry)
+    number = entry.next_task_number
     task = Task(
         task=f"t{number}",
         skill=ask.skill,
@@ -260,6 +252,14 @@ def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
         plan=replace(entry.plan, pins=pins),
         amendment=task,
         amendment_request=ask.request,
-        replan_reason=f"task {task.task} is added",
     )
-    return set_entry(state, entry)
+    return set_entry(state, entry.to_replan(ReplanScope.REPAIR, f"task {task.task} is added"))
+
+
+_CONTROLS = {
+    Control.START: _start,
+    Control.APPROVE: _approve,
+    Control.CANCEL: _cancel,
+    Control.DELETE: _delete,
+    Control.ADD_TASK: _add_task,
+}

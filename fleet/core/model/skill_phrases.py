@@ -21,8 +21,8 @@ def phrases_of(skills: Mapping[str, SkillModel]) -> tuple[SkillPhrase, ...]:
         about = {row.variable.subject for row in rows}
         plain = all(row.value not in skill.parameters for row in rows)
         if len(about) == 1 and plain:
-            sort = skill.parameters[about.pop()]
+            kind = skill.parameters[about.pop()]
             wants = tuple((key.relation, value) for key, value in rows if value is not None)
             if wants:
-                found.append(SkillPhrase(verb=name.replace("_", " "), sort=sort, wants=wants))
+                found.append(SkillPhrase(verb=name.replace("_", " "), type=kind, wants=wants))
     return tuple(found)

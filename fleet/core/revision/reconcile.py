@@ -18,7 +18,7 @@ from fleet.core import events
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
-from fleet.core.state import OUTSTANDING, PlanEntry
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry
 from keyexpr_schema.ids import bound
 from keyexpr_schema.payloads.plans import Plan, PlanChange, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -33,11 +33,11 @@ class Revision:
 
     plan: Plan
     records: dict[str, TaskRecord]
-    dropping: tuple[str, ...]
+    unwanted: tuple[str, ...]
     change: PlanChange
 
 
-def revise(
+def reconcile(
     entry: PlanEntry, event: events.PlanningSucceeded, world: WorldModel, started: frozenset[str]
 ) -> Revision:
     """Take over the plan in `event`; `started` were under way when it was being made."""
@@ -55,13 +55,13 @@ def revise(
                 records[task.task], state=TaskState.SUCCEEDED, reason="it is so already"
             )
     wanted = {task.task for task in plan.tasks}
-    dropping: list[str] = []
+    unwanted: list[str] = []
     dropped = 0
     for name, record in entry.records.items():
         if name in wanted:
             continue
         if record.state in OUTSTANDING:
-            dropping.append(name)
+            unwanted.append(name)
             dropped += 1
         elif record.state is TaskState.WAITING:
             dropped += 1
@@ -69,7 +69,7 @@ def revise(
     # A task that is so already may have been waiting: then it is kept, and counts once.
     added = sum(task.task not in {*names, *skipped} for task in event.plan.tasks)
     change = PlanChange(kept=len(names), dropped=dropped, added=added)
-    return Revision(plan, records, tuple(dropping), change)
+    return Revision(plan, records, tuple(unwanted), change)
 
 
 def _call(task: Task, allocation: Mapping[str, str]) -> Call:

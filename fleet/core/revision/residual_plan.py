@@ -7,15 +7,14 @@ from collections.abc import Set
 from msgspec.structs import replace
 
 from fleet.core.model.task_graph import TaskGraph
-from fleet.core.plan_entry import next_task
-from fleet.core.state import OUTSTANDING, PlanEntry
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry
 from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
 
 HAD_ROBOT = OUTSTANDING | {TaskState.SUCCEEDED}
 
 
-def remaining_plan(
+def residual_plan(
     entry: PlanEntry, revision: int, gone: Set[str] = frozenset(), addition: Task | None = None
 ) -> Plan:
     """The tasks that have not ended and are for goals that the plan still has, under new names, and
@@ -24,7 +23,7 @@ def remaining_plan(
     Actors whose robot is `gone` begin anew, with everything that they had done. The others stay
     with their robot once they have begun. Whether that is still a plan, the checker has to say.
     """
-    anew = {actor for actor, robot in entry.allocation.items() if robot in gone}
+    anew = {actor for actor, robot in entry.outcome.allocation.items() if robot in gone}
     todo = [
         task
         for task in entry.plan.tasks
@@ -35,7 +34,7 @@ def remaining_plan(
             or entry.records[task.task].state not in ENDED_TASKS
         )
     ]
-    first = next_task(entry) + (addition is not None)
+    first = entry.next_task_number + (addition is not None)
     names = {task.task: f"t{first + number}" for number, task in enumerate(todo)}
     if addition is not None:
         todo.append(addition)
@@ -61,7 +60,7 @@ def begun_actors(entry: PlanEntry, gone: Set[str] = frozenset()) -> dict[str, st
         if record.state in HAD_ROBOT
         and record.robot is not None
         and record.robot not in gone
-        and entry.allocation.get(record.actor) == record.robot
+        and entry.outcome.allocation.get(record.actor) == record.robot
     }
 
 

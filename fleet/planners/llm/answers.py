@@ -9,7 +9,7 @@ import msgspec
 
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
-from fleet.llm.structured_output import Answer, enumerated, schema_of
+from fleet.llm.structured_output import StructuredAnswer, enumerated, schema_of
 from fleet.planners.llm.prompt_text import team_skills
 from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.goals import Goal
@@ -20,7 +20,7 @@ _ActorName = Annotated[str, msgspec.Meta(pattern=r"^\?a[0-9]{1,2}$")]
 Actor = Annotated[str, msgspec.Meta(pattern=r"^\?[A-Za-z0-9_-]{1,30}$")]
 
 
-class StepAnswer(Answer, frozen=True, kw_only=True):
+class StepAnswer(StructuredAnswer, frozen=True, kw_only=True):
     """A task of a flat list: a plan's `Task` less its name, order and duration."""
 
     skill: Id
@@ -35,21 +35,21 @@ class TaskAnswer(StepAnswer, frozen=True, kw_only=True):
     after: tuple[Id, ...] = ()
 
 
-class PinAnswer(Answer, frozen=True):
+class PinAnswer(StructuredAnswer, frozen=True):
     """An actor that must be a certain robot."""
 
     actor: Actor
     robot: Id
 
 
-class GraphAnswer(Answer, frozen=True):
+class GraphAnswer(StructuredAnswer, frozen=True):
     """A plan as a graph."""
 
     tasks: tuple[TaskAnswer, ...]
     pins: tuple[PinAnswer, ...] = ()
 
 
-class ListAnswer(Answer, frozen=True):
+class ListAnswer(StructuredAnswer, frozen=True):
     """A plan as a flat list."""
 
     tasks: tuple[StepAnswer, ...]

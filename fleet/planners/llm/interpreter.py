@@ -9,7 +9,7 @@ from fleet.core.model.skills import SkillModel
 from fleet.language import Vocabulary
 from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
 from fleet.llm.quoting import cleaned
-from fleet.llm.structured_output import Answer, read_answer, schema_of
+from fleet.llm.structured_output import StructuredAnswer, read_answer, schema_of
 from fleet.planners.llm.prompt_text import vocabulary_text
 from keyexpr_schema.facts import HELD, LOCATED
 from keyexpr_schema.ids import Id
@@ -23,7 +23,7 @@ DERIVED = {LOCATED: "it is known where the object is", HELD: "a hand holds the o
 Stages = tuple[tuple[Condition, ...], ...]
 
 
-class ConditionAnswer(Answer, frozen=True):
+class ConditionAnswer(StructuredAnswer, frozen=True):
     """A `Condition`, with every field said."""
 
     relation: Id
@@ -32,7 +32,7 @@ class ConditionAnswer(Answer, frozen=True):
     any_of: tuple[Id, ...] = ()
 
 
-class GoalAnswer(Answer, frozen=True):
+class GoalAnswer(StructuredAnswer, frozen=True):
     """Stages of conditions, or why there are none."""
 
     stages: tuple[tuple[ConditionAnswer, ...], ...]

@@ -1,0 +1,1 @@
+"""What the commands read from, write to and ask of the key-space."""

@@ -1,0 +1,132 @@
+"""What robotctl asks of the planner, and what the planner says that it can do."""
+
+from __future__ import annotations
+
+import asyncio
+import uuid
+from collections.abc import Iterable
+from contextlib import suppress
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any
+
+from cli.client.presence import planner_alive
+from cli.errors import NotRunning, Refused, TooLate, Unknown
+from keyexpr_schema.key import Key
+from keyexpr_schema.keyspace import (
+    ANSWER,
+    CONTROL_REQUEST,
+    PLAN_REQUEST,
+    PLANNER_STATUS,
+    REPLAN_REQUEST,
+    STATEMENT_STATUS,
+)
+from keyexpr_schema.payloads.requests import (
+    Answer,
+    ControlRequest,
+    PlanRequest,
+    ReplanRequest,
+    RequestAddress,
+)
+from keyexpr_schema.payloads.service import PlannerAddress
+
+if TYPE_CHECKING:
+    from keyexpr_schema.payloads.robots import RobotSpec
+    from keyexpr_schema.payloads.service import PlannerStatus
+    from keyexpr_schema.payloads.world import StatementStatus
+    from keyexpr_schema.transport.session import Session
+
+ANSWER_S = 120.0
+"""Longest time to wait for an answer: planning with a language model takes its time."""
+
+READ_S = 5.0
+"""How long the planner may take to read a statement."""
+
+Request = PlanRequest | ReplanRequest | ControlRequest
+REQUEST_KEYS: dict[type[Request], Key[RequestAddress, Any]] = {
+    PlanRequest: PLAN_REQUEST,
+    ReplanRequest: REPLAN_REQUEST,
+    ControlRequest: CONTROL_REQUEST,
+}
+
+
+def request_name() -> str:
+    """A name for one request, never used before."""
+    return f"req-{uuid.uuid4().hex[:12]}"
+
+
+async def check_planner(session: Session) -> None:
+    """Raise `NotRunning` unless a planner is connected."""
+    if not await planner_alive(session):
+        raise NotRunning("no planner is running; start one with `robotctl planner`")
+
+
+async def ask_planner(session: Session, request: Request, timeout_s: float = ANSWER_S) -> Answer:
+    """Put `request` and wait for its answer.
+
+    With no planner there the request is not put: it would be carried out whenever one starts, long
+    after anybody remembers it.
+
+    Raises:
+        NotRunning: no planner is connected.
+        Refused: the planner said no; the message is its sentence and every violation.
+        TooLate: the planner did not answer within `timeout_s` [s].
+    """
+    await check_planner(session)
+    await session.confirm(REQUEST_KEYS[type(request)], RequestAddress(request.request), request)
+    answer: Answer | None = await first_value(session, ANSWER, timeout_s, request=request.request)
+    if answer is None:
+        raise TooLate(
+            f"the planner did not answer request {request.request} within {timeout_s:g} s"
+        )
+    if not answer.accepted:
+        more = [each.sentence for each in answer.violations if each.sentence not in answer.sentence]
+        raise Refused("; ".join([answer.sentence, *more]))
+    return answer
+
+
+async def first_value(
+    session: Session, key: Key[Any, Any], timeout_s: float, **chunks: str | int
+) -> Any | None:
+    """The first value of the one `key` with these chunks; `None` if none comes in time."""
+    with suppress(TimeoutError):
+        async with asyncio.timeout(timeout_s), session.watch((key, chunks)) as watch:
+            async for change in watch:
+                if change.value is not None:
+                    return change.value
+    return None
+
+
+async def statement_status(session: Session, statement: str) -> StatementStatus | None:
+    """What the planner read out of a statement; `None` if no planner runs, or it does not say."""
+    if not await planner_alive(session):
+        return None
+    return await first_value(session, STATEMENT_STATUS, READ_S, statement=statement)
+
+
+async def planner_status(session: Session) -> PlannerStatus | None:
+    """What the latest planner says that it can do; `None` where none ever ran, or nobody can tell.
+
+    A value that is no status is reported on its reject key, and is no reason to refuse a command.
+    """
+    return (await session.list(PLANNER_STATUS)).get(PlannerAddress())
+
+
+async def check_skills(session: Session, specs: Iterable[RobotSpec]) -> None:
+    """Do nothing if the planner has a model of each skill, or if no planner ever ran here.
+
+    Raises:
+        Unknown: it lacks one, so that no plan could ever ask a robot for it.
+    """
+    planner = await planner_status(session)
+    if planner is None or not planner.skills:
+        return
+    for spec in specs:
+        for skill in spec.skills:
+            if skill not in planner.skills:
+                near = get_close_matches(skill, planner.skills, n=1)
+                hint = f" (did you mean {near[0]!r}?)" if near else ""
+                raise Unknown(
+                    f"robot {spec.robot!r}: the planner knows no skill {skill!r}{hint}; it knows "
+                    f"{', '.join(sorted(planner.skills))}; "
+                    "teach it more with `robotctl planner --skills FILE`"
+                )

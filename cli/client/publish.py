@@ -1,0 +1,156 @@
+"""Publishes what people say: goals, statements and facts; each write is confirmed."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Iterable
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from cli.errors import BadArgument, check_known
+from keyexpr_schema.errors import InvalidId
+from keyexpr_schema.facts import AT, parse_value
+from keyexpr_schema.ids import slug
+from keyexpr_schema.keyspace import (
+    FACT,
+    GOAL_SPEC,
+    GOAL_STATUS,
+    OBJECT,
+    PLACE,
+    ROBOT_SPEC,
+    ROBOT_STATE,
+    SIM_CLOCK,
+    SIM_SCENE,
+    STATEMENT,
+)
+from keyexpr_schema.payloads.goals import Goal, GoalAddress
+from keyexpr_schema.payloads.world import (
+    Fact,
+    FactAddress,
+    Statement,
+    StatementAddress,
+)
+
+if TYPE_CHECKING:
+    from keyexpr_schema.transport.session import Session
+
+
+CLOCK_S = 0.6
+"""How long to listen for a simulation's clock [s, wall]; it ticks several times as often."""
+
+
+def free_name(text: str, taken: Iterable[str], kind: str) -> str:
+    """A name made from the words of `text` that is not one of `taken`.
+
+    Where no letter of it can stand in a name, as of Chinese, the name is `kind`.
+    """
+    used = set(taken)
+    try:
+        base = slug(text)
+    except InvalidId:
+        base = kind
+    number = 1
+    name = base
+    while name in used:
+        number += 1
+        name = f"{base}-{number}"
+    return name
+
+
+async def put_statement(session: Session, text: str, name: str | None = None) -> Statement:
+    """Store a sentence, confirmed, under `name` or one made from its words.
+
+    Raises:
+        BadArgument: it has no words.
+    """
+    if not text.strip():
+        raise BadArgument("say something, such as “The first cup is in the kitchen.”")
+    if name is None:
+        stored = await session.list(STATEMENT)
+        same = [a.statement for a, said in stored.items() if said.text == text]
+        name = same[0] if same else free_name(text, (a.statement for a in stored), "statement")
+    said = Statement(statement=name, text=text)
+    await session.confirm(STATEMENT, StatementAddress(name), said)
+    return said
+
+
+async def put_fact(session: Session, relation: str, subject: str, written: str) -> Fact:
+    """Store a fact, confirmed.
+
+    Raises:
+        Unknown: `at` of something that is no object or robot, or of a place that is none.
+    """
+    value = parse_value(written)
+    if relation == AT:
+        how = "load a world with `robotctl world load FILE`"
+        robots = [a.robot for a in await session.list(ROBOT_SPEC)]
+        objects = [a.object for a in await session.list(OBJECT)]
+        check_known("object or robot", subject, [*objects, *robots], how)
+        if value is not None:
+            places = [a.place for a in await session.list(PLACE)]
+            check_known("place or robot", written, [*places, *robots], how)
+    fact = Fact(
+        subject=subject,
+        relation=relation,
+        value=value,
+        source="person",
+        time_s=await fleet_time_s(session),
+    )
+    await session.confirm(FACT, FactAddress.of(fact.key), fact)
+    return fact
+
+
+async def fleet_time_s(session: Session) -> float:
+    """What is now on the fleet's clock [s]: a simulation's if there is one, else Unix time.
+
+    A realm that has a simulated scene whose clock is not heard has stopped; then the time is the
+    latest that a robot has reported: Unix time would outdate whatever the simulation says later.
+    """
+    heard: float | None = None
+    simulated = False
+    async with session.watch(SIM_CLOCK, SIM_SCENE) as watch:
+        with suppress(TimeoutError):
+            async with asyncio.timeout(CLOCK_S):
+                async for change in watch:
+                    if change.key is SIM_CLOCK and change.value is not None:
+                        heard = change.value.time_s
+                        break
+                    simulated = simulated or change.value is not None
+    if heard is not None:
+        return heard
+    if not simulated:
+        return time.time()
+    states = (await session.list(ROBOT_STATE)).values()
+    return max((state.time_s for state in states), default=0.0)
+
+
+async def put_goal(
+    session: Session,
+    text: str,
+    name: str | None,
+    priority: int = 0,
+    within_s: float | None = None,
+) -> Goal:
+    """Store a goal, confirmed, after all that were given before it; due `within_s` from now [s].
+
+    Raises:
+        BadArgument: it has no words, or there is a goal of that name.
+    """
+    if not text.strip():
+        raise BadArgument("say what you want, such as “Bring the first cup to the hallway.”")
+    stored = {address.goal: spec for address, spec in (await session.list(GOAL_SPEC)).items()}
+    ended = [address.goal for address in await session.list(GOAL_STATUS)]
+    if name in stored:
+        raise BadArgument(
+            f"there is a goal {name!r} already: “{stored[name].text}”; use another --id"
+        )
+    spec = Goal(
+        goal=name if name is not None else free_name(text, [*stored, *ended], "goal"),
+        text=text,
+        priority=priority,
+        due_s=None if within_s is None else await fleet_time_s(session) + within_s,
+        ordinal=1 + max((each.ordinal for each in stored.values()), default=0),
+    )
+    await session.confirm(GOAL_SPEC, GoalAddress(spec.goal), spec)
+    return spec

@@ -1,0 +1,140 @@
+"""Publishes objects and places, of a world file or one by one; each write is confirmed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from msgspec.structs import replace
+
+from cli.errors import BadArgument, check_known
+from keyexpr_schema.ids import check_id
+from keyexpr_schema.keyspace import OBJECT, PLACE, ROBOT_SPEC
+from keyexpr_schema.payloads.world import Object, ObjectAddress, Place, PlaceAddress
+
+if TYPE_CHECKING:
+    from keyexpr_schema.transport.session import Session
+
+
+async def put_world(session: Session, places: Iterable[Place], objects: Iterable[Object]) -> None:
+    """Store places and objects, confirmed."""
+    for place in places:
+        await session.confirm(PLACE, PlaceAddress(place.place), place)
+    for thing in objects:
+        await session.confirm(OBJECT, ObjectAddress(thing.object), thing)
+
+
+async def put_object(
+    session: Session,
+    name: str,
+    kind: str,
+    label: str | None,
+    aliases: tuple[str, ...],
+    home: str | None,
+    mass_kg: float | None,
+) -> Object:
+    """Store an object, confirmed; of one that is known, what is not said now stays as it was.
+
+    A new one is the next of its kind: with cup 1 and cup 2 there, it is cup 3.
+
+    Raises:
+        BadArgument: the name stands for a place or a robot.
+        Unknown: its home is no place.
+        InvalidId: the name or the kind cannot be one.
+    """
+    check_id(name, "object")
+    check_id(kind, "kind")
+    places = [address.place for address in await session.list(PLACE)]
+    if home is not None:
+        check_known("place", home, places)
+    _check_free(name, "place", places)
+    _check_free(name, "robot", [address.robot for address in await session.list(ROBOT_SPEC)])
+    objects = {a.object: thing for a, thing in (await session.list(OBJECT)).items()}
+    old = objects.get(name)
+    ordinal = 1 + max((o.ordinal for o in objects.values() if o.kind == kind), default=0)
+    if old is None or old.kind != kind:
+        old = Object(object=name, kind=kind, label=_in_words(name), ordinal=ordinal)
+    thing = replace(
+        old,
+        label=label or old.label,
+        aliases=aliases or old.aliases,
+        home=home or old.home,
+        mass_kg=old.mass_kg if mass_kg is None else mass_kg,
+    )
+    await session.confirm(OBJECT, ObjectAddress(name), thing)
+    return thing
+
+
+async def put_place(
+    session: Session,
+    name: str,
+    label: str | None,
+    aliases: tuple[str, ...],
+    regions: Iterable[str],
+    distances: Iterable[str],
+) -> Place:
+    """Store a place, confirmed; of one that is known, what is not said now stays as it was.
+
+    A distance counts both ways, so the other place is told of it, too.
+
+    Raises:
+        BadArgument: the name stands for an object or a robot, or a region or distance is none.
+        Unknown: a distance is to no place.
+        InvalidId: the name cannot be one.
+    """
+    check_id(name, "place")
+    region_m = tuple(_rectangle(written) for written in regions)
+    travel_m = dict(_distance(written) for written in distances)
+    places = {a.place: place for a, place in (await session.list(PLACE)).items()}
+    for other in travel_m:
+        check_known("place", other, [p for p in places if p != name])
+    _check_free(name, "object", [address.object for address in await session.list(OBJECT)])
+    _check_free(name, "robot", [address.robot for address in await session.list(ROBOT_SPEC)])
+    old = places.get(name) or Place(place=name, label=_in_words(name))
+    place = replace(
+        old,
+        label=label or old.label,
+        aliases=aliases or old.aliases,
+        region_m=region_m or old.region_m,
+        travel_m={**old.travel_m, **travel_m},
+    )
+    await session.confirm(PLACE, PlaceAddress(name), place)
+    for other, metres in travel_m.items():
+        back = replace(places[other], travel_m={**places[other].travel_m, name: metres})
+        await session.confirm(PLACE, PlaceAddress(other), back)
+    return place
+
+
+def _check_free(name: str, kind: str, taken: Iterable[str]) -> None:
+    if name in taken:
+        raise BadArgument(f"{name!r} is a {kind} already; choose another name")
+
+
+def _in_words(name: str) -> str:
+    return name.replace("_", " ").replace("-", " ")
+
+
+def _rectangle(written: str) -> tuple[float, float, float, float]:
+    """`0,0,2.5,4` as `(x_min, y_min, x_max, y_max)` [m, world frame]."""
+    try:
+        x_min, y_min, x_max, y_max = (float(part) for part in written.split(","))
+    except ValueError:
+        x_min = y_min = x_max = y_max = math.nan
+    if not (x_min < x_max and y_min < y_max and math.isfinite(x_max - x_min + y_max - y_min)):
+        raise BadArgument(
+            f"region {written!r} is not X_MIN,Y_MIN,X_MAX,Y_MAX in metres, such as 0,0,2.5,4"
+        )
+    return x_min, y_min, x_max, y_max
+
+
+def _distance(written: str) -> tuple[str, float]:
+    """`kitchen=2.5` as `("kitchen", 2.5)` [m]."""
+    place, _, number = written.partition("=")
+    try:
+        metres = float(number)
+    except ValueError:
+        metres = math.nan
+    if not (place and 0.0 <= metres < math.inf):
+        raise BadArgument(f"distance {written!r} is not PLACE=METRES, such as kitchen=2.5")
+    return place, metres

@@ -1,0 +1,152 @@
+"""`robotctl world add`: a sentence, a fact, an object or a place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated
+
+import typer
+
+from cli.command import Call
+
+_GOES_WITH = {
+    "--id": ("a sentence",),
+    "--label": ("--object", "--place"),
+    "--alias": ("--object", "--place"),
+    "--kind": ("--object",),
+    "--home": ("--object",),
+    "--mass-kg": ("--object",),
+    "--region": ("--place",),
+    "--distance": ("--place",),
+}
+"""Each option of `world add`: the forms that take it."""
+
+
+async def add(
+    call: Call,
+    words: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="STATEMENT", help="A sentence; or RELATION SUBJECT VALUE."),
+    ] = None,
+    fact: Annotated[
+        bool, typer.Option("--fact", help="The words are a fact: RELATION SUBJECT VALUE.")
+    ] = False,
+    name: Annotated[
+        str | None, typer.Option("--id", help="Name of the statement; else made from its words.")
+    ] = None,
+    thing: Annotated[
+        str | None, typer.Option("--object", metavar="ID", help="Tell of an object, with --kind.")
+    ] = None,
+    place: Annotated[
+        str | None, typer.Option("--place", metavar="ID", help="Tell of a place.")
+    ] = None,
+    label: Annotated[
+        str | None, typer.Option("--label", help="What people call it; else its id in words.")
+    ] = None,
+    alias: Annotated[
+        list[str] | None,
+        typer.Option("--alias", metavar="NAME", help="What else they call it; repeatable."),
+    ] = None,
+    kind: Annotated[
+        str | None, typer.Option("--kind", help="What sort of object it is, such as cup.")
+    ] = None,
+    home: Annotated[
+        str | None, typer.Option("--home", metavar="PLACE", help="Where the object belongs.")
+    ] = None,
+    mass_kg: Annotated[
+        float | None, typer.Option("--mass-kg", min=0.0, help="What the object weighs; else 0.")
+    ] = None,
+    region: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--region",
+            metavar="X0,Y0,X1,Y1",
+            help="A rectangle of the place's floor, in metres; repeatable.",
+        ),
+    ] = None,
+    distance: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--distance", metavar="PLACE=METRES", help="How far another place is; repeatable."
+        ),
+    ] = None,
+) -> None:
+    """Say something of the world: a sentence, a fact, an object or a place.
+
+    "The first cup is in the kitchen."   --fact at cup_1 kitchen
+    --object cup_3 --kind cup --home kitchen   --place pantry --distance kitchen=2.5
+    """
+    from cli.client.planner import statement_status
+    from cli.client.publish import put_fact, put_statement
+    from cli.client.world import put_object, put_place
+    from cli.errors import BadArgument
+    from cli.views.text import statement_means
+
+    _check_options(
+        sentence=bool(words) and not fact,
+        fact=fact,
+        object=thing is not None,
+        place=place is not None,
+        given={
+            "--id": name,
+            "--label": label,
+            "--alias": alias,
+            "--kind": kind,
+            "--home": home,
+            "--mass-kg": mass_kg,
+            "--region": region,
+            "--distance": distance,
+        },
+    )
+    words = words or []
+    if fact and len(words) != 3:
+        raise BadArgument(
+            f"a fact is RELATION SUBJECT VALUE, such as 'at cup_1 kitchen'; got {len(words)} words"
+        )
+    async with call.session() as session:
+        if thing is not None:
+            kept = await put_object(
+                session, thing, kind or "", label, tuple(alias or ()), home, mass_kg
+            )
+            call.show(kept, lambda: f"stored object {kept.object}: “{kept.label}”, a {kept.kind}")
+        elif place is not None:
+            room = await put_place(
+                session, place, label, tuple(alias or ()), region or (), distance or ()
+            )
+            call.show(room, lambda: f"stored place {room.place}: “{room.label}”")
+        elif fact:
+            said = await put_fact(session, *words)
+            call.show(said, lambda: f"stored {said.literal}")
+        else:
+            statement = await put_statement(session, " ".join(words), name)
+            status = await statement_status(session, statement.statement)
+            call.show(
+                {"statement": statement, "status": status},
+                lambda: (
+                    f"stored statement {statement.statement}: “{statement.text}”"
+                    f"{statement_means(status)}"
+                ),
+            )
+
+
+def _check_options(
+    *, sentence: bool, fact: bool, object: bool, place: bool, given: Mapping[str, object]
+) -> None:
+    """Do nothing if the options tell of one thing.
+
+    Raises:
+        BadArgument: of none, of two at once, or an option goes with another form.
+    """
+    from cli.errors import BadArgument
+
+    forms = {"a sentence": sentence, "--fact": fact, "--object": object, "--place": place}
+    chosen = [form for form, wanted in forms.items() if wanted]
+    if not chosen:
+        raise BadArgument("say a sentence, or tell of a --fact, an --object or a --place")
+    if len(chosen) > 1:
+        raise BadArgument(f"{' and '.join(chosen)} are different things to tell: choose one")
+    for option, value in given.items():
+        if value not in (None, []) and chosen[0] not in _GOES_WITH[option]:
+            raise BadArgument(f"{option} goes with {' or '.join(_GOES_WITH[option])}")
+    if object and not given["--kind"]:
+        raise BadArgument("an object has a --kind, such as cup")

@@ -1,0 +1,189 @@
+"""The processes of a demo: started, watched, and ended by their ids."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Coroutine, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from cli.errors import BadArgument, ProcessDied
+
+T = TypeVar("T")
+END_WITH_STDIN = "ROBOTFLEET_END_WITH_STDIN"
+"""Set by `robotctl demo` for its children: end when stdin ends, that is, when the parent died."""
+TERM_S = 5.0
+"""How long a process has to end after SIGTERM before it gets SIGKILL."""
+
+
+def free_endpoint() -> str:
+    """A loopback endpoint on which nothing listens now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+class ChildProcesses:
+    """Child processes `robotctl …`, by name, each with a log file in `out`.
+
+    Use as `async with ChildProcesses(…) as processes:`; at the end every child gets SIGTERM, then
+    SIGKILL. Each is in a session of its own, so that Ctrl-C reaches the parent only, and ends by
+    itself when the parent dies (its stdin ends).
+    """
+
+    def __init__(self, endpoint: str, realm: str, out: Path) -> None:
+        self.endpoint, self.realm, self.out = endpoint, realm, out
+        self._commands: dict[str, tuple[str, ...]] = {}
+        self._layers: dict[str, int] = {}
+        self._children: dict[str, asyncio.subprocess.Process] = {}
+        self._waiters: dict[str, asyncio.Task[None]] = {}
+        self._ending: set[str] = set()
+        self._died: asyncio.Future[ProcessDied] | None = None
+
+    async def __aenter__(self) -> ChildProcesses:
+        self._died = asyncio.get_running_loop().create_future()
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        for layer in sorted(set(self._layers.values()), reverse=True):
+            names = [name for name in self._children if self._layers[name] == layer]
+            await asyncio.gather(*(self.stop(name) for name in names))
+        if self._died is not None and not self._died.done():
+            self._died.cancel()
+
+    def declare(self, name: str, *arguments: str, layer: int = 0) -> None:
+        """Say which `robotctl` command `name` runs, for this and every later `start`.
+
+        At the end the highest layer is stopped first, so that nobody complains of a router that
+        has gone, and the recorder sees how the others end.
+        """
+        self._commands[name] = arguments
+        self._layers[name] = layer
+
+    def log(self, name: str) -> Path:
+        """Where the output of `name` goes."""
+        return self.out / f"{name}.log"
+
+    def pid(self, name: str) -> int | None:
+        """The process id of `name` while it runs."""
+        child = self._children.get(name)
+        return child.pid if child is not None and child.returncode is None else None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Every declared process."""
+        return tuple(self._commands)
+
+    async def start(self, name: str) -> None:
+        """Start `name`, for the first time or again; its log goes on where it was.
+
+        Raises:
+            BadArgument: nobody declared it, or it runs.
+        """
+        if name not in self._commands:
+            raise BadArgument(f"there is no process {name!r}; there are {', '.join(self.names)}")
+        if self.pid(name) is not None:
+            raise BadArgument(f"{name} runs already")
+        self._ending.discard(name)
+        arguments = (
+            *("-P", "-m", "cli.main", *self._commands[name]),
+            *("--router", self.endpoint, "--realm", self.realm),
+        )
+        with self.log(name).open("ab") as log:
+            child = await asyncio.create_subprocess_exec(
+                sys.executable,
+                *arguments,
+                stdin=asyncio.subprocess.PIPE,
+                stdout=log,
+                stderr=log,
+                env={**os.environ, END_WITH_STDIN: "1", "PYTHONUNBUFFERED": "1"},
+                start_new_session=True,
+            )
+        self._children[name] = child
+        self._waiters[name] = asyncio.create_task(self._wait(name, child))
+
+    async def kill(self, name: str) -> None:
+        """`kill -9`, as a test of what the others do then; not an unexpected death."""
+        await self._end(name, (signal.SIGKILL,))
+
+    async def stop(self, name: str) -> None:
+        """SIGTERM, and SIGKILL if that does not help."""
+        await self._end(name, (signal.SIGTERM, signal.SIGKILL))
+
+    async def guard(self, work: Coroutine[Any, Any, T]) -> T:
+        """Do `work`; stop it when a process dies unasked.
+
+        Raises:
+            ProcessDied: one did; the message names it, and its log.
+        """
+        if self._died is None:
+            raise RuntimeError("use ChildProcesses in `async with`")
+        task = asyncio.ensure_future(work)
+        try:
+            watched: list[asyncio.Future[Any]] = [task, self._died]
+            await asyncio.wait(watched, return_when=asyncio.FIRST_COMPLETED)
+            if not task.done():
+                raise self._died.result()
+            return task.result()
+        finally:
+            if not task.done():
+                task.cancel()
+                await asyncio.wait({task})
+
+    async def _end(self, name: str, signals: Sequence[signal.Signals]) -> None:
+        child = self._children.get(name)
+        if child is None:
+            return
+        self._ending.add(name)
+        for signum in signals:
+            if child.returncode is not None:
+                break
+            try:
+                child.send_signal(signum)
+                async with asyncio.timeout(TERM_S):
+                    await child.wait()
+            except (TimeoutError, ProcessLookupError):
+                continue
+        await self._waiters[name]
+
+    async def _wait(self, name: str, child: asyncio.subprocess.Process) -> None:
+        code = await child.wait()
+        if child.stdin is not None:
+            child.stdin.close()
+        if name in self._ending or self._died is None or self._died.done():
+            return
+        # What a process said before a signal ended it has nothing to do with its end.
+        how = (
+            f"with exit code {code}{_last_words(self.log(name))}"
+            if code >= 0
+            else f"by {signal.Signals(-code).name}"
+        )
+        self._died.set_result(
+            ProcessDied(f"{name} ended unexpectedly {how}; its log is {self.log(name)}")
+        )
+
+
+def _last_words(log: Path) -> str:
+    """The last line of a log, as part of a sentence."""
+    text = log.read_text(encoding="utf-8", errors="replace")
+    lines = [line.strip() for line in text.split("\n") if line.strip()]
+    return f", saying “{lines[-1].removeprefix('Error: ')}”" if lines else ""
+
+
+def end_with_parent() -> None:
+    """If a demo started this process, give it SIGTERM when the demo is gone, however it went."""
+    if not os.environ.get(END_WITH_STDIN):
+        return
+    stdin = sys.stdin.fileno()
+
+    def wait() -> None:
+        while os.read(stdin, 4096):
+            pass
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    threading.Thread(target=wait, name="end-with-parent", daemon=True).start()

@@ -1,0 +1,163 @@
+"""Verifies goals against the truth of the simulated world: did it really happen?
+
+Pure: what the planner says a goal means (`GoalStatus.conditions`) is held against what the physics
+says (`Truth`, and where robots stand). What a worker or the planner claims plays no part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum
+from typing import NamedTuple
+
+import msgspec
+
+from keyexpr_schema.facts import AT, HELD, LOCATED, Value
+from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
+from keyexpr_schema.payloads.simulation import Truth
+
+
+class Verdict(str, Enum):
+    """What the physics says of a condition or a goal."""
+
+    HOLDS = "holds"
+    FAILS = "fails"
+    NOT_JUDGED = "not judged by physics"
+
+
+class ConditionVerdict(msgspec.Struct, frozen=True, kw_only=True, rename={"verdict": "judgement"}):
+    """One condition, and in a sentence why it holds or does not."""
+
+    condition: Condition
+    verdict: Verdict
+    sentence: str
+
+
+class GoalVerdict(msgspec.Struct, frozen=True, kw_only=True):
+    """One goal: what the physics says, what the planner says, and whether both say reached."""
+
+    goal: str
+    physics: Verdict
+    planner: GoalState
+    agreed: bool
+    sentence: str
+    conditions: tuple[ConditionVerdict, ...]
+
+
+def goal_verdicts(
+    goals: Mapping[str, GoalStatus],
+    truths: Mapping[str, Truth],
+    robot_places: Mapping[str, str | None],
+    beliefs: Mapping[str, Value] = {},
+) -> tuple[GoalVerdict, ...]:
+    """A verdict on every goal, in the order of `goals`.
+
+    `robot_places` says which place each robot really stands in (`None`: in none), `beliefs` where
+    the fleet takes each thing to be. `at(object)` holds when the object's truth is that place,
+    settled and in nobody's hand; lying in a robot's basket counts, as the goal's definition says.
+    `at(robot)` holds when the robot stands there, `held(object)` when a hand really holds it, and
+    `located(object)` when the fleet takes it to be where it really is. Nothing else can be seen by
+    the physics. Of several subjects one is enough. A goal with no conditions is not judged either.
+    """
+    seen = _Seen(truths, robot_places, beliefs)
+    return tuple(_goal_verdict(status, seen) for status in goals.values())
+
+
+class _Seen(NamedTuple):
+    truths: Mapping[str, Truth]
+    robot_places: Mapping[str, str | None]
+    beliefs: Mapping[str, Value]
+
+
+def all_agreed(verdicts: tuple[GoalVerdict, ...]) -> bool:
+    """Whether there are goals, and physics and planner both say of each that it is reached."""
+    return bool(verdicts) and all(verdict.agreed for verdict in verdicts)
+
+
+def _goal_verdict(status: GoalStatus, seen: _Seen) -> GoalVerdict:
+    found = tuple(_condition(each, seen) for each in status.conditions)
+    verdicts = {each.verdict for each in found}
+    if Verdict.FAILS in verdicts:
+        physics = Verdict.FAILS
+    elif Verdict.NOT_JUDGED in verdicts or not found:
+        physics = Verdict.NOT_JUDGED
+    else:
+        physics = Verdict.HOLDS
+    sentence = "; ".join(each.sentence for each in found) or (
+        "nobody said what must hold for this goal, so there is nothing to judge"
+    )
+    if status.state is GoalState.REACHED and physics is Verdict.FAILS:
+        sentence += " (but the planner says it is reached)"
+    elif status.state is not GoalState.REACHED:
+        why = f": {status.reason}" if status.reason else ""
+        sentence += f" (the planner says {status.state.value}{why})"
+    return GoalVerdict(
+        goal=status.goal,
+        physics=physics,
+        planner=status.state,
+        agreed=physics is Verdict.HOLDS and status.state is GoalState.REACHED,
+        sentence=sentence,
+        conditions=found,
+    )
+
+
+def _condition(condition: Condition, seen: _Seen) -> ConditionVerdict:
+    """The best of what can be said of its subjects: one that holds is enough."""
+    found = [_for_subject(condition, subject, seen) for subject in condition.subjects]
+    verdicts = [verdict for verdict, _ in found]
+    if Verdict.HOLDS in verdicts:
+        verdict = Verdict.HOLDS
+    else:
+        unsure = Verdict.NOT_JUDGED in verdicts
+        verdict = Verdict.NOT_JUDGED if unsure else Verdict.FAILS
+    sentence = "; ".join(sentence for each, sentence in found if each is verdict)
+    return ConditionVerdict(condition=condition, verdict=verdict, sentence=sentence)
+
+
+def _for_subject(condition: Condition, subject: str, seen: _Seen) -> tuple[Verdict, str]:
+    relation, wanted = condition.relation, condition.value
+    if relation == AT and subject in seen.truths:
+        return _object_at(seen.truths[subject], wanted)
+    if relation == AT and subject in seen.robot_places:
+        place = seen.robot_places[subject]
+        aim = "" if place == wanted else f", not in {wanted}"
+        return _holds(place == wanted), f"{subject} stands in {place or 'no known place'}{aim}"
+    if relation == HELD and subject in seen.truths:
+        by = seen.truths[subject].held_by
+        where = f"in the hand of {by}" if by else "in nobody's hand"
+        return _holds((by is not None) is wanted), f"{subject} is {where}"
+    if relation == LOCATED and wanted is True and subject in seen.truths:
+        return _located(seen.truths[subject], seen)
+    return Verdict.NOT_JUDGED, f"{condition} is not judged by physics"
+
+
+def _holds(holds: bool) -> Verdict:
+    return Verdict.HOLDS if holds else Verdict.FAILS
+
+
+def _located(truth: Truth, seen: _Seen) -> tuple[Verdict, str]:
+    """Whether the fleet has it where it is; what it takes to be on a robot is where that stands."""
+    belief = seen.beliefs.get(truth.object)
+    where = truth.place or "no known place"
+    if belief is None:
+        return Verdict.FAILS, f"{truth.object} lies in {where}, and the fleet does not know where"
+    name = str(belief)
+    place = seen.robot_places.get(name, name)
+    right = place == truth.place
+    rest = "as the fleet says" if right else f"and the fleet says in {place}"
+    return _holds(right), f"{truth.object} is in {where}, {rest}"
+
+
+def _object_at(truth: Truth, wanted: object) -> tuple[Verdict, str]:
+    where = f"in {truth.place}" if truth.place else "in no known place"
+    if truth.held_by is not None:
+        return (
+            Verdict.FAILS,
+            f"{truth.object} is {where} but still in the hand of {truth.held_by}",
+        )
+    if not truth.settled:
+        return Verdict.FAILS, f"{truth.object} is {where} but has not come to rest"
+    on = f" on {truth.support}" if truth.support else ""
+    if truth.place != wanted:
+        return Verdict.FAILS, f"{truth.object} lies {where}{on}, not in {wanted}"
+    return Verdict.HOLDS, f"{truth.object} lies {where}{on}"

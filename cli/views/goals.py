@@ -1,0 +1,75 @@
+"""Goals as a table, and one on a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import msgspec
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from cli.views.console import table
+from cli.views.text import STATE_STYLE, meaning, seconds, stages
+from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
+
+
+class GoalRow(msgspec.Struct, frozen=True, kw_only=True):
+    """One goal as `robotctl goal list --json` shows it."""
+
+    goal: str
+    spec: Goal | None
+    status: GoalStatus | None
+
+
+def goal_rows(goals: Mapping[str, Goal], status: Mapping[str, GoalStatus]) -> list[GoalRow]:
+    """Every goal in the order it was given."""
+    rows = [GoalRow(goal=g, spec=goals[g], status=status.get(g)) for g in goals]
+    return sorted(rows, key=lambda row: (row.spec.ordinal if row.spec else 0, row.goal))
+
+
+def goals_table(rows: Iterable[GoalRow]) -> Table:
+    """One line a goal."""
+    return table(
+        ["goal", "state", "priority", "text", "means", "plan", "reason"],
+        (
+            (
+                row.goal,
+                (row.status.state if row.status else GoalState.WAITING).value,
+                row.spec.priority if row.spec else "",
+                row.spec.text if row.spec else "",
+                meaning(row.status) if row.status else "",
+                row.status.plan if row.status else "",
+                row.status.reason if row.status else "",
+            )
+            for row in rows
+        ),
+    )
+
+
+def goal_page(row: GoalRow) -> Group:
+    """Its words, what they were understood as, where it stands and why."""
+    status = row.status
+    state = (status.state if status else GoalState.WAITING).value
+    lines = [Text.assemble((row.goal, "bold"), "  ", (state, STATE_STYLE.get(state, "")))]
+    if row.spec is not None:
+        lines.append(Text(f"wanted      “{row.spec.text}”"))
+        lines.append(Text(f"priority    {row.spec.priority}"))
+        if row.spec.due_s is not None:
+            lines.append(Text(f"due         {seconds(row.spec.due_s)} on the fleet's clock"))
+    if status is None:
+        lines.append(Text("understood  nobody has read it yet: no planner runs", "dim"))
+        return Group(*lines)
+    found = stages(status)
+    for number, stage in enumerate(found):
+        head = "understood  " if number == 0 else "then        "
+        now = "  ← now" if len(found) > 1 and number == status.stage else ""
+        lines.append(Text(f"{head}{' and '.join(str(each) for each in stage)}{now}"))
+    if status.plan:
+        lines.append(Text(f"plan        {status.plan}"))
+    if status.note:
+        lines.append(Text(f"note        {status.note}"))
+    if status.reason:
+        lines.append(Text(f"reason      {status.reason}", "red"))
+    lines.append(Text(f"since       {seconds(status.time_s)} on the fleet's clock"))
+    return Group(*lines)

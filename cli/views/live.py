@@ -1,0 +1,154 @@
+"""What happens, as it happens: a picture that is redrawn on a terminal, else a line a change."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING, Any
+
+import typer
+from rich.console import Group, RenderableType
+from rich.live import Live
+from rich.text import Text
+
+from cli.views.console import console, table
+from cli.views.plan_tree import plan_tree
+from cli.views.text import call, carried, doing, seconds
+from keyexpr_schema.payloads.goals import GoalStatus
+from keyexpr_schema.payloads.plans import PlanStatus
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+
+if TYPE_CHECKING:
+    from cli.client.fleet_view import FleetView
+    from keyexpr_schema.transport.session import Change
+
+REDRAW_S = 0.2
+"""How often the picture is redrawn, so that running tasks count up."""
+
+
+class ChangePrinter:
+    """Prints each change of a goal, plan or task as a line, where nothing draws a picture.
+
+    `to_stderr` keeps stdout for data; `only` names the one plan that is of interest.
+    """
+
+    def __init__(self, to_stderr: bool, only: str | None = None) -> None:
+        self._to_stderr = to_stderr
+        self._only = only
+        self._printed: dict[str, str] = {}
+        self.silent = False
+
+    @property
+    def draws(self) -> bool:
+        """Whether there is a terminal to draw on."""
+        return (sys.stderr if self._to_stderr else sys.stdout).isatty()
+
+    @property
+    def to_stderr(self) -> bool:
+        """Whether stdout is kept for data."""
+        return self._to_stderr
+
+    def on_change(self, change: Change[Any, Any]) -> None:
+        """Print the change if it is worth a line that was not printed."""
+        line = change_line(change.value)
+        if line is None or self.silent:
+            return
+        if self._only not in (None, getattr(change.address, "plan", self._only)):
+            return
+        time_s, sentence = line
+        where = change.key.build(change.address)
+        if self._printed.get(where) != sentence:
+            self._printed[where] = sentence
+            time = " " * 10 if time_s is None else f"{time_s:8.1f} s"
+            typer.echo(f"{time}  {sentence}", err=self._to_stderr)
+
+
+def change_line(what: object) -> tuple[float | None, str] | None:
+    """What happened, and when on the fleet's clock [s]; `None` if it is not worth a line."""
+    if isinstance(what, TaskRecord):
+        time_s = {
+            TaskState.ORDERED: what.ordered_s,
+            TaskState.RUNNING: what.started_s,
+        }.get(what.state, what.ended_s)
+        attempt = f" (attempt {what.attempt})" if what.attempt > 1 else ""
+        return time_s, (
+            f"{what.plan}/{what.task} {call(what.skill, what.args, what.robot)} "
+            f"{what.robot or what.actor}: {what.state.value}{attempt}{_because(what.reason)}"
+        )
+    if isinstance(what, GoalStatus):
+        return what.time_s, f"goal {what.goal} is {what.state.value}{_because(what.reason)}"
+    if isinstance(what, PlanStatus):
+        who = ", ".join(f"{actor}→{robot}" for actor, robot in what.allocation.items())
+        return what.time_s, (
+            f"plan {what.plan} revision {what.revision} is {what.state.value}"
+            f"{f' ({who})' if who else ''}{_because(what.reason)}"
+        )
+    return None
+
+
+def _because(reason: str | None) -> str:
+    return f": {reason}" if reason else ""
+
+
+def picture(view: FleetView, only: str | None = None) -> RenderableType:
+    """Plans as trees and robots as a table."""
+    parts: list[RenderableType] = []
+    clock = view.now_s
+    if clock is not None:
+        parts.append(Text(f"{seconds(clock)} on the fleet's clock", "bold"))
+    for name in sorted(view.plans):
+        if only not in (None, name):
+            continue
+        records = {task: record for (of, task), record in view.tasks.items() if of == name}
+        parts.append(
+            plan_tree(
+                view.plans[name],
+                view.plan_status.get(name),
+                records,
+                view.goals,
+                view.goal_status,
+                clock,
+            )
+        )
+    if not view.plans:
+        waiting = ", ".join(view.goals) or "none"
+        parts.append(f"No plan yet; goals: {waiting}")
+    parts.append(
+        table(
+            ["robot", "activity", "place", "holding", "task"],
+            (
+                (s.robot, s.activity.value, s.place, carried(s), doing(s))
+                for _, s in sorted(view.robot_states.items())
+            ),
+        )
+    )
+    return Group(*parts)
+
+
+@asynccontextmanager
+async def live_view(
+    view: FleetView, printer: ChangePrinter, plan: str | None = None
+) -> AsyncIterator[None]:
+    """Redraw `view` on the terminal during the block; without one the changes are printed."""
+    if not printer.draws:
+        yield
+        return
+    printer.silent = True
+    screen = console(sys.stderr if printer.to_stderr else sys.stdout)
+    with Live(console=screen, auto_refresh=False, transient=False) as live:
+
+        async def redraw() -> None:
+            while True:
+                live.update(picture(view, plan), refresh=True)
+                await asyncio.sleep(REDRAW_S)
+
+        task = asyncio.create_task(redraw())
+        try:
+            yield
+        finally:
+            task.cancel()
+            await asyncio.wait([task])
+            live.update(picture(view, plan), refresh=True)
+            printer.silent = False

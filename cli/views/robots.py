@@ -1,0 +1,72 @@
+"""Robots, and how long they really take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Set
+
+import msgspec
+from rich.table import Table
+
+from cli.views.console import table
+from cli.views.text import capabilities, carried, doing, seconds
+from keyexpr_schema.payloads.durations import Durations
+from keyexpr_schema.payloads.robots import RobotSpec, RobotState
+
+
+class RobotRow(msgspec.Struct, frozen=True, kw_only=True):
+    """One robot as `robotctl robots --json` shows it."""
+
+    robot: str
+    connected: bool
+    spec: RobotSpec | None
+    state: RobotState | None
+
+
+def robot_rows(
+    specs: Mapping[str, RobotSpec], states: Mapping[str, RobotState], connected: Set[str]
+) -> list[RobotRow]:
+    """Every robot that is registered or connected; of one that is not, its last state."""
+    return [
+        RobotRow(
+            robot=robot,
+            connected=robot in connected,
+            spec=specs.get(robot),
+            state=states.get(robot),
+        )
+        for robot in sorted(specs.keys() | connected)
+    ]
+
+
+def robots_table(rows: Iterable[RobotRow]) -> Table:
+    """One line a robot."""
+    return table(
+        ["robot", "connected", "activity", "place", "holding", "task", "skills", "capabilities"],
+        (
+            (
+                row.robot,
+                "yes" if row.connected else "no",
+                row.state.activity.value if row.state and row.connected else "",
+                row.state.place if row.state else "",
+                carried(row.state),
+                doing(row.state),
+                ", ".join(row.spec.skills) if row.spec else "not registered",
+                capabilities(row.spec) if row.spec else "",
+            )
+            for row in rows
+        ),
+    )
+
+
+def durations_table(rows: Iterable[Durations]) -> Table:
+    """A line for each skill of each type of robot, and one for its pace."""
+    return table(["model", "what", "mean", "sd", "attempts"], _duration_lines(rows))
+
+
+def _duration_lines(rows: Iterable[Durations]) -> Iterator[tuple[str, ...]]:
+    for known in rows:
+        if known.pace is not None:
+            what = "pace (1: top speed all the way)"
+            pace = known.pace
+            yield known.model, what, f"{pace.mean:.2f}", f"{pace.sd:.2f}", str(pace.count)
+        for skill, each in sorted(known.skills.items()):
+            yield known.model, skill, seconds(each.mean), seconds(each.sd), str(each.count)

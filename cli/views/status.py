@@ -1,0 +1,82 @@
+"""The fleet on one page, and the store's journal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+
+from cli.views.console import table
+from cli.views.goals import GoalRow, goals_table
+from cli.views.plans import plans_table
+from cli.views.robots import RobotRow, robots_table
+from keyexpr_schema.payloads.service import PlannerStatus, Reject, StoreJournal
+
+if TYPE_CHECKING:
+    from cli.client.fleet_view import FleetView
+
+VALUE_WIDTH = 120
+"""Characters of a value shown in the journal; `--json` shows all of it."""
+
+
+def status_page(
+    routers: Sequence[str],
+    realm: str,
+    planner: PlannerStatus | None,
+    planning: bool,
+    robots: Sequence[RobotRow],
+    goals: Sequence[GoalRow],
+    view: FleetView,
+    rejects: Sequence[Reject],
+) -> Group:
+    """One page; a part with nothing in it is one short line."""
+    plans = set(view.plans) | set(view.plan_status)
+    unreadable: list[RenderableType] = ["", rejects_table(rejects)] if rejects else []
+    return Group(
+        f"router   {', '.join(routers)}, realm {realm}",
+        f"planner  {_planner(planner, planning)}",
+        "",
+        robots_table(robots) if robots else "No robots are registered.",
+        "",
+        goals_table(goals) if goals else "No goals.",
+        "",
+        plans_table(view.plans, view.plan_status) if plans else "No plans.",
+        *unreadable,
+    )
+
+
+def _planner(planner: PlannerStatus | None, planning: bool) -> str:
+    if not planning:
+        return "not running (start one with `robotctl planner`)"
+    if planner is None:
+        return "running"
+    offers = (
+        ("strategies", planner.strategies),
+        ("planners", planner.planners),
+        ("allocators", planner.allocators),
+        ("skills", planner.skills),
+    )
+    lines = [f"  {what:<11}{', '.join(names)}" for what, names in offers if names]
+    return "\n".join([f"running, epoch {planner.epoch}", *lines])
+
+
+def rejects_table(rejects: Sequence[Reject]) -> Table:
+    """One line a value that somebody could not read."""
+    return table(
+        ["key", "told by", "times", "reason"],
+        ((r.keyexpr, r.component, r.count, r.reason) for r in rejects),
+        title="Unreadable values",
+    )
+
+
+def journal_table(journal: StoreJournal) -> Table:
+    """One line a change."""
+    rows = []
+    for entry in journal.entries:
+        at = datetime.fromtimestamp(entry.wall_time_s).strftime("%H:%M:%S.%f")[:-3]
+        value = "deleted" if entry.deleted else entry.value or ""
+        rows.append((entry.number, at, entry.keyexpr, value[:VALUE_WIDTH]))
+    return table(["number", "at", "key", "value"], rows)

@@ -1,0 +1,64 @@
+"""Tasks and their reports as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from rich.table import Table
+
+from cli.views.console import table
+from cli.views.text import call, seconds, spent_s
+from keyexpr_schema.payloads.tasks import Report, TaskRecord
+
+
+def tasks_table(records: Iterable[TaskRecord], now_s: float | None = None) -> Table:
+    """One line a task."""
+    return table(
+        ["plan", "task", "call", "robot", "state", "attempt", "spent", "predicted", "after", "why"],
+        (
+            (
+                record.plan,
+                record.task,
+                call(record.skill, record.args, leave_out=record.robot),
+                record.robot,
+                record.state.value,
+                record.attempt or "",
+                seconds(spent_s(record, now_s)),
+                seconds(record.duration_s) if record.duration_s else "",
+                ", ".join(record.after),
+                record.reason,
+            )
+            for record in records
+        ),
+    )
+
+
+def reports_table(reports: Iterable[Report]) -> Table:
+    """One line a try of each attempt at a task; an attempt without tries has one line too."""
+    rows: list[Sequence[object]] = []
+    for report in reports:
+        learned = ", ".join(str(fact.literal) for fact in report.facts)
+        if not report.tries:
+            spent = _between(report.started_s, report.ended_s)
+            rows.append(
+                (
+                    report.attempt,
+                    report.robot,
+                    report.state.value,
+                    "",
+                    spent,
+                    report.reason,
+                    learned,
+                )
+            )
+        for each in report.tries:
+            spent = _between(each.started_s, each.ended_s)
+            state = report.state.value if each is report.tries[-1] else "failed"
+            rows.append(
+                (report.attempt, report.robot, state, each.number, spent, each.reason, learned)
+            )
+    return table(["attempt", "robot", "state", "try", "spent", "reason", "learned"], rows)
+
+
+def _between(start_s: float | None, end_s: float | None) -> str:
+    return seconds(end_s - start_s) if start_s is not None and end_s is not None else ""

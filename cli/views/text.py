@@ -1,0 +1,108 @@
+"""Small pieces of text that many views share."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from keyexpr_schema.payloads.goals import Condition, GoalStatus
+from keyexpr_schema.payloads.plans import PlanStatus
+from keyexpr_schema.payloads.robots import RobotSpec, RobotState
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.world import StatementStatus
+
+STATE_STYLE = {
+    "waiting": "dim",
+    "reading": "dim",
+    "planned": "cyan",
+    "proposed": "yellow",
+    "planning": "cyan",
+    "ready": "cyan",
+    "ordered": "cyan",
+    "running": "yellow",
+    "succeeded": "green",
+    "reached": "green",
+    "failed": "red",
+    "rejected": "red",
+    "cancelled": "magenta",
+}
+"""rich style by the value of a goal's, plan's or task's state."""
+
+
+def seconds(duration_s: float | None) -> str:
+    """`12.3 s`; nothing for `None`."""
+    return "" if duration_s is None else f"{duration_s:.1f} s"
+
+
+def call(skill: str, args: Mapping[str, str], leave_out: str | None = None) -> str:
+    """`pick(object=cup_1)`; arguments equal to `leave_out` (the robot itself) are not shown."""
+    inner = ", ".join(f"{name}={arg}" for name, arg in args.items() if arg != leave_out)
+    return f"{skill}({inner})"
+
+
+def spent_s(record: TaskRecord, now_s: float | None) -> float | None:
+    """Seconds from the start of a task to its end, or to now while it runs."""
+    if record.started_s is None:
+        return None
+    until = record.ended_s
+    if until is None and record.state is TaskState.RUNNING:
+        until = now_s
+    return None if until is None else max(0.0, until - record.started_s)
+
+
+def doing(state: RobotState | None) -> str:
+    """What a robot is at, e.g. `plan-1/t3`."""
+    if state is None or state.task is None:
+        return ""
+    return f"{state.plan}/{state.task}" if state.plan else state.task
+
+
+def stages(status: GoalStatus) -> tuple[tuple[Condition, ...], ...]:
+    """What must hold for a goal, stage by stage."""
+    return status.stages or ((status.conditions,) if status.conditions else ())
+
+
+def meaning(status: GoalStatus) -> str:
+    """What a goal was understood as: its conditions, stage by stage."""
+    return ", then ".join(" and ".join(str(each) for each in stage) for stage in stages(status))
+
+
+def statement_means(status: StatementStatus | None) -> str:
+    """What the planner read out of a statement, to go on with behind it; empty: nobody read it."""
+    if status is None:
+        return ""
+    if not status.facts:
+        return f", not understood: {status.reason or 'it says nothing of the world'}"
+    facts = " and ".join(str(fact.literal) for fact in status.facts)
+    return f", understood as {facts}"
+
+
+def carried(state: RobotState | None) -> str:
+    """What a robot has in its hand and basket."""
+    if state is None:
+        return ""
+    parts = [state.holding] if state.holding and state.holding != "nothing" else []
+    if state.basket:
+        parts.append(f"basket: {', '.join(state.basket)}")
+    return "; ".join(parts)
+
+
+def capabilities(spec: RobotSpec) -> str:
+    """`drive 0.6, grip 1.2`."""
+    return ", ".join(f"{name} {amount:g}" for name, amount in spec.capabilities.items())
+
+
+def outcome(status: PlanStatus) -> str:
+    """Why a plan stands as it does: its reason and every violation, or nothing."""
+    parts = [status.reason] if status.reason else []
+    for each in status.violations:
+        if not any(each.sentence in part for part in parts):
+            parts.append(each.sentence)
+    return "; ".join(parts)
+
+
+def natural_order(name: str) -> tuple[tuple[int, str], ...]:
+    """A sort key that puts `t2` before `t10`."""
+    return tuple(
+        (int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", name)
+    )

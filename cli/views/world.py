@@ -1,0 +1,74 @@
+"""Places, objects, facts and statements as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from rich.table import Table
+
+from cli.views.console import table
+from cli.views.text import statement_means
+from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
+
+
+def places_table(places: Sequence[Place]) -> Table:
+    """One line a place."""
+    return table(
+        ["place", "label", "also called", "surfaces", "distances"],
+        (
+            (
+                place.place,
+                place.label,
+                ", ".join(place.aliases),
+                ", ".join(surface.surface for surface in place.surfaces),
+                ", ".join(f"{to} {m:.1f} m" for to, m in place.travel_m.items()),
+            )
+            for place in places
+        ),
+        title="Places",
+    )
+
+
+def objects_table(objects: Sequence[Object]) -> Table:
+    """One line an object."""
+    return table(
+        ["object", "kind", "label", "also called", "mass", "home"],
+        (
+            (o.object, o.kind, o.label, ", ".join(o.aliases), f"{o.mass_kg:g} kg", o.home)
+            for o in objects
+        ),
+        title="Objects",
+    )
+
+
+def facts_table(facts: Sequence[Fact]) -> Table:
+    """One line a fact."""
+    return table(
+        ["fact", "source", "time"],
+        (
+            (
+                str(fact.literal),
+                fact.source,
+                f"{fact.time_s:.1f} s",
+            )
+            for fact in facts
+        ),
+        title="Facts",
+    )
+
+
+def statements_table(statements: Sequence[Statement], read: Mapping[str, StatementStatus]) -> Table:
+    """One line a statement, with what the planner read out of it."""
+    return table(
+        ["statement", "text", "source", "read as"],
+        (
+            (
+                said.statement,
+                said.text,
+                said.source,
+                statement_means(read.get(said.statement)).removeprefix(", "),
+            )
+            for said in statements
+        ),
+        title="Statements",
+    )

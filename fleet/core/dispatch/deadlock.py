@@ -1,0 +1,28 @@
+"""Deadlock: plans that wait for robots which they keep reserved from one another in a circle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from fleet.core.dispatch.ready_tasks import order_if_ready
+from fleet.core.model.preconditions import Skills
+from fleet.core.state import State
+from keyexpr_schema.payloads.plans import PlanState
+from keyexpr_schema.payloads.tasks import TaskState
+
+
+def break_deadlock(state: State, plans: Iterable[str], skills: Skills) -> State:
+    """Where nobody moves, one task gets its robots in spite of reservations; what that upsets is
+    planned again. `plans` come in the order of their priority."""
+    alive = [entry for entry in state.plans.values() if not entry.ended]
+    if any(entry.job is not None or entry.outstanding() for entry in alive):
+        return state
+    for entry in (state.plans[plan] for plan in plans):
+        if entry.state is not PlanState.RUNNING or entry.replan is not None:
+            continue
+        for record in entry.current():
+            if record.state is TaskState.WAITING:
+                after = order_if_ready(state, entry.plan.plan, record, skills, reservations=False)
+                if after is not state:
+                    return after
+    return state

@@ -1,0 +1,68 @@
+"""Statements: the facts that can be read out of them."""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from fleet.core import events
+from fleet.core.effects import PLANNER_SOURCE
+from fleet.core.model.preconditions import Skills
+from fleet.core.state import State, put, without
+from fleet.core.updates import believe
+from fleet.errors import NotUnderstood
+from fleet.language import statement_facts
+from keyexpr_schema.payloads.world import Fact, StatementStatus
+
+
+def statement_put(state: State, event: events.StatementPut, skills: Skills) -> State:
+    """Keep the statement, and believe the facts that can be read out of it."""
+    statement = event.statement
+    if state.statements.get(statement.statement) == statement:
+        return state
+    state = replace(state, statements=put(state.statements, statement.statement, statement))
+    return _read_statement(state, statement.statement)
+
+
+def statement_deleted(state: State, event: events.StatementDeleted, skills: Skills) -> State:
+    """Drop the statement. Facts once read out of it stay: they may have been confirmed since."""
+    if event.statement not in state.statements:
+        return state
+    return replace(
+        state,
+        statements=without(state.statements, event.statement),
+        statement_states=without(state.statement_states, event.statement),
+    )
+
+
+def understand_again(state: State) -> State:
+    """Read the statements again that were not understood, now that there are other names."""
+    for name, status in state.statement_states.items():
+        if status.reason is not None:
+            state = _read_statement(state, name)
+    return state
+
+
+def _read_statement(state: State, name: str) -> State:
+    try:
+        read = statement_facts(state.statements[name].text, state.vocabulary())
+    except NotUnderstood as error:
+        return _set_status(state, StatementStatus(statement=name, reason=str(error)))
+    facts = tuple(
+        Fact(
+            subject=key.subject,
+            relation=key.relation,
+            value=value,
+            source=f"{PLANNER_SOURCE}:{name}",
+            time_s=state.time_s,
+        )
+        for key, value in read
+    )
+    for fact in facts:
+        state = believe(state, fact)
+    return _set_status(state, StatementStatus(statement=name, facts=facts))
+
+
+def _set_status(state: State, status: StatementStatus) -> State:
+    if state.statement_states.get(status.statement) == status:
+        return state
+    return replace(state, statement_states=put(state.statement_states, status.statement, status))

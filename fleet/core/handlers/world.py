@@ -1,0 +1,69 @@
+"""Places, objects and facts."""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from fleet.core import events
+from fleet.core.dispatch.replan_triggers import contradiction
+from fleet.core.handlers import goals, statements
+from fleet.core.model.preconditions import Skills
+from fleet.core.plan_entry import ReplanScope
+from fleet.core.state import State, put, without
+from fleet.core.updates import believe, set_entry
+from keyexpr_schema.facts import FactKey
+from keyexpr_schema.payloads.plans import PlanState
+
+
+def fact_put(state: State, event: events.FactPut, skills: Skills) -> State:
+    """Believe the fact: its key holds the latest word. A plan that it contradicts is repaired."""
+    fact = event.fact
+    changed = believe(state, fact)
+    if changed is state:
+        return state
+    state = changed
+    for entry in state.plans.values():
+        if entry.state is PlanState.RUNNING and entry.replan is None:
+            reason = contradiction(entry, fact, skills)
+            if reason is not None:
+                state = set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason))
+    return state
+
+
+def fact_deleted(state: State, event: events.FactDeleted, skills: Skills) -> State:
+    """No longer believe anything of that variable."""
+    key = FactKey(event.relation, event.subject)
+    return replace(state, facts=without(state.facts, key)) if key in state.facts else state
+
+
+def place_put(state: State, event: events.PlacePut, skills: Skills) -> State:
+    """A new place may make sentences understood."""
+    if state.places.get(event.place.place) == event.place:
+        return state
+    return vocabulary_changed(
+        replace(state, places=put(state.places, event.place.place, event.place))
+    )
+
+
+def place_deleted(state: State, event: events.PlaceDeleted, skills: Skills) -> State:
+    """Sentences once understood stay so."""
+    return replace(state, places=without(state.places, event.place))
+
+
+def object_put(state: State, event: events.ObjectPut, skills: Skills) -> State:
+    """A new object may make sentences understood."""
+    if state.objects.get(event.object.object) == event.object:
+        return state
+    return vocabulary_changed(
+        replace(state, objects=put(state.objects, event.object.object, event.object))
+    )
+
+
+def object_deleted(state: State, event: events.ObjectDeleted, skills: Skills) -> State:
+    """Sentences once understood stay so."""
+    return replace(state, objects=without(state.objects, event.object))
+
+
+def vocabulary_changed(state: State) -> State:
+    """Read again, with other names, what was not understood."""
+    return statements.understand_again(goals.understand_again(state))

@@ -1,0 +1,132 @@
+"""Changes to the state that handlers, dispatch and revision have in common."""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.state import State, put
+from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState, GoalStatus
+from keyexpr_schema.payloads.plans import Plan, PlanState, Violation
+from keyexpr_schema.payloads.requests import Answer
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.world import Fact
+
+
+def believe(state: State, fact: Fact) -> State:
+    """Believe a fact, whatever was known of its variable."""
+    if state.facts.get(fact.key) == fact:
+        return state
+    return replace(state, facts=put(state.facts, fact.key, fact))
+
+
+def believe_if_newer(state: State, fact: Fact) -> State:
+    """Believe a fact that came on another way than its key, unless a newer one is known."""
+    known = state.fact(fact.relation, fact.subject)
+    return state if known is not None and fact.time_s < known.time_s else believe(state, fact)
+
+
+def set_goal(state: State, status: GoalStatus) -> State:
+    """Change what is published of a goal."""
+    return replace(state, goal_states=put(state.goal_states, status.goal, status))
+
+
+def mark_goals(
+    state: State,
+    goals: tuple[str, ...],
+    to: GoalState,
+    plan: str | None,
+    reason: str | None = None,
+) -> State:
+    """Move those goals that have not ended to another state."""
+    for goal in goals:
+        status = state.goal_states.get(goal)
+        if (
+            status is None
+            or status.state in ENDED_GOALS
+            or (status.state is to and status.reason == reason and status.plan == plan)
+        ):
+            continue
+        state = set_goal(
+            state, replace(status, state=to, plan=plan, reason=reason, time_s=state.time_s)
+        )
+    return state
+
+
+def active_plan_of(state: State, goal: str) -> str | None:
+    """The plan that works on a goal and has not ended."""
+    for plan, entry in state.plans.items():
+        if goal in entry.plan.goals and not entry.ended and entry.state is not PlanState.REJECTED:
+            return plan
+    return None
+
+
+def open_goals(state: State, entry: PlanEntry) -> list[str]:
+    """The goals of the plan that have not ended."""
+    return [
+        goal
+        for goal in entry.plan.goals
+        if goal in state.goal_states and state.goal_states[goal].state not in ENDED_GOALS
+    ]
+
+
+def without_goal(state: State, plan: Plan, goal: str) -> Plan:
+    """The plan, answering for its other goals only; its tasks stay."""
+    rest = tuple(other for other in plan.goals if other != goal)
+    conditions = tuple(
+        condition
+        for other in rest
+        if other in state.goal_states
+        for condition in state.goal_states[other].conditions
+    )
+    return replace(plan, goals=rest, conditions=conditions)
+
+
+def set_entry(state: State, entry: PlanEntry) -> State:
+    """Change what is kept of a plan."""
+    return replace(
+        state, plans=put(state.plans, entry.plan.plan, replace(entry, changed_s=state.time_s))
+    )
+
+
+def set_record(state: State, entry: PlanEntry, record: TaskRecord) -> State:
+    """Change what is kept of a task."""
+    return set_entry(state, replace(entry, records=put(entry.records, record.task, record)))
+
+
+def give_up(state: State, entry: PlanEntry, reason: str) -> State:
+    """End a plan as failed, and with it those of its goals that are not reached."""
+    records = {
+        name: record
+        if record.state is not TaskState.WAITING
+        else replace(record, state=TaskState.CANCELLED, reason="the plan failed")
+        for name, record in entry.records.items()
+    }
+    entry = replace(
+        entry,
+        state=PlanState.FAILED,
+        reason=reason,
+        replan=None,
+        records=records,
+        unwanted=tuple(record.task for record in entry.outstanding()),
+        job=None,
+    )
+    state = set_entry(state, entry)
+    return mark_goals(state, entry.plan.goals, GoalState.FAILED, entry.plan.plan, reason)
+
+
+def answer(
+    state: State,
+    request: str | None,
+    accepted: bool,
+    sentence: str,
+    plan: str | None = None,
+    violations: tuple[Violation, ...] = (),
+) -> State:
+    """Answer a request; no request, no answer."""
+    if request is None:
+        return state
+    reply = Answer(
+        request=request, accepted=accepted, sentence=sentence, plan=plan, violations=violations
+    )
+    return replace(state, answers=put(state.answers, request, reply))

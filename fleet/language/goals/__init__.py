@@ -1,0 +1,1 @@
+"""Goals: clauses that ask for something, to stages of conditions."""

@@ -1,0 +1,135 @@
+"""Clauses about order: tidying up a room or everything, clearing a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from fleet.errors import NotUnderstood
+from fleet.language.goals.moving import HOME_HINT, Moving
+from fleet.language.phrases.locations import PLACES
+from fleet.language.phrases.mentions import Mention
+from fleet.language.refusals import one_of
+from fleet.language.words.verbs import EXAMPLE
+from fleet.language.words.wordlists import WHOLE_HOUSE
+from keyexpr_schema.facts import AT
+
+
+class Tidying(Moving):
+    """Turns clauses about order into wishes that things are where they belong."""
+
+    def tidy(self) -> None:
+        """`tidy up`, `tidy up the kitchen`, `tidy up the coffee table`, `put the cups away`."""
+        cursor = self.cursor
+        cursor.take("up")
+        preposed = cursor.preposition() is not None
+        about_things = cursor.word() in ("it", "them") or (
+            not cursor.next_of(WHOLE_HOUSE) and self.nouns.starts(("object",))
+        )
+        if not preposed and about_things:
+            return self.move(tidy=True)
+        homes = {
+            o.object: o.home
+            for o in self.vocabulary.objects.values()
+            if o.movable and o.home and o.home in self.vocabulary.places
+        }
+        names = tuple(homes)
+        if preposed or not (cursor.at_border() or cursor.word() == "and"):
+            names = self._within(homes)
+            cursor.take("up")
+        cursor.take_word(("up", "away"))
+        if not names:
+            raise NotUnderstood(f"nothing has a home: {HOME_HINT}")
+        return self._to_their_homes(names, homes)
+
+    def clear(self) -> None:
+        """`clear TABLE`, after the verb: what lies on it goes where it belongs."""
+        cursor = self.cursor
+        homes = {o.object: o.home for o in self.vocabulary.objects.values() if o.movable and o.home}
+        mentions = self.place_mentions() or []
+        if not mentions or any(mention.type != "surface" for mention in mentions):
+            places = [name for m in mentions for name in m.subjects] or list(self.vocabulary.places)
+            raise NotUnderstood(
+                f"{cursor.quote(self.began)!r}: name the things and where to bring them, or say "
+                f'"tidy up {one_of(places)}"'
+            )
+        self._to_their_homes([n for m in mentions for n in self._lying_on(m, homes)], homes)
+
+    def _to_their_homes(self, names: Sequence[str], homes: Mapping[str, str]) -> None:
+        start = self.began
+        for name in names:
+            self.draft.add(AT, Mention((name,), "object", start), homes[name])
+        self.subjects.remember([Mention(tuple(names), "object", start)])
+
+    def _within(self, homes: Mapping[str, str]) -> tuple[str, ...]:
+        """What is to be tidied up in the places that come next, or in all of them."""
+        mentions = self.place_mentions()
+        if mentions is None:
+            return tuple(homes)
+        places = dict.fromkeys(n for m in mentions if m.type == "place" for n in m.subjects)
+        if len(places) > 1 and set(places) == set(self.vocabulary.places):
+            return tuple(homes)
+        on_tables = [n for m in mentions if m.type == "surface" for n in self._lying_on(m, homes)]
+        in_rooms = self._misplaced(homes, tuple(places)) if places else ()
+        return tuple(dict.fromkeys((*in_rooms, *on_tables)))
+
+    def _misplaced(self, homes: Mapping[str, str], where: Sequence[str]) -> tuple[str, ...]:
+        """What is believed to be in these places and belongs elsewhere.
+
+        Raises:
+            NotUnderstood: there is nothing of that kind in one of them.
+        """
+        at = self.vocabulary.whereabouts
+        names = tuple(n for n, home in homes.items() if at.get(n) in where and at[n] != home)
+        if tidy := [place for place in where if place not in {at[name] for name in names}]:
+            raise NotUnderstood(
+                f"nothing that belongs elsewhere is believed to be in {one_of(tidy)}: have it "
+                'searched first, or say where things belong with the field "home" of the object'
+            )
+        return names
+
+    def _lying_on(self, table: Mention, homes: Mapping[str, str]) -> list[str]:
+        """What is believed to lie on a surface, all of which must have its home elsewhere.
+
+        Raises:
+            NotUnderstood: there is nothing, or not all of it is known, or some cannot go anywhere.
+        """
+        (place,), surface, vocabulary = table.subjects, one_of(table.surfaces), self.vocabulary
+        there = [n for n, where in vocabulary.whereabouts.items() if where == place]
+        there = [n for n in there if n in vocabulary.objects and vocabulary.objects[n].movable]
+        searched = f"have {place} searched first"
+        if unsure := [name for name in there if name not in vocabulary.rests]:
+            raise NotUnderstood(
+                f"it is not known whether {one_of(unsure)} lies on {surface}: {searched}, or name "
+                "the things and where to bring them"
+            )
+        names = [name for name in there if vocabulary.rests[name] in table.surfaces]
+        if not names:
+            raise NotUnderstood(f"nothing is believed to lie on {surface}: {searched}")
+        if stuck := [name for name in names if homes.get(name, place) == place]:
+            raise NotUnderstood(
+                f"of what lies on {surface}, {' and '.join(stuck)} has no home in another place: "
+                "say where to bring it"
+            )
+        return names
+
+    def places(self) -> tuple[str, ...]:
+        """The places that come next: one, several, or all of them."""
+        named = self.place_mentions()
+        if named is None:
+            return tuple(self.vocabulary.places)
+        return tuple(dict.fromkeys(name for m in named for name in m.subjects))
+
+    def place_mentions(self) -> list[Mention] | None:
+        """The places that come next, and places of surfaces; `None` for the whole house."""
+        cursor = self.cursor
+        named = cursor.lexicon.exact(cursor.tokens, cursor.at, PLACES)[1]
+        if not named and self.vocabulary.places and cursor.take_of(WHOLE_HOUSE):
+            return None
+        mentions = []
+        for subject in self.subjects.read("a place", PLACES):
+            mention = self.subjects.resolve(subject)
+            if mention.open or mention.type not in PLACES:
+                raise NotUnderstood(f"it does not say which place: {EXAMPLE}")
+            mentions.append(replace(mention, surfaces=subject.surfaces))
+        return mentions

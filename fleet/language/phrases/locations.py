@@ -1,0 +1,162 @@
+"""Where things are or shall be: "in the kitchen", "on the table in the hallway"."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fleet.errors import NotUnderstood
+from fleet.language.phrases.cursor import Cursor
+from fleet.language.phrases.mentions import NounPhrase, Quantity
+from fleet.language.phrases.noun_phrases import NounPhrases
+from fleet.language.refusals import one_of
+from fleet.language.vocabulary import Vocabulary
+from fleet.language.words.lexicon import EntityType
+from fleet.language.words.wordlists import BASKETS, DEFINITE, INDEFINITE
+
+PLACES: tuple[EntityType, ...] = ("place", "surface")
+SPOTS: tuple[EntityType, ...] = ("place", "robot", "surface")
+
+
+@dataclass(frozen=True)
+class Locative:
+    """One prepositional phrase: `to`, `in` or `from`, and what stands behind it."""
+
+    preposition: str
+    noun: NounPhrase
+
+
+@dataclass(frozen=True)
+class Where:
+    """What the prepositional phrases of one clause say: places or robots, by id.
+
+    `source_surface` and `target_surface` are the surfaces in those places, where one is named.
+    `each`: instead of one target, all of several ("to every room"); `text` are their words.
+    """
+
+    source: str | None = None
+    target: str | None = None
+    target_type: EntityType = "place"
+    source_surface: str | None = None
+    target_surface: str | None = None
+    each: tuple[str, ...] = ()
+    text: str = ""
+
+
+class Locations:
+    """Reads prepositional phrases of place."""
+
+    def __init__(self, cursor: Cursor, nouns: NounPhrases, vocabulary: Vocabulary) -> None:
+        self.cursor, self.nouns, self.vocabulary = cursor, nouns, vocabulary
+
+    def locative(self, preposition: str) -> Locative:
+        """What stands behind a preposition that was just read.
+
+        Raises:
+            NotUnderstood: it is neither a place, nor a robot, nor a robot's basket.
+        """
+        cursor, start = self.cursor, self.cursor.at
+        if (basket := self._basket(start)) is not None:
+            return Locative(preposition, basket)
+        noun = self.nouns.noun("a place", SPOTS)
+        if noun.type == "robot":
+            possessed = cursor.take("'s") or cursor.take("'")
+            if cursor.take_word(BASKETS):
+                noun = noun.among(self._with_baskets()) if noun.generic else noun
+                if not noun.found:
+                    raise NotUnderstood("no robot with a basket is known")
+            elif possessed:
+                raise cursor.refusal(
+                    f"{cursor.quote(start)!r} is followed by what is not understood; "
+                    "a robot has a basket"
+                )
+        return Locative(preposition, noun)
+
+    def _with_baskets(self) -> list[str]:
+        return sorted(
+            n for n, spec in self.vocabulary.robots.items() if "basket" in spec.capabilities
+        )
+
+    def _basket(self, start: int) -> NounPhrase | None:
+        """`the basket`, `its basket`, `the basket of the robot`."""
+        cursor = self.cursor
+        cursor.take_word(DEFINITE | INDEFINITE)
+        named = cursor.lexicon.exact(cursor.tokens, cursor.at, SPOTS)[1]
+        if named or not cursor.take_word(BASKETS):
+            cursor.at = start
+            return None
+        if cursor.take("of"):
+            return self.nouns.noun("a robot", ("robot",))
+        owners = self._with_baskets()
+        found = tuple(e for e in cursor.lexicon.entities if e.type == "robot" and e.id in owners)
+        if len(found) != 1:
+            reason = f"could be that of {one_of(owners)}" if found else "is no robot's"
+            raise NotUnderstood(f"{cursor.quote(start)!r} {reason}: say whose")
+        return NounPhrase(found, cursor.quote(start), start, Quantity.THE, exact=True)
+
+    def where(self, locatives: Sequence[Locative]) -> Where:
+        """Source and target of a clause that moves something, or says where something is.
+
+        What stands behind "to" is the target; without it, what stands behind the last "in". Other
+        phrases narrow the target ("on the table in the kitchen") or name the source.
+
+        Raises:
+            NotUnderstood: a phrase could be several places, or the phrases do not go together.
+        """
+        targets = [p for p in locatives if p.preposition == "to"]
+        inside = [p for p in locatives if p.preposition == "in"]
+        sources = [p for p in locatives if p.preposition == "from"]
+        if targets:
+            first_to = locatives.index(targets[0])
+            sources = [*(p for p in locatives[:first_to] if p in inside), *sources]
+            targets = [p for p in locatives if p not in sources]
+        else:
+            targets = inside
+            while len(targets) > 1 and not _shared(targets):
+                sources = [targets[0], *sources]
+                targets = targets[1:]
+        source, _ = self._one(sources) if sources else (None, "place")
+        if len(targets) == 1 and targets[0].noun.quantity is Quantity.ALL:
+            each = targets[0].noun.resolve()
+            if each.type == "place" and len(each.subjects) > 1:
+                return Where(source, each=each.subjects, text=targets[0].noun.text)
+        target, target_type = self._one(targets) if targets else (None, "place")
+        if source is not None and source == target:
+            raise NotUnderstood(f"the sentence says both from and to {source}: say where to")
+        kind: EntityType = "robot" if target_type == "robot" else "place"
+        return Where(source, target, kind, _surface(sources, source), _surface(targets, target))
+
+    def _one(self, locatives: Sequence[Locative]) -> tuple[str, EntityType]:
+        """The one place or robot that all the phrases mean."""
+        shared = _shared(locatives)
+        if not shared:
+            names = " and ".join(repr(locative.noun.text) for locative in locatives)
+            raise NotUnderstood(
+                f'{names} are two places; if one is to come after the other, say "then"'
+            )
+        for locative in locatives:
+            mention = locative.noun.among(shared).resolve()
+            if mention.open or len(mention.subjects) != 1:
+                raise NotUnderstood(
+                    f"{locative.noun.text!r} could be {one_of(mention.subjects)}: say which"
+                )
+        return mention.subjects[0], mention.type
+
+
+def _surface(locatives: Sequence[Locative], place: str | None) -> str | None:
+    """The one surface of the place that the phrases name, if they name one."""
+    found = {
+        entity.id
+        for locative in locatives
+        for entity in locative.noun.found
+        if entity.type == "surface" and entity.stands_for == place
+    }
+    return found.pop() if len(found) == 1 else None
+
+
+def _shared(locatives: Sequence[Locative]) -> frozenset[str]:
+    """Who could be meant by every one of the phrases."""
+    found = frozenset(locatives[0].noun.names)
+    for locative in locatives[1:]:
+        found &= frozenset(locative.noun.names)
+    return found

@@ -1,0 +1,1 @@
+"""Statements: sentences that say what holds, to facts."""

@@ -1,0 +1,54 @@
+"""Oversubscription: a plan for those goals that can be reached, where not all can."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from fleet.core.checker.checked_plan import CheckedPlan
+from fleet.planners.base import NoPlan, Planner, PlanningProblem
+from keyexpr_schema.payloads.plans import Plan
+
+
+@dataclass(frozen=True)
+class PartialPlan:
+    """A plan, and the goals that it leaves out, each with the reason.
+
+    `changed` is false for a residual plan that stays as it was.
+    """
+
+    checked: CheckedPlan
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    changed: bool = True
+
+    @property
+    def plan(self) -> Plan:
+        """The plan without its check."""
+        return self.checked.plan
+
+
+def plan_reachable_goals(
+    planner: Planner,
+    feasibility: Planner,
+    problem: PlanningProblem,
+    reached: frozenset[str] = frozenset(),
+) -> PartialPlan | NoPlan:
+    """A plan for all goals, or else for all but those that `feasibility` cannot plan even alone.
+
+    Goals that are `reached` stay in the plan, so that it does not undo them; a plan for nothing
+    else is no plan.
+    """
+    made = planner.plan(problem)
+    if isinstance(made, CheckedPlan):
+        return PartialPlan(made)
+    left_out: dict[str, str] = {}
+    for goal in problem.goals if len(problem.goals) > 1 else ():
+        if goal.goal not in reached:
+            alone = feasibility.plan(replace(problem, goals=(goal,)))
+            if isinstance(alone, NoPlan):
+                left_out[goal.goal] = alone.reason
+    rest = tuple(goal for goal in problem.goals if goal.goal not in left_out)
+    if not left_out or all(goal.goal in reached for goal in rest):
+        return made
+    again = planner.plan(replace(problem, goals=rest))
+    return again if isinstance(again, NoPlan) else PartialPlan(again, left_out)

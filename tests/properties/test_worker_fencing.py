@@ -1,0 +1,216 @@
+"""Laws of a worker's fencing: whatever is delivered, whenever it crashes, no attempt runs twice."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from keyexpr_schema.payloads.tasks import Order, ReportState
+from workers.orders.fencing import (
+    Accept,
+    Attempt,
+    AttemptName,
+    Cancel,
+    Ignore,
+    Ledger,
+    Phase,
+    Refuse,
+    Renew,
+    Repeat,
+    attempt_name,
+    decide,
+    superseded,
+)
+from workers.orders.journal import Journal
+from workers.orders.reports import make_report
+
+small = st.integers(1, 3)
+orders = st.builds(
+    Order,
+    robot=st.just("hsr"),
+    plan=st.sampled_from(["p", "q"]),
+    task=st.sampled_from(["t1", "t2"]),
+    revision=small,
+    attempt=small,
+    epoch=small,
+    skill=st.just("navigate"),
+    args=st.just({"robot": "hsr", "to": "kitchen"}),
+    deadline_s=st.just(60.0),
+    cancelled=st.booleans(),
+)
+
+
+class Fenced:
+    """The shell's use of `decide`, with everything on disk that the journal would have there."""
+
+    def __init__(self) -> None:
+        self.ledger = Ledger()
+        self.queue: list[AttemptName] = []
+        self.running: AttemptName | None = None
+        self.started: list[AttemptName] = []
+        self.fences: tuple[int, dict[str, int]] = (0, {})
+        self.met: set[str] = set()
+
+    def end(self, name: AttemptName, state: ReportState) -> None:
+        order = self.ledger.attempts[name].order
+        report = make_report(order, "r1", state)
+        self.ledger.put(Attempt(order, Phase.ENDED, report))
+
+    def deliver(self, order: Order) -> None:
+        name = attempt_name(order)
+        before = self.ledger.attempts.get(name)
+        older = order.epoch < self.ledger.epoch or order.revision < self.ledger.revisions.get(
+            order.plan, 0
+        )
+        decision = decide(self.ledger, order)
+        self.met.add(type(decision).__name__)
+        assert self.ledger.attempts.get(name) is before, "deciding changes nothing"
+        if before is not None and before.phase is Phase.ENDED:
+            assert decision == Repeat(before.report)
+        if older:
+            assert isinstance(decision, (Refuse, Ignore, Repeat))
+        match decision:
+            case Accept():
+                assert not order.cancelled
+                assert order.attempt > max(
+                    (a for *t, a in self.started if t == [*name[:2]]), default=0
+                )
+                for past in superseded(self.ledger, order):
+                    if past in self.queue:
+                        self.met.add("superseded in the queue")
+                        self.queue.remove(past)
+                        self.end(past, ReportState.CANCELLED)
+                self.ledger.put(Attempt(order, Phase.QUEUED))
+                self.queue.append(name)
+            case Renew():
+                self.ledger.raise_fences(order)
+            case Cancel():
+                if name in self.queue:
+                    self.queue.remove(name)
+                    self.end(name, ReportState.CANCELLED)
+                elif name == self.running:
+                    self.met.add("cancelled while it ran")
+                    self.end(name, ReportState.CANCELLED)
+                    self.running = None
+                else:
+                    assert before is None
+                    self.ledger.put(
+                        Attempt(order, Phase.ENDED, make_report(order, "r", ReportState.CANCELLED))
+                    )
+            case Refuse():
+                assert before is None
+            case Repeat() | Ignore():
+                pass
+
+    def deliver_again(self, number: int, cancelled: bool, newer: int) -> None:
+        names = list(self.ledger.attempts)
+        if not names:
+            return
+        order = self.ledger.attempts[names[-1 - number % len(names)]].order
+        epoch = self.ledger.epoch + newer
+        revision = self.ledger.revisions[order.plan] + newer
+        self.deliver(replace(order, epoch=epoch, revision=revision, cancelled=cancelled))
+
+    def go_on(self, state: ReportState = ReportState.FAILED) -> None:
+        """End what runs, or else start what is first in the queue."""
+        if self.running is not None:
+            self.end(self.running, state)
+            self.running = None
+        elif self.queue:
+            self.running = self.queue.pop(0)
+            self.ledger.put(Attempt(self.ledger.attempts[self.running].order, Phase.STARTED))
+            self.started.append(self.running)
+
+    def withdraw(self) -> None:
+        if self.queue:
+            self.ledger.drop(self.queue.pop())
+
+    def crash_and_restart(self) -> None:
+        kept = Ledger(epoch=self.ledger.epoch, revisions=dict(self.ledger.revisions))
+        for attempt in self.ledger.attempts.values():
+            if attempt.phase is not Phase.QUEUED:
+                kept.put(attempt)
+        self.ledger, self.queue, self.running = kept, [], None
+        for attempt in kept.in_phase(Phase.STARTED):
+            self.met.add("interrupted by a crash")
+            self.end(attempt_name(attempt.order), ReportState.INTERRUPTED)
+
+    def check(self) -> None:
+        """One attempt never runs twice; attempts of a task start in order; fences only rise."""
+        assert len(self.started) == len(set(self.started))
+        for plan, task in {name[:2] for name in self.started}:
+            attempts = [a for p, t, a in self.started if (p, t) == (plan, task)]
+            assert attempts == sorted(attempts)
+        epoch, revisions = self.fences
+        assert self.ledger.epoch >= epoch
+        assert all(self.ledger.revisions[plan] >= seen for plan, seen in revisions.items())
+        self.fences = (self.ledger.epoch, dict(self.ledger.revisions))
+
+
+Step = Callable[[Fenced], None]
+steps: st.SearchStrategy[Step] = st.one_of(
+    st.builds(lambda o: lambda m: m.deliver(o), orders),
+    st.builds(
+        lambda n, c, up: lambda m: m.deliver_again(n, c, up),
+        st.integers(0, 9),
+        st.booleans(),
+        st.integers(0, 1),
+    ),
+    st.sampled_from([Fenced.go_on, Fenced.go_on, Fenced.withdraw, Fenced.crash_and_restart]),
+)
+
+
+def test_one_attempt_never_runs_twice_whatever_comes() -> None:
+    met: Counter[str] = Counter()
+
+    @settings(max_examples=300, deadline=None)
+    @given(st.lists(steps, min_size=15, max_size=50))
+    def law(taken: list[Step]) -> None:
+        fenced = Fenced()
+        for step in taken:
+            step(fenced)
+            fenced.check()
+        met.update(fenced.met)
+
+    law()
+    decisions = {kind.__name__ for kind in (Accept, Renew, Cancel, Repeat, Refuse, Ignore)}
+    crises = {"superseded in the queue", "cancelled while it ran", "interrupted by a crash"}
+    assert met.keys() == decisions | crises
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.lists(st.tuples(orders, st.sampled_from(["queue", "start", "end", "open"])), max_size=12))
+def test_the_journal_on_disk_is_the_ledger_in_memory(steps: list[tuple[Order, str]]) -> None:
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "hsr.journal"
+        ledger = Ledger()
+        journal = Journal(path).__enter__()
+        try:
+            for order, step in steps:
+                name = attempt_name(order)
+                if step == "queue" and name not in ledger.attempts:
+                    journal.queued(order)
+                    ledger.put(Attempt(order, Phase.QUEUED))
+                elif step == "start" and name in ledger.attempts:
+                    journal.started(order, make_report(order, "r", ReportState.STARTED))
+                    ledger.put(Attempt(order, Phase.STARTED))
+                elif step == "end":
+                    report = make_report(order, "r", ReportState.SUCCEEDED)
+                    journal.ended(order, report)
+                    ledger.put(Attempt(order, Phase.ENDED, report))
+                elif step == "open":
+                    journal.__exit__(None, None, None)
+                    journal = Journal(path).__enter__()
+                    for attempt in ledger.in_phase(Phase.QUEUED):
+                        ledger.drop(attempt_name(attempt.order))
+                assert journal.ledger.epoch == ledger.epoch
+                assert journal.ledger.revisions == ledger.revisions
+                assert journal.ledger.attempts == ledger.attempts
+        finally:
+            journal.__exit__(None, None, None)

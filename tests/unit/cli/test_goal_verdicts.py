@@ -1,0 +1,162 @@
+"""The judge: goals against the truth."""
+
+from __future__ import annotations
+
+import pytest
+
+from cli.demo.verdict import GoalVerdict, Verdict, all_agreed, goal_verdicts
+from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
+from keyexpr_schema.payloads.simulation import Truth
+
+
+def status(
+    state: GoalState = GoalState.REACHED, relation: str = "at", subject: str = "cup_1"
+) -> GoalStatus:
+    return GoalStatus(
+        goal="g",
+        state=state,
+        conditions=(Condition(relation=relation, subject=subject, value="hallway"),),
+        reason=None if state is GoalState.REACHED else "the cup is gone",
+    )
+
+
+def truth(
+    place: str | None = "hallway",
+    support: str | None = "hallway_table",
+    held_by: str | None = None,
+    settled: bool = True,
+) -> Truth:
+    return Truth(
+        object="cup_1",
+        kind="cup",
+        time_s=1.0,
+        point_m=(5.0, 5.6, 0.6),
+        place=place,
+        support=support,
+        held_by=held_by,
+        settled=settled,
+    )
+
+
+def verdict(goal: GoalStatus, found: Truth | None, robots: dict[str, str | None]) -> GoalVerdict:
+    (only,) = goal_verdicts({"g": goal}, {"cup_1": found} if found else {}, robots)
+    return only
+
+
+@pytest.mark.parametrize("support", ["hallway_table", "floor", "locobot"])
+def test_an_object_that_lies_in_the_place_is_there_whatever_it_lies_on(support: str) -> None:
+    found = verdict(status(), truth(support=support), {})
+    assert found.physics is Verdict.HOLDS
+    assert found.agreed
+    assert found.sentence == f"cup_1 lies in hallway on {support}"
+
+
+@pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        (truth(place="kitchen", support="kitchen_table"), "lies in kitchen on kitchen_table, not"),
+        (truth(held_by="hsr", support=None), "still in the hand of hsr"),
+        (truth(settled=False), "has not come to rest"),
+        (truth(place=None, support="floor"), "in no known place"),
+    ],
+)
+def test_physics_overrules_a_planner_that_says_reached(found: Truth, words: str) -> None:
+    said = verdict(status(), found, {})
+    assert said.physics is Verdict.FAILS
+    assert not said.agreed
+    assert words in said.sentence
+    assert "but the planner says it is reached" in said.sentence
+
+
+def test_a_goal_that_holds_but_was_given_up_is_not_agreed() -> None:
+    said = verdict(status(GoalState.FAILED), truth(), {})
+    assert said.physics is Verdict.HOLDS
+    assert not said.agreed
+    assert "the planner says failed: the cup is gone" in said.sentence
+
+
+def test_a_robot_stands_where_its_senses_say() -> None:
+    goal = status(subject="hsr")
+    assert verdict(goal, None, {"hsr": "hallway"}).agreed
+    elsewhere = verdict(goal, None, {"hsr": "kitchen"})
+    assert elsewhere.sentence.startswith("hsr stands in kitchen, not in hallway")
+    assert not elsewhere.agreed
+
+
+@pytest.mark.parametrize(
+    "goal",
+    [
+        status(relation="clean"),
+        status(subject="ghost"),
+        GoalStatus(goal="g", state=GoalState.REACHED),
+    ],
+)
+def test_what_physics_cannot_see_is_never_agreed(goal: GoalStatus) -> None:
+    said = verdict(goal, truth(), {})
+    assert said.physics is Verdict.NOT_JUDGED
+    assert not said.agreed
+
+
+def test_one_failing_condition_fails_the_goal() -> None:
+    goal = GoalStatus(
+        goal="g",
+        state=GoalState.REACHED,
+        conditions=(
+            Condition(relation="at", subject="cup_1", value="hallway"),
+            Condition(relation="at", subject="hsr", value="hallway"),
+        ),
+    )
+    assert verdict(goal, truth(), {"hsr": "hallway"}).agreed
+    assert verdict(goal, truth(), {"hsr": None}).physics is Verdict.FAILS
+
+
+def test_no_goals_is_no_success() -> None:
+    assert not all_agreed(())
+    assert all_agreed(goal_verdicts({"g": status()}, {"cup_1": truth()}, {}))
+
+
+def derived(relation: str, value: bool = True, *subjects: str) -> GoalStatus:
+    condition = Condition(
+        relation=relation, subject=(subjects or ("cup_1",))[0], value=value, any_of=subjects
+    )
+    return GoalStatus(goal="g", state=GoalState.REACHED, conditions=(condition,))
+
+
+def test_one_subject_of_several_is_enough() -> None:
+    goal = GoalStatus(
+        goal="g",
+        state=GoalState.REACHED,
+        conditions=(
+            Condition(
+                relation="at", subject="cup_2", value="hallway", any_of=("cup_2", "cup_1", "ghost")
+            ),
+        ),
+    )
+    truths = {"cup_1": truth(), "cup_2": truth("kitchen")}
+    (found,) = goal_verdicts({"g": goal}, truths, {})
+    assert found.agreed
+    assert found.sentence == "cup_1 lies in hallway on hallway_table"
+    (nowhere,) = goal_verdicts(
+        {"g": goal}, {"cup_1": truth("kitchen"), "cup_2": truth("kitchen")}, {}
+    )
+    assert nowhere.physics is Verdict.NOT_JUDGED  # nobody sees the ghost
+
+
+@pytest.mark.parametrize(
+    ("held_by", "wanted", "agreed"),
+    [("hsr", True, True), (None, True, False), (None, False, True), ("hsr", False, False)],
+)
+def test_the_physics_sees_hands(held_by: str | None, wanted: bool, agreed: bool) -> None:
+    said = verdict(derived("held", wanted), truth(held_by=held_by), {})
+    assert said.agreed is agreed
+
+
+@pytest.mark.parametrize(
+    ("told", "agreed"), [("hallway", True), ("kitchen", False), (None, False), ("hsr", True)]
+)
+def test_what_is_found_is_where_the_fleet_says(told: str | None, agreed: bool) -> None:
+    (said,) = goal_verdicts(
+        {"g": derived("located")}, {"cup_1": truth()}, {"hsr": "hallway"}, {"cup_1": told}
+    )
+    assert said.agreed is agreed
+    assert said.physics is not Verdict.NOT_JUDGED

@@ -1,0 +1,196 @@
+"""What robotctl draws."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
+from rich.console import RenderableType
+
+from cli.commands.processes import parse_speed
+from cli.commands.tasks import parse_args
+from cli.errors import BadArgument
+from cli.views.console import console, table
+from cli.views.live import change_line
+from cli.views.plan_tree import in_order, plan_tree
+from cli.views.text import natural_order, outcome
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus, Task, Violation
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+
+GOAL = "bring"
+TASKS = (
+    Task(
+        task="t2",
+        skill="pick",
+        args={"robot": "?a1", "object": "cup_1"},
+        actor="a1",
+        after=("t1",),
+        goal=GOAL,
+        duration_s=8.0,
+    ),
+    Task(
+        task="t1",
+        skill="navigate",
+        args={"robot": "?a1", "place": "kitchen"},
+        actor="a1",
+        goal=GOAL,
+    ),
+)
+PLAN = Plan(
+    plan="p1",
+    goals=(GOAL,),
+    conditions=(Condition(relation="at", subject="cup_1", value="hallway"),),
+    tasks=TASKS,
+)
+
+
+def drawn(what: RenderableType) -> str:
+    file = io.StringIO()
+    console(file).print(what)
+    return file.getvalue()
+
+
+def test_the_tree_shows_goals_tasks_dependencies_actors_states_and_times() -> None:
+    status = PlanStatus(
+        plan="p1", revision=1, state=PlanState.RUNNING, allocation={"a1": "hsr"}, made_by="symbolic"
+    )
+    running = TaskRecord(
+        plan="p1",
+        revision=1,
+        task="t2",
+        skill="pick",
+        args={"robot": "hsr", "object": "cup_1"},
+        actor="a1",
+        robot="hsr",
+        state=TaskState.RUNNING,
+        attempt=2,
+        started_s=10.0,
+    )
+    text = drawn(
+        plan_tree(
+            PLAN,
+            status,
+            {"t2": running},
+            {GOAL: Goal(goal=GOAL, text="Bring [the] cup.")},
+            {GOAL: GoalStatus(goal=GOAL, state=GoalState.RUNNING)},
+            now_s=13.5,
+        )
+    )
+    lines = [line.strip() for line in text.splitlines()]
+    assert lines[0].startswith("p1 revision 1  running")
+    assert "“Bring [the] cup.”" in lines[1]
+    assert "t1 navigate(place=kitchen)  a1→hsr  waiting" in lines[2]
+    assert "t2 pick(object=cup_1)  a1→hsr  running 3.5 s of about 8.0 s" in lines[3]
+    assert "attempt 2" in lines[3]
+    assert "after t1" in lines[3]
+
+
+def test_work_of_earlier_revisions_stays_in_the_tree() -> None:
+    def earlier(task: str, started_s: float | None) -> TaskRecord:
+        return TaskRecord(
+            plan="p1",
+            revision=1,
+            task=task,
+            skill="search",
+            args={},
+            actor="a0",
+            robot="hsr",
+            state=TaskState.SUCCEEDED if started_s is not None else TaskState.CANCELLED,
+            goal=GOAL,
+            started_s=started_s,
+            ended_s=started_s,
+        )
+
+    text = drawn(
+        plan_tree(PLAN, None, {"t0": earlier("t0", 1.0), "t9": earlier("t9", None)}, {}, {})
+    )
+    assert "✓ t0 search()  a0→hsr  succeeded" in text
+    assert "t9" not in text
+
+
+def test_names_with_numbers_are_in_the_order_people_expect() -> None:
+    assert sorted(["t10", "t2", "a1", "t1"], key=natural_order) == ["a1", "t1", "t2", "t10"]
+
+
+def test_a_rejected_plan_shows_why() -> None:
+    status = PlanStatus(
+        plan="p1",
+        revision=1,
+        state=PlanState.REJECTED,
+        violations=(Violation(code="cycle", sentence="t1 waits for itself."),),
+    )
+    assert "t1 waits for itself." in drawn(plan_tree(PLAN, status, {}, {}, {}))
+    said = replace(status, reason="it was rejected: t1 waits for itself.")
+    assert outcome(said) == "it was rejected: t1 waits for itself."
+
+
+@given(st.data())
+def test_tasks_come_after_what_they_wait_for_and_none_is_lost(data: st.DataObject) -> None:
+    number = data.draw(st.integers(1, 8))
+    after = [
+        tuple(f"t{j}" for j in data.draw(st.sets(st.integers(0, i - 1))) if i) if i else ()
+        for i in range(number)
+    ]
+    tasks = [
+        Task(task=f"t{i}", skill="wait", args={}, actor="a", after=after[i]) for i in range(number)
+    ]
+    shuffled = data.draw(st.permutations(tasks))
+    places = {task.task: place for place, task in enumerate(in_order(shuffled))}
+    assert len(places) == number
+    assert all(places[a] < places[task.task] for task in tasks for a in task.after)
+
+
+def test_a_cycle_is_drawn_not_followed() -> None:
+    loop = [
+        Task(task="t1", skill="wait", args={}, actor="a", after=("t2",)),
+        Task(task="t2", skill="wait", args={}, actor="a", after=("t1", "gone")),
+    ]
+    assert {task.task for task in in_order(loop)} == {"t1", "t2"}
+
+
+def test_text_is_never_markup() -> None:
+    assert "[bold]x[/bold] :smile:" in drawn(table(["a"], [("[bold]x[/bold] :smile:",)]))
+
+
+def test_a_change_in_a_line() -> None:
+    record = TaskRecord(
+        plan="p1",
+        revision=1,
+        task="t1",
+        skill="pick",
+        args={"object": "cup_1"},
+        actor="a1",
+        robot="hsr",
+        state=TaskState.FAILED,
+        attempt=3,
+        ended_s=12.0,
+        reason="it slipped",
+    )
+    assert change_line(record) == (
+        12.0,
+        "p1/t1 pick(object=cup_1) hsr: failed (attempt 3): it slipped",
+    )
+    assert change_line(GoalStatus(goal="g", state=GoalState.REACHED, time_s=3.0)) == (
+        3.0,
+        "goal g is reached",
+    )
+    assert change_line("anything else") is None
+
+
+def test_arguments_of_tasks() -> None:
+    assert parse_args(["place=kitchen", "object=cup_1"]) == {"place": "kitchen", "object": "cup_1"}
+    for bad in (["place"], ["=x"], ["place="], ["a=1", "a=2"]):
+        with pytest.raises(BadArgument):
+            parse_args(bad)
+
+
+def test_speeds() -> None:
+    assert parse_speed("max") is None
+    assert parse_speed("2.5") == 2.5
+    for bad in ("fast", "0", "-1", "nan", "inf"):
+        with pytest.raises(BadArgument, match=bad):
+            parse_speed(bad)

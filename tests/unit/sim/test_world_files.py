@@ -1,0 +1,242 @@
+"""World, robot and mission files: what they give, and how they say what is wrong with them."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from sim.errors import BadFile
+from sim.files.mission_file import load_mission, load_robot
+from sim.files.solids import solids
+from sim.files.world_file import load_world
+from sim.files.world_payloads import object_payloads, place_payloads
+from sim.reach import out_of_reach
+
+CONFIGS = Path(__file__).parents[3] / "configs"
+HOME = CONFIGS / "worlds" / "home.yaml"
+# `on` is a boolean to PyYAML's own loader, and a word to ours.
+RAW: dict[str, Any] = yaml.load(HOME.read_text(), yaml.BaseLoader)
+
+
+def numbers(value: Any) -> Any:
+    """What BaseLoader leaves as text, as numbers again."""
+    if isinstance(value, dict):
+        return {key: numbers(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [numbers(item) for item in value]
+    try:
+        return float(value)
+    except ValueError:
+        return value
+
+
+@pytest.fixture
+def changed(tmp_path: Path) -> Callable[[Callable[[dict[str, Any]], None]], Path]:
+    def make(change: Callable[[dict[str, Any]], None]) -> Path:
+        raw = copy.deepcopy(numbers(RAW))
+        change(raw)
+        path = tmp_path / "world.yaml"
+        path.write_text(yaml.safe_dump(raw, sort_keys=False))
+        return path
+
+    return make
+
+
+def set_at(*keys: str, to: Any) -> Callable[[dict[str, Any]], None]:
+    def change(raw: dict[str, Any]) -> None:
+        for key in keys[:-1]:
+            raw = raw[key]
+        raw[keys[-1]] = to
+
+    return change
+
+
+def test_home_says_what_is_in_it() -> None:
+    world = load_world(HOME)
+    places = {place.place: place for place in place_payloads(world)}
+    assert list(places) == ["kitchen", "hallway", "living_room"]
+    assert [top.surface for top in places["kitchen"].surfaces] == ["kitchen_table"]
+    assert [(o.object, o.kind, o.ordinal, o.label) for o in object_payloads(world)] == [
+        ("cup_1", "cup", 1, "first cup"),
+        ("cup_2", "cup", 2, "second cup"),
+    ]
+    assert world.start_point_m("cup_1") == pytest.approx((0.7, 4.8, 0.6))
+    assert world.place_at(5.0, 1.0) == "hallway"
+    assert world.place_at(-1.0, 1.0) is None
+
+
+def test_travel_is_symmetric_goes_through_doors_and_obeys_the_triangle_inequality() -> None:
+    places = {place.place: place for place in place_payloads(load_world(HOME))}
+    for name, place in places.items():
+        assert set(place.travel_m) == set(places) - {name}
+        for other, metres in place.travel_m.items():
+            assert places[other].travel_m[name] == pytest.approx(metres)
+    kitchen = places["kitchen"].travel_m
+    assert kitchen["living_room"] > kitchen["hallway"] > 1.0
+    beyond = kitchen["hallway"] + places["hallway"].travel_m["living_room"]
+    assert kitchen["living_room"] == pytest.approx(beyond, abs=0.5)
+
+
+def test_a_place_behind_a_wall_without_a_door_has_no_travel(changed: Any) -> None:
+    def shut(raw: dict[str, Any]) -> None:
+        del raw["doors"]["kitchen_door"]
+
+    places = {place.place: place for place in place_payloads(load_world(changed(shut)))}
+    assert places["kitchen"].travel_m == {}
+    assert set(places["hallway"].travel_m) == {"living_room"}
+
+
+def test_doors_are_cut_out_of_walls() -> None:
+    pieces = [solid for solid in solids(load_world(HOME)) if solid.name.startswith("wall_0")]
+    assert sum(2 * piece.half_m[0] for piece in pieces) == pytest.approx(6.0 - 1.0)
+
+
+def test_a_turned_table_turns_what_lies_on_it(changed: Any) -> None:
+    world = load_world(changed(set_at("furniture", "kitchen_table", "yaw_deg", to=90.0)))
+    x, y, z = world.start_point_m("cup_1")  # (-0.3, -0.2) in the table's axes
+    assert (x, y, z) == pytest.approx((1.0 + 0.2, 5.0 - 0.3, 0.6))
+    assert world.surface("kitchen_table").yaw_rad == pytest.approx(math.pi / 2)
+
+
+@pytest.mark.parametrize(
+    ("keys", "value", "said"),
+    [
+        (("size_m",), [10.0, "wide"], r"size_m\[1\]: expected a number, got text"),
+        (("objects", "cup_1", "colour"), "red", r"objects\.cup_1: there is no field `colour`"),
+        (("objects", "cup_1", "on"), "shelf", r"objects\.cup_1\.on: there is no table 'shelf'; "),
+        (("objects", "cup_1", "on"), "sofa", r"there are kitchen_table, hallway_table, coffee_tab"),
+        (("objects", "cup_1", "kind"), "mug", r"there is no kind 'mug'; there are cup"),
+        (("objects", "cup_1", "at_m"), [2.0, 0.0], r"\[2\.0, 0\.0\] is not on kitchen_table"),
+        (("objects", "cup_2", "at_m"), [-0.28, -0.2], r"objects\.cup_2\.at_m: it overlaps cup_1"),
+        (("furniture", "sofa", "place"), "attic", r"no place 'attic'; there are kitchen, hallway"),
+        (("furniture", "sofa", "center_m"), [1.0, 1.0], r"is not in 'living_room'"),
+        (("furniture", "sofa", "size_m"), [1.0, -1.0, 1.0], r"furniture\.sofa\.size_m\[1\]: "),
+        (("doors", "kitchen_door", "between"), ["kitchen", "x"], r"doors\.kitchen_door\.between"),
+        (("places", "kitchen", "region_m"), [[4, 0, 0, 6]], r"is not \[x_min, y_min, x_max"),
+        (("object_kinds", "cup", "shape"), "sphery", r"object_kinds\.cup\.shape: invalid enum"),
+        (("roof",), True, r"world files have no field 'roof'; they have "),
+    ],
+)
+def test_a_wrong_world_is_one_clear_sentence(
+    changed: Any, keys: tuple[str, ...], value: Any, said: str
+) -> None:
+    path = changed(set_at(*keys, to=value))
+    with pytest.raises(BadFile, match=said) as caught:
+        load_world(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_file_and_a_file_that_is_not_yaml(tmp_path: Path) -> None:
+    with pytest.raises(BadFile, match=r"the world file .*none\.yaml does not exist"):
+        load_world(tmp_path / "none.yaml")
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("world: [home\nsize_m: 3\n")
+    with pytest.raises(BadFile, match=r"bad\.yaml line 2: this is not YAML"):
+        load_world(bad)
+    bad.write_text("just words\n")
+    with pytest.raises(BadFile, match="a world file is a list of `name: value` lines"):
+        load_world(bad)
+    bad.write_text("world: home\nsize_m: [1, 1]\nplaces: {}\nsize_m: [2, 2]\n")
+    with pytest.raises(BadFile, match=r"bad\.yaml line 4: this is not YAML: 'size_m' comes twice"):
+        load_world(bad)
+
+
+def mission(tmp_path: Path, robots: str) -> Path:
+    path = tmp_path / "m.yaml"
+    path.write_text(f"mission: m\nworld: {HOME}\nrobots:\n{robots}")
+    return path
+
+
+HSR = CONFIGS / "robots" / "hsr.yaml"
+
+
+def test_a_mission_by_name_and_by_path_is_the_same() -> None:
+    by_name = load_mission("two-cups")
+    assert by_name == load_mission(CONFIGS / "missions" / "two-cups.yaml")
+    assert [robot.spec.robot for robot in by_name.robots] == ["hsr", "locobot"]
+    assert by_name.robots[1].start_m_rad == pytest.approx((5.0, 1.5, math.pi / 2))
+    assert by_name.plan.allocator == "makespan"
+    assert len(by_name.goals) == 2 and len(by_name.statements) == 2
+
+
+def test_an_unknown_mission_lists_those_there_are() -> None:
+    with pytest.raises(BadFile, match=r"no mission 'three-cups'; .*two-cups.* \(looked in"):
+        load_mission("three-cups")
+
+
+def test_two_robots_of_one_specification(tmp_path: Path) -> None:
+    path = mission(
+        tmp_path,
+        f"  - {{spec: {HSR}, start: {{at_m: [8, 3]}}}}\n"
+        f"  - {{spec: {HSR}, robot: hsr_2, start: {{at_m: [7, 3]}}}}\n",
+    )
+    assert [robot.spec.robot for robot in load_mission(path).robots] == ["hsr", "hsr_2"]
+
+
+@pytest.mark.parametrize(
+    ("second", "said"),
+    [
+        (f"{{spec: {HSR}, start: {{at_m: [7, 3]}}}}", r"there are two robots 'hsr'"),
+        (
+            f"{{spec: {HSR}, robot: b, start: {{at_m: [8.2, 3]}}}}",
+            r"\(b\): .* overlaps hsr, 0.20 m",
+        ),
+        (
+            f"{{spec: {HSR}, robot: b, start: {{at_m: [1, 5]}}}}",
+            r"from kitchen_table; a robot need",
+        ),
+        (f"{{spec: {HSR}, robot: b, start: {{at_m: [11, 5]}}}}", r"is outside the building"),
+        (f"{{spec: {HSR}, robot: cup_1, start: {{at_m: [7, 3]}}}}", r"has the name 'cup_1'"),
+        (f"{{spec: {HSR}, robot: b}}", r"robots\[1\]: it lacks the field `start`"),
+        ("{spec: no.yaml, robot: b, start: {at_m: [7, 3]}}", r"the robot file .* does not exist"),
+    ],
+)
+def test_a_wrong_mission_is_one_clear_sentence(tmp_path: Path, second: str, said: str) -> None:
+    path = mission(tmp_path, f"  - {{spec: {HSR}, start: {{at_m: [8, 3]}}}}\n  - {second}\n")
+    with pytest.raises(BadFile, match=said):
+        load_mission(path)
+
+
+def test_a_robot_that_cannot_drive_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "r.yaml"
+    path.write_text("robot: r\nmodel: hsr\nskills: [navigate]\ncapabilities: {see: 4.0}\n")
+    with pytest.raises(BadFile, match=r"it lacks `drive`, the robot's top speed in m/s"):
+        load_robot(path)
+    path.write_text("robot: r\nmodel: hsr\nskills: navigate\ncapabilities: {drive: 1}\n")
+    with pytest.raises(BadFile, match=r"skills: expected a list, got text"):
+        load_robot(path)
+
+
+@pytest.mark.parametrize("name", ["a/b", "r$*", "röbot", "", "x" * 64])
+def test_a_robot_with_a_name_that_can_be_no_key_is_told_the_rule(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "r.yaml"
+    path.write_text(
+        f"robot: '{name}'\nmodel: hsr\nskills: [navigate]\ncapabilities: {{drive: 1}}\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(BadFile, match=r"robot: expected a name \(1 to 63 ASCII letters, digits"):
+        load_robot(path)
+
+
+def test_what_lies_in_the_middle_of_a_wide_table_is_said_to_be_out_of_reach(
+    tmp_path: Path,
+) -> None:
+    path = mission(tmp_path, f"  - {{spec: {HSR}, start: {{at_m: [8.0, 3.0]}}}}\n")
+    assert out_of_reach(load_mission(path)) == ()
+    with path.open("a") as file:
+        file.write("objects: {cup_2: {on: kitchen_table, at_m: [0.3, 0.0]}}\n")
+    [sentence] = out_of_reach(load_mission(path))
+    assert sentence.startswith(
+        "cup_2 lies on kitchen_table at [0.3, 0.0], where no hand gets to: for hsr, it must stand "
+        "0.43 to 0.55 m away, and there is room only 0.6"
+    )
+    only_drives = tmp_path / "only.yaml"
+    only_drives.write_text(path.read_text().replace(str(HSR), str(HSR.with_name("locobot.yaml"))))
+    assert out_of_reach(load_mission(only_drives)) == ()

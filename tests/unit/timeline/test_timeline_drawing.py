@@ -1,0 +1,189 @@
+"""The clock, the layout of the task graph, trails, lanes and the palette, each by its laws."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fleet.timeline.clock import Clock, wall_of
+from fleet.timeline.drawing.graph import Node, layout
+from fleet.timeline.drawing.lanes import Bar, Lane, call_text
+from fleet.timeline.drawing.palette import Palette
+from fleet.timeline.drawing.sink import Sink, open_stream
+from fleet.timeline.drawing.text import DRAWN, drawable
+from fleet.timeline.drawing.trails import CORNERS, Trail
+from fleet.timeline.drawing.utilisation import Utilisation
+from fleet.timeline.read import rows
+from keyexpr_schema.payloads.tasks import TaskState
+from tests.timeline_mission import STEPS, record
+
+
+def test_a_zenoh_timestamp_gives_its_wall_time() -> None:
+    assert wall_of(f"{1_760_000_000 * 2**32 + 2**31}/ab12") == 1_760_000_000.5
+    assert wall_of("") is None
+    assert wall_of("yesterday/1") is None
+    assert wall_of("²/1") is None
+
+
+def test_the_clock_places_a_value_between_its_neighbours() -> None:
+    clock = Clock()
+    assert clock.fleet_at(5.0) == 0.0
+    assert clock.wall_at(5.0) is None
+    clock.tick(100.0, 10.0)
+    clock.tick(102.0, 30.0)
+    assert clock.fleet_at(101.0) == 20.0
+    assert clock.wall_at(20.0) == 101.0
+    assert clock.fleet_at(99.0) == 10.0
+    assert clock.fleet_at(500.0) == 30.0  # a clock that is published and stands still
+    clock.tick(103.0, 1.0)  # a new run
+    assert clock.now_s == 1.0
+    assert clock.fleet_at(101.0) == 1.0
+
+
+def test_without_a_published_clock_time_goes_on() -> None:
+    clock = Clock()
+    clock.learn(100.0, 10.0)
+    assert clock.fleet_at(104.0) == 14.0
+
+
+@given(st.lists(st.tuples(st.floats(0, 1e6), st.floats(0, 1e6)), max_size=40))
+def test_the_clock_never_runs_backwards_whatever_it_learns(
+    pairs: list[tuple[float, float]],
+) -> None:
+    clock = Clock()
+    for wall_s, fleet_s in pairs:
+        clock.learn(wall_s, fleet_s)
+    known = [clock.fleet_at(wall_s) for wall_s in sorted(wall for wall, _ in pairs)]
+    assert all(a <= b + 1e-6 for a, b in pairwise(known))
+
+
+def nodes() -> st.SearchStrategy[list[Node]]:
+    names = [f"t{i}" for i in range(12)]
+    node = st.tuples(
+        st.sampled_from(["r1", "r2", "?a1"]),
+        st.lists(st.sampled_from([*names, "unknown"]), max_size=4),
+        st.text(max_size=20),
+    )
+    return st.lists(node, max_size=12).map(
+        lambda many: [
+            Node(task=name, label=f"{text}\nx", state=TaskState.WAITING, lane=lane, after=tuple(a))
+            for name, (lane, a, text) in zip(names, many, strict=False)
+        ]
+    )
+
+
+@given(nodes())
+def test_no_two_nodes_overlap_and_dependencies_point_down(drawn: list[Node]) -> None:
+    places = layout(drawn)
+    assert set(places) == {node.task for node in drawn}
+    width = {n.task: 7.0 * max(map(len, n.label.split("\n"))) for n in drawn}
+    for i, a in enumerate(drawn):
+        for b in drawn[:i]:
+            (ax, ay), (bx, by) = places[a.task], places[b.task]
+            apart = abs(ax - bx) >= (width[a.task] + width[b.task]) / 2
+            assert apart or abs(ay - by) >= 40.0
+    if all(
+        int(first[1:]) < int(n.task[1:]) for n in drawn for first in n.after if first != "unknown"
+    ):
+        for node in drawn:
+            for first in node.after:
+                if first in places:
+                    assert places[first][1] < places[node.task][1]
+
+
+@settings(deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.floats(0, 100), st.one_of(st.none(), st.floats(0, 50))),
+        max_size=8,
+    ),
+    st.floats(1, 100),
+)
+def test_busy_time_is_never_counted_twice(
+    spans: list[tuple[float, float | None]], until_s: float
+) -> None:
+    lane = Lane("/robots/r")
+    for i, (start, length) in enumerate(spans):
+        end = None if length is None else start + length
+        lane.bars[str(i)] = Bar(str(i), "", (0, 0, 0, 0), start, end)
+    steps = 400
+    samples = [(k + 0.5) * until_s / steps for k in range(steps)]
+    counted = sum(lane.at(at) is not None for at in samples) * until_s / steps
+    assert lane.busy_s(0.0, until_s) == pytest.approx(
+        counted, abs=2 * (len(spans) + 1) * until_s / steps
+    )
+
+
+def test_a_task_that_starts_as_another_ends_is_not_hidden(tmp_path: Path) -> None:
+    """The planner's word on the next task can come before its word on the last one."""
+    from fleet.timeline.drawing.lanes import Lanes
+
+    path = tmp_path / "lanes.rrd"
+    stream = open_stream(path, "test")
+    clock = Clock()
+    lanes = Lanes(Sink(stream, clock), Palette())
+    first, second = STEPS[0], STEPS[1]
+    lanes.record(record(first, TaskState.RUNNING, started_s=0.0), 0.0)
+    lanes.record(record(second, TaskState.RUNNING, started_s=15.0), 15.1)
+    lanes.record(record(first, TaskState.SUCCEEDED, started_s=0.0, ended_s=15.0), 15.2)
+    lanes.flush()
+    use = Utilisation(Sink(stream, clock), lanes, Palette())
+    use.advance(20.0)
+    stream.disconnect()
+    held = {row.sim_s: row.value[0] for row in rows(path, "/robots/hsr", "state")}
+    assert held == {0.0: "p1/t1#1", 15.0: "p1/t2#1"}
+    busy = {
+        row.sim_s: row.value[0] for row in rows(path, "/fleet/utilisation/all/fleet", "scalars")
+    }
+    assert busy[19.0] == 1.0
+    assert 0.0 not in busy
+
+
+def test_a_trail_has_a_corner_where_the_way_turns_and_no_end_of_them(tmp_path: Path) -> None:
+    path = tmp_path / "trail.rrd"
+    stream = open_stream(path, "test")
+    sink = Sink(stream, Clock())
+    straight, zigzag = Trail("/a", (1, 2, 3, 255), 0.1), Trail("/b", (1, 2, 3, 255), 0.1)
+    for i in range(100):
+        straight.visit(sink, (0.2 * min(i, 50), 0.2 * max(0, i - 50), 0.0), 0.1 * i, 0.1 * i)
+    for i in range(CORNERS + 50):
+        zigzag.visit(sink, (0.2 * i, 0.5 * (i % 2), 0.0), 0.1 * i, 0.1 * i)
+    stream.disconnect()
+    corner = rows(path, "/a", "strips")[-1].value[0]
+    assert [tuple(round(x, 2) for x in point[:2]) for point in corner] == [
+        (0, 0),
+        (10, 0),
+        (10, 9.8),
+    ]
+    assert len(rows(path, "/b", "strips")[-1].value[0]) == CORNERS
+
+
+def test_a_call_names_neither_its_robot_nor_actors() -> None:
+    args = {"robot": "hsr", "object": "cup_1", "carrier": "?a2"}
+    assert call_text("place_on_robot", args, "hsr") == "place_on_robot cup_1"
+
+
+def test_colours_stay_and_the_first_ones_differ() -> None:
+    palette = Palette()
+    first = [palette.robot(f"r{i}") for i in range(8)]
+    assert len(set(first)) == 8
+    assert [palette.robot(f"r{i}") for i in range(20)][:8] == first
+    skills = [
+        palette.skill(s) for s in ("navigate", "search", "pick", "place", "place_on_robot", "fly")
+    ]
+    assert len(set(skills)) == 6
+
+
+@given(st.text())
+def test_every_text_becomes_one_that_the_viewer_can_draw(text: str) -> None:
+    assert DRAWN.issuperset(drawable(text))
+
+
+def test_text_that_can_be_drawn_stays_and_other_text_becomes_plainer() -> None:
+    fine = "Bring die Tasse in den Flur, “schön”; Ελλάς, кухня ✓"
+    assert drawable(fine) == fine
+    assert drawable("scho\u0308n ﬁne\tcup ☕杯\u200b") == "schön fine cup ??"

@@ -1,0 +1,149 @@
+"""The processes of a demo: none dies unnoticed, and none stays behind."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from cli.demo.bring_up import router_up
+from cli.demo.child_processes import ChildProcesses, free_endpoint
+from cli.errors import BadArgument, ProcessDied
+
+DEADLINE_S = 20.0
+
+
+def make(out: Path) -> ChildProcesses:
+    processes = ChildProcesses(free_endpoint(), "demo", out)
+    processes.declare(
+        "router", "router", "--listen", processes.endpoint, "--data", str(out / "data")
+    )
+    return processes
+
+
+def runs(pid: int) -> bool:
+    """Whether the process is there and no zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    async with asyncio.timeout(DEADLINE_S):
+        while not condition():
+            await asyncio.sleep(0.02)
+
+
+async def test_a_process_is_ready_by_its_keys_and_gone_at_the_end(tmp_path: Path) -> None:
+    async with make(tmp_path) as processes:
+        await processes.start("router")
+        await processes.guard(router_up(processes))
+        pid = processes.pid("router")
+        assert pid is not None
+        assert runs(pid)
+        with pytest.raises(BadArgument, match="runs already"):
+            await processes.start("router")
+    assert not runs(pid)
+    assert f"listening on {processes.endpoint}" in processes.log("router").read_text()
+
+
+async def test_a_death_that_nobody_asked_for_ends_the_work(tmp_path: Path) -> None:
+    async with make(tmp_path) as processes:
+        await processes.start("router")
+        await processes.guard(router_up(processes))
+        pid = processes.pid("router")
+        assert pid is not None
+        os.kill(pid, signal.SIGKILL)
+        with pytest.raises(ProcessDied) as error:
+            await processes.guard(asyncio.Event().wait())
+    assert "router ended unexpectedly by SIGKILL; its log is" in str(error.value)
+    assert str(processes.log("router")) in str(error.value)
+
+
+async def test_a_process_that_cannot_start_says_why(tmp_path: Path) -> None:
+    async with make(tmp_path) as processes:
+        processes.declare("ghost", "sim", "no-such-mission")
+        await processes.start("ghost")
+        with pytest.raises(ProcessDied, match=r"exit code 1, saying .*no mission") as error:
+            await processes.guard(asyncio.Event().wait())
+    assert str(processes.log("ghost")) in str(error.value)
+
+
+async def test_a_second_simulation_in_a_realm_is_turned_away(tmp_path: Path) -> None:
+    async with make(tmp_path) as processes:
+        await processes.start("router")
+        await processes.guard(router_up(processes))
+        for name in ("sim", "sim-again"):
+            processes.declare(name, "sim", "two-cups", "--backend", "kinematic")
+        await processes.start("sim")
+        await until(lambda: "running" in processes.log("sim").read_text())
+        await processes.kill("sim")
+        await processes.start("sim")  # the dead one's scene is there still, and keeps nobody out
+        await until(lambda: processes.log("sim").read_text().count("running") == 2)
+        await processes.start("sim-again")
+        with pytest.raises(ProcessDied, match=r"sim-again .*a simulated world runs in realm demo"):
+            await processes.guard(asyncio.Event().wait())
+        assert processes.pid("sim") is not None
+
+
+async def test_a_killed_process_can_be_started_again(tmp_path: Path) -> None:
+    async with make(tmp_path) as processes:
+        await processes.start("router")
+        await processes.guard(router_up(processes))
+        first = processes.pid("router")
+        await processes.kill("router")
+        assert processes.pid("router") is None
+        await processes.start("router")
+        await processes.guard(router_up(processes))
+        assert processes.pid("router") not in (None, first)
+    assert processes.log("router").read_text().count("listening") == 2
+
+
+async def test_an_error_in_the_block_leaves_nothing_behind(tmp_path: Path) -> None:
+    processes = make(tmp_path)
+    pid = None
+    with pytest.raises(RuntimeError, match="mine"):
+        async with processes:
+            await processes.start("router")
+            pid = processes.pid("router")
+            raise RuntimeError("mine")
+    assert pid is not None
+    assert not runs(pid)
+
+
+async def test_children_end_when_their_parent_is_killed(tmp_path: Path) -> None:
+    """`kill -9` of a demo: it can tidy up nothing, so its children look after themselves."""
+    program = f"""
+import asyncio
+from pathlib import Path
+from cli.demo.bring_up import router_up
+from cli.demo.child_processes import ChildProcesses, free_endpoint
+
+async def main():
+    async with ChildProcesses(free_endpoint(), "demo", Path({str(tmp_path)!r})) as processes:
+        listen = ("--listen", processes.endpoint)
+        processes.declare("router", "router", *listen, "--data", {str(tmp_path)!r})
+        await processes.start("router")
+        await router_up(processes)
+        print(processes.pid("router"), flush=True)
+        await asyncio.Event().wait()
+
+asyncio.run(main())
+"""
+    parent = await asyncio.create_subprocess_exec(
+        sys.executable, "-c", program, stdout=asyncio.subprocess.PIPE
+    )
+    try:
+        assert parent.stdout is not None
+        child = int(await parent.stdout.readline())
+        assert runs(child)
+    finally:
+        parent.kill()
+        await parent.wait()
+    await until(lambda: not runs(child))

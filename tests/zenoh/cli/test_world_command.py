@@ -1,0 +1,142 @@
+"""Telling the fleet of its world, thing by thing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+import pytest
+
+from tests.planner_process import person, planner
+from tests.robotctl import Robotctl
+
+WORLD = str(Path(__file__).parents[3] / "configs" / "worlds" / "home.yaml")
+
+
+class Router(Protocol):
+    endpoint: str
+
+
+@pytest.fixture
+def robotctl(router: Router, tmp_path: Path) -> Robotctl:
+    return Robotctl(router.endpoint, tmp_path, "test")
+
+
+def test_the_world_is_loaded_said_listed_and_forgotten(robotctl: Robotctl) -> None:
+    unknown = robotctl("world", "add", "--fact", "at", "cup_1", "kitchen")
+    assert unknown.code == 1
+    assert "load a world with `robotctl world load FILE`" in unknown.err
+
+    assert robotctl("world", "load", WORLD).code == 0
+    assert robotctl("world", "add", "The first cup is in the kitchen.").code == 0
+    assert robotctl("world", "add", "The first cup is in the kitchen.").code == 0
+    said = robotctl("world", "add", "--fact", "at", "cup_1", "kitchen")
+    assert said.out.strip() == "stored at(cup_1) = kitchen"
+    wrong = robotctl("world", "add", "--fact", "at", "cup_1", "kitchn")
+    assert "(did you mean 'kitchen'?)" in wrong.err
+    assert "got 2 words" in robotctl("world", "add", "--fact", "at", "cup_1").err
+
+    world = robotctl("world", "list", "--json").data
+    assert [place["place"] for place in world["places"]] == ["hallway", "kitchen", "living_room"]
+    assert [thing["object"] for thing in world["objects"]] == ["cup_1", "cup_2"]
+    assert [fact["value"] for fact in world["facts"]] == ["kitchen"]
+    assert [s["text"] for s in world["statements"]] == ["The first cup is in the kitchen."]
+    page = robotctl("world", "list").out
+    assert "at(cup_1) = kitchen" in page
+    assert "The first cup is in the kitchen." in page
+
+    assert robotctl("world", "delete", "at", "cup_1").out.strip() == "deleted at(cup_1)"
+    statement = world["statements"][0]["statement"]
+    assert robotctl("world", "delete", statement).code == 0
+    assert robotctl("world", "delete", "cup_2").out.strip() == "deleted object cup_2"
+    assert "known are: cup_1," in robotctl("world", "delete", "cup_2").err
+    left = robotctl("world", "list", "--json").data
+    assert left["facts"] == left["statements"] == []
+
+
+def test_objects_are_told_one_by_one(robotctl: Robotctl) -> None:
+    robotctl("world", "load", WORLD)
+    said = robotctl("world", "add", "--object", "cup_3", "--kind", "cup", "--home", "kitchen")
+    assert said.out.strip() == "stored object cup_3: “cup 3”, a cup"
+    heavy = robotctl(
+        *("world", "add", "--object", "cup_3", "--kind", "cup", "--label", "the red cup"),
+        *("--mass-kg", "0.4", "--alias", "mug", "--json"),
+    ).data
+    assert heavy["ordinal"] == 3
+    assert heavy["home"] == "kitchen"
+    assert (heavy["label"], heavy["aliases"], heavy["mass_kg"]) == ("the red cup", ["mug"], 0.4)
+    page = robotctl("world", "list").out
+    assert "the red cup" in page
+    assert "mug" in page
+    wrong = robotctl("world", "add", "--object", "x", "--kind", "cup", "--home", "kitchn")
+    assert "(did you mean 'kitchen'?)" in wrong.err
+    taken = robotctl("world", "add", "--object", "kitchen", "--kind", "cup")
+    assert "'kitchen' is a place already" in taken.err
+
+
+def test_places_are_told_one_by_one(robotctl: Robotctl) -> None:
+    robotctl("world", "load", WORLD)
+    told = robotctl(
+        *("world", "add", "--place", "pantry", "--alias", "larder", "--json"),
+        *("--region", "0,0,1.5,2", "--distance", "kitchen=2.5"),
+    ).data
+    assert told["region_m"] == [[0.0, 0.0, 1.5, 2.0]]
+    places = {each["place"]: each for each in robotctl("world", "list", "--json").data["places"]}
+    assert places["pantry"]["travel_m"] == {"kitchen": 2.5}
+    assert places["kitchen"]["travel_m"]["pantry"] == 2.5
+    assert places["kitchen"]["travel_m"]["hallway"] > 0.0
+    assert places["kitchen"]["surfaces"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--object", "x"], "an object has a --kind"),
+        ([], "say a sentence, or tell of"),
+        (["--object", "x", "--kind", "cup", "--place", "y"], "--object and --place are different"),
+        (["A cup.", "--place", "y"], "a sentence and --place are different"),
+        (["A cup.", "--kind", "cup"], "--kind goes with --object"),
+        (["--place", "y", "--home", "kitchen"], "--home goes with --object"),
+        (["--place", "a b"], "place 'a b' is not valid"),
+        (["--place", "y", "--region", "1,2,3"], "region '1,2,3' is not X_MIN"),
+        (["--place", "y", "--region", "1,1,0,2"], "is not X_MIN"),
+        (["--place", "y", "--distance", "kitchen"], "is not PLACE=METRES"),
+        (["--place", "y", "--distance", "nowhere=1"], "there is no place 'nowhere'"),
+    ],
+)
+def test_what_makes_no_sense_is_one_sentence(
+    robotctl: Robotctl, arguments: list[str], words: str
+) -> None:
+    said = robotctl("world", "add", *arguments)
+    assert said.code == 1
+    assert said.out == ""
+    assert words in said.err
+    assert said.err.count("\n") == 1
+
+
+async def test_a_statement_tells_how_it_was_read(
+    router: Router, robotctl: Robotctl, tmp_path: Path
+) -> None:
+    async with person(router.endpoint), planner(router.endpoint, tmp_path / "planner"):
+        read = await robotctl.soon("world", "add", "Cup 1 is in the hallway.")
+        unread = await robotctl.soon("world", "add", "The weather is fine.", "--json")
+        page = (await robotctl.soon("world", "list")).out
+    assert "understood as at(cup_1) = hallway" in read.out
+    assert unread.code == 0
+    assert unread.data["status"]["facts"] == []
+    assert unread.data["status"]["reason"]
+    assert "not understood: " in page
+
+
+def test_a_planner_that_is_told_nonsense_says_so(robotctl: Robotctl, tmp_path: Path) -> None:
+    llm = tmp_path / "llm.yaml"
+    llm.write_text("llm: {modle: x}")
+    for option, file, words in (
+        ("--llm-config", "nowhere.yaml", "nowhere.yaml cannot be read"),
+        ("--llm-config", str(llm), "`llm` has no field modle"),
+        ("--skills", "nowhere.yaml", "nowhere.yaml cannot be read"),
+    ):
+        said = robotctl("planner", "--data", str(tmp_path / "data"), option, file)
+        assert said.code == 1
+        assert words in said.err
+    assert robotctl("planner", "--lost-after", "-1").code == 2

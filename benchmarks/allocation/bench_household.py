@@ -27,12 +27,11 @@ from benchmarks.allocation.household import (
     scenarios,
     world_of,
 )
-from fleet.allocators.balanced import BalancedAllocator
 from fleet.allocators.base import Allocated, Allocator
 from fleet.allocators.cost_based import CostBasedAllocator
 from fleet.allocators.llm import LlmAllocator
 from fleet.allocators.makespan import DEADLINE_S, MakespanAllocator
-from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.core.checker.checked_plan import CheckedPlan, check_plan
 from fleet.core.schedule.idle_time import predicted_unit, union_s
@@ -64,14 +63,19 @@ def allocators(limit_s: float = DEADLINE_S, llm_file: Path | None = None) -> tup
     """Those that are compared; the language model only where one is configured."""
     own: tuple[Allocator, ...] = (
         MakespanAllocator(limit_s),
-        BalancedAllocator(),
-        MilpAllocator(),
+        MinMaxLoadAllocator(TieBreak.NEXT_LOADS),
+        MinMaxLoadAllocator(TieBreak.TRAVEL),
         CostBasedAllocator(),
         RoundRobinAllocator(),
     )
     if llm_file is None:
         return own
-    return (*own, LlmAllocator(LanguageModel(load_llm_config(llm_file)), BalancedAllocator()))
+    return (
+        *own,
+        LlmAllocator(
+            LanguageModel(load_llm_config(llm_file)), MinMaxLoadAllocator(TieBreak.NEXT_LOADS)
+        ),
+    )
 
 
 def runs(seeds: int, compared: Sequence[Allocator], console: Console) -> list[Run]:

@@ -118,7 +118,7 @@ def write(folder: Path, told: dict[str, Any]) -> None:
 
 def _packages() -> str:
     found = []
-    for name in ("ortools", "highspy", "pulp"):
+    for name in ("ortools", "pulp", "scipy"):
         try:
             found.append(f"{name} {version(name)}")
         except PackageNotFoundError:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 
 from fleet.allocators.base import (
     AllocationProblem,
@@ -12,7 +11,7 @@ from fleet.allocators.base import (
     Circumstances,
     NotAllocated,
 )
-from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import assign_with_least_travel
 from fleet.allocators.plan_shop import PlanShop, plan_shop
 from fleet.jobshop.bounds import lower_bound
 from fleet.jobshop.budget import Budget, Clock
@@ -66,8 +65,10 @@ class MakespanAllocator(Allocator):
         found = solve(made.shop, Budget(self._deadline_s, self._clock), self._exact, self._seed)
         if found is None:
             # Robots are so few that rules run into a dead end: what is left is a matching problem.
-            chosen = MilpAllocator()._assign(problem)
-            return chosen if isinstance(chosen, NotAllocated) else _by_load(chosen)
+            chosen = assign_with_least_travel(problem)
+            if isinstance(chosen, NotAllocated):
+                return chosen
+            return Assignment(chosen.allocation, notes=("load balanced: no rule found an order",))
         return _assignment(made, found, found.lower_bound_s, found.notes)
 
 
@@ -104,8 +105,3 @@ def _rescheduled(
         f"with any number of changes the least found is {found.best_makespan_s:.1f} s"
     )
     return _assignment(made, found.schedule, lower_bound(Instance(made.shop)), (note,))
-
-
-def _by_load(chosen: Mapping[str, str] | Assignment) -> Assignment:
-    allocation = chosen.allocation if isinstance(chosen, Assignment) else chosen
-    return Assignment(allocation, notes=("load balanced: no rule found an order",))

@@ -12,12 +12,11 @@ from typing import Any
 
 import yaml
 
-from fleet.allocators.balanced import BalancedAllocator
 from fleet.allocators.base import Allocator
 from fleet.allocators.cost_based import CostBasedAllocator
 from fleet.allocators.llm import LlmAllocator
 from fleet.allocators.makespan import MakespanAllocator
-from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.core.model.skills import SkillModel, skills_from_data
 from fleet.errors import BadSkillFile
@@ -69,9 +68,9 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
     planners: dict[str, Planner] = {symbolic.name: symbolic, llm.name: llm}
     own: tuple[Allocator, ...] = (
         MakespanAllocator(),
-        MilpAllocator(),
-        MilpAllocator(fallback_round_robin=True),
-        BalancedAllocator(),
+        MinMaxLoadAllocator(TieBreak.TRAVEL),
+        MinMaxLoadAllocator(TieBreak.TRAVEL, fallback_round_robin=True),
+        MinMaxLoadAllocator(TieBreak.NEXT_LOADS),
         CostBasedAllocator(),
         RoundRobinAllocator(),
         LlmAllocator(model, MakespanAllocator()),

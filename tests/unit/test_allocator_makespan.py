@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from benchmarks.allocation.shops import random_shop
 from fleet.allocators.base import Allocated, Circumstances, NotAllocated
 from fleet.allocators.makespan import MakespanAllocator
-from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.core.model.world import WorldModel
 from fleet.jobshop.budget import Budget, StepClock
 from fleet.jobshop.cpsat import CpSat, installed
@@ -44,7 +44,7 @@ def planned(world: WorldModel, *goals: tuple[int, str]) -> Plan:
     return made.plan
 
 
-def allocated(allocator: MakespanAllocator | MilpAllocator, plan: Plan, world: WorldModel,
+def allocated(allocator: MakespanAllocator | MinMaxLoadAllocator, plan: Plan, world: WorldModel,
               told: Circumstances | None = None) -> Allocated:  # fmt: skip
     found = allocator.allocate(checked(plan, world), told)
     assert isinstance(found, Allocated), found
@@ -59,7 +59,7 @@ def team() -> WorldModel:
 def test_it_is_no_longer_than_the_balanced_plan_and_says_how_far_from_optimal() -> None:
     world = team()
     plan = planned(world, (1, "hallway"), (2, "living_room"), (3, "hallway"), (4, "living_room"))
-    balanced = allocated(MilpAllocator(), plan, world)
+    balanced = allocated(MinMaxLoadAllocator(TieBreak.TRAVEL), plan, world)
     found = allocated(QUICK, plan, world)
     assert found.schedule.makespan_s <= balanced.schedule.makespan_s + 1e-6
     assert found.lower_bound_s is not None and found.gap is not None

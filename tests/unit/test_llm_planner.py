@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from fleet.allocators.base import Allocated
-from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.core.checker.checked_plan import CheckedPlan
 from fleet.core.model.world import WorldModel
 from fleet.llm.client import ModelClient
@@ -94,7 +94,9 @@ def solve(
     problem = PlanningProblem("p", goals, world, strategy=strategy, first_task=first_task)
     made = planner.plan(problem)
     assert isinstance(made, CheckedPlan), made
-    assert isinstance(MilpAllocator().allocate(checked(made.plan, world)), Allocated)
+    assert isinstance(
+        MinMaxLoadAllocator(TieBreak.TRAVEL).allocate(checked(made.plan, world)), Allocated
+    )
     return made.plan
 
 

@@ -8,16 +8,13 @@ import msgspec
 import pytest
 
 from fleet.allocators.base import Allocated
-from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.core.checker.checked_plan import (
     CheckedPlan,
-    InvalidPlan,
     check_allocation,
-    check_plan,
 )
 from fleet.core.model.skills import skills_from_data
 from fleet.core.model.world import WorldModel
-from fleet.core.schedule.actor_constraints import tasks_nobody_can_do
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from keyexpr_schema.facts import FactKey
@@ -34,7 +31,7 @@ def solve(world: WorldModel, *goals: Goal, **more: object) -> Plan:
 
 
 def allocate(plan: Plan, world: WorldModel) -> Allocated:
-    made = MilpAllocator().allocate(checked(plan, world))
+    made = MinMaxLoadAllocator(TieBreak.TRAVEL).allocate(checked(plan, world))
     assert isinstance(made, Allocated), made
     return made
 
@@ -127,13 +124,6 @@ def test_why_there_is_no_plan_is_said() -> None:
     assert "locobot" in reason(home((carrier(),)), goal)
     assert "no robot is connected" in reason(home(()), goal)
     assert "choose one of" in reason(home(), goal, strategy="magic")
-
-
-def test_what_no_robot_can_do_does_not_come_to_be_allocated() -> None:
-    plan = solve(home(), bring(1, "hallway"))
-    refused = check_plan(plan, home((carrier(),)))
-    assert isinstance(refused, InvalidPlan)
-    assert "does not have the skill" in tasks_nobody_can_do(refused)[0].sentence
 
 
 def test_what_nobody_knows_is_looked_for_everywhere_in_parallel() -> None:

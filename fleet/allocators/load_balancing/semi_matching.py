@@ -1,4 +1,4 @@
-"""The evenest way to share equal tasks among robots that cannot all do everything.
+"""Optimal semi-matching: the evenest loads of unit tasks on robots that cannot all do each of them.
 
 An assignment of unit tasks to robots is an *optimal semi-matching* if no *cost-reducing path*
 exists: a chain of tasks, each handed from one robot to the next, from a robot to one with at least
@@ -7,7 +7,9 @@ so on, and the least sum of any convex cost of loads (Harvey, Ladner, Lovász, T
 for bipartite graphs and load balancing", J. Algorithms 59, 2006, theorems 3.1 and 3.5).
 
 Here a path moves many alike tasks at once, between classes of alike robots. Inside a class the load
-is spread evenly, so its robots differ by one task at most.
+is spread evenly, so its robots differ by one task at most. Maximum flows for every level of load
+would do it, too; where robots can do half of 10,000 tasks, scipy takes three times as long for one
+of them as all of this takes, and 250 MB.
 """
 
 from __future__ import annotations
@@ -15,16 +17,16 @@ from __future__ import annotations
 from bisect import bisect_left, insort
 from collections import deque
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import cycle, islice, pairwise
 
-from fleet.allocators.load_balancing.bits import bits
+from fleet.allocators.load_balancing.robot_sets import Classes, bits
 
-Shares = list[dict[int, int]]
-"""For every robot class: how many actors of each actor class it takes."""
+Flow = list[dict[int, int]]
+"""For every robot class: how many tasks of each task class it takes."""
 
 
-def semi_matching(counts: Sequence[int], able: Sequence[int], members: Sequence[int]) -> Shares:
-    """Share unit tasks so that the sorted loads are lexicographically least.
+def semi_matching(counts: Sequence[int], able: Sequence[int], members: Sequence[int]) -> Flow:
+    """Assign unit tasks so that the sorted loads are lexicographically least.
 
     `counts[i]` tasks are of class `i` and can be done by the robot classes in the set `able[i]`;
     `members[j]` robots are of class `j`. The robots of one class are to share evenly.
@@ -32,33 +34,45 @@ def semi_matching(counts: Sequence[int], able: Sequence[int], members: Sequence[
     Raises:
         ValueError: there are tasks that no robot can do.
     """
-    state = _Loads(members)
+    loads = _ClassLoads(members)
     for i in sorted(range(len(counts)), key=lambda i: able[i].bit_count()):
         if counts[i] and not able[i]:
             raise ValueError(f"no robot can do tasks of class {i}")
-        state.fill(i, counts[i], able[i])
-    _reduce(state, able)
-    return state.shares
+        loads.fill(i, counts[i], able[i])
+    _cancel_paths(loads, able)
+    return loads.flow
 
 
-def loads_of(shares: Shares, members: Sequence[int]) -> list[int]:
+def loads_of(flow: Flow, members: Sequence[int]) -> list[int]:
     """The loads of all robots, the greatest first."""
     loads: list[int] = []
-    for share, size in zip(shares, members, strict=True):
-        even, more = divmod(sum(share.values()), size)
+    for taken, size in zip(flow, members, strict=True):
+        even, more = divmod(sum(taken.values()), size)
         loads += [even + 1] * more + [even] * (size - more)
     return sorted(loads, reverse=True)
 
 
-class _Loads:
-    """Totals and shares of robot classes, and the classes by the load of their idlest robot."""
+def robots_of(classes: Classes, flow: Flow) -> list[int]:
+    """A robot for every actor of one task; a class deals its actors to its robots in turn."""
+    robot = [0] * sum(map(len, classes.actors))
+    queues = [iter(actors) for actors in classes.actors]
+    for taken, members in zip(flow, classes.robots, strict=True):
+        turn = cycle(members)
+        for i, count in taken.items():
+            for actor in islice(queues[i], count):
+                robot[actor] = next(turn)
+    return robot
+
+
+class _ClassLoads:
+    """Totals and flow of robot classes, and the classes by the load of their idlest robot."""
 
     def __init__(self, members: Sequence[int]) -> None:
         self.members = members
         self.total = [0] * len(members)
         self.tops = [0] * len(members)
         """The loads of the busiest robots of the classes."""
-        self.shares: Shares = [{} for _ in members]
+        self.flow: Flow = [{} for _ in members]
         self._at: dict[int, int] = {0: (1 << len(members)) - 1}
         self._levels = [0]
 
@@ -85,15 +99,15 @@ class _Loads:
                 above = (v for v in self._levels if v > level and able & self._at[v])
                 room += self.members[j] * (next(above, level + 1 + count) - level - 1)
             some = min(count, room)
-            self.take(i, j, some)
+            self.add(i, j, some)
             count -= some
 
-    def take(self, i: int, j: int, some: int) -> None:
-        """Book `some` more tasks of class `i` (or less, if negative) to robot class `j`."""
-        share = self.shares[j]
-        share[i] = share.get(i, 0) + some
-        if not share[i]:
-            del share[i]
+    def add(self, i: int, j: int, some: int) -> None:
+        """Give `some` more tasks of class `i` (or less, if negative) to robot class `j`."""
+        taken = self.flow[j]
+        taken[i] = taken.get(i, 0) + some
+        if not taken[i]:
+            del taken[i]
         before = self.floor(j)
         self.total[j] += some
         self.tops[j] = -(-self.total[j] // self.members[j])
@@ -110,40 +124,42 @@ class _Loads:
         self._at[after] |= 1 << j
 
 
-def _reduce(state: _Loads, able: Sequence[int]) -> None:
+def _cancel_paths(loads: _ClassLoads, able: Sequence[int]) -> None:
     """Follow cost-reducing paths until there is none.
 
     If no path leaves the busiest class, none ever will from what can be reached from it: those
     have loads of at most one less, their tasks cannot go elsewhere, and no path that comes in from
     outside can end there. They are settled, and the rest goes on without them.
     """
-    handed = [_reach(share, able) for share in state.shares]
-    open_classes = set(range(len(state.members)))
+    successors = [_able_classes(taken, able) for taken in loads.flow]
+    open_classes = set(range(len(loads.members)))
     settled = 0
     while open_classes:
-        source = max(open_classes, key=state.tops.__getitem__)
-        top = state.tops[source]
+        source = max(open_classes, key=loads.tops.__getitem__)
+        top = loads.tops[source]
         if top <= 1:
             return
-        path, seen = _path(source, handed, state.up_to(top - 2), settled)
+        path, seen = _path(source, successors, loads.up_to(top - 2), settled)
         if not path:
             open_classes.difference_update(bits(seen ^ settled))
             settled = seen
             continue
-        _hand_on(path, state, able)
+        _augment(path, loads, able)
         for j in path:
-            handed[j] = _reach(state.shares[j], able)
+            successors[j] = _able_classes(loads.flow[j], able)
 
 
-def _reach(share: dict[int, int], able: Sequence[int]) -> int:
-    """The robot classes that some task of this share could be handed to."""
+def _able_classes(taken: dict[int, int], able: Sequence[int]) -> int:
+    """The robot classes that could do some of these tasks."""
     mask = 0
-    for i in share:
+    for i in taken:
         mask |= able[i]
     return mask
 
 
-def _path(source: int, handed: Sequence[int], targets: int, settled: int) -> tuple[list[int], int]:
+def _path(
+    source: int, successors: Sequence[int], targets: int, settled: int
+) -> tuple[list[int], int]:
     """A shortest chain of robot classes from `source` to a target, around those settled.
 
     If there is none: an empty one, and the settled ones with all that was reached.
@@ -153,13 +169,13 @@ def _path(source: int, handed: Sequence[int], targets: int, settled: int) -> tup
     queue = deque([source])
     while queue:
         here = queue.popleft()
-        if hit := handed[here] & targets:
+        if hit := successors[here] & targets:
             path = [(hit & -hit).bit_length() - 1]
             while here != source:
                 path.append(here)
                 here = parent[here]
             return [source, *reversed(path)], seen
-        new = handed[here] & ~seen
+        new = successors[here] & ~seen
         seen |= new
         for there in bits(new):
             parent[there] = here
@@ -167,20 +183,20 @@ def _path(source: int, handed: Sequence[int], targets: int, settled: int) -> tup
     return [], seen
 
 
-def _hand_on(path: Sequence[int], state: _Loads, able: Sequence[int]) -> None:
+def _augment(path: Sequence[int], loads: _ClassLoads, able: Sequence[int]) -> None:
     """Move as many tasks along the path as even out its ends, and its narrowest step allows.
 
     Up to the point where the ends' mean loads meet, no move makes the loads less even.
     """
     steps = []
     for here, there in pairwise(path):
-        share = state.shares[here]
-        i = max((i for i in share if able[i] >> there & 1), key=share.__getitem__)
-        steps.append((here, there, i, share[i]))
+        taken = loads.flow[here]
+        i = max((i for i in taken if able[i] >> there & 1), key=taken.__getitem__)
+        steps.append((here, there, i, taken[i]))
     first, last = path[0], path[-1]
-    m, n = state.members[first], state.members[last]
-    even = (state.total[first] * n - state.total[last] * m) // (m + n)
+    m, n = loads.members[first], loads.members[last]
+    even = (loads.total[first] * n - loads.total[last] * m) // (m + n)
     some = min(max(even, 1), *(room for *_, room in steps))
     for here, there, i, _ in steps:
-        state.take(i, here, -some)
-        state.take(i, there, some)
+        loads.add(i, here, -some)
+        loads.add(i, there, some)

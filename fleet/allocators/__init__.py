@@ -14,7 +14,6 @@ if TYPE_CHECKING:
         AllocationProblem,
         Allocator,
         Assignment,
-        Circumstances,
         NotAllocated,
     )
     from fleet.allocators.cost_based import CostBasedAllocator
@@ -22,13 +21,14 @@ if TYPE_CHECKING:
     from fleet.allocators.makespan import MakespanAllocator
     from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
     from fleet.allocators.round_robin import RoundRobinAllocator
+    from fleet.scheduling.plan_shop import AllocationContext
 
 __all__ = [
     "Allocated",
+    "AllocationContext",
     "AllocationProblem",
     "Allocator",
     "Assignment",
-    "Circumstances",
     "CostBasedAllocator",
     "LlmAllocator",
     "MakespanAllocator",

@@ -1,17 +1,18 @@
-"""The allocator interface: actors in, robots out, checked on both sides."""
+"""The allocator interface: actors in, robots out, with their check."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import msgspec
 
-from fleet.core.checker.checked_plan import CheckedPlan, check_allocation, check_plan
+from fleet.core.checker.checked_plan import CheckedPlan, check_plan
 from fleet.core.model.world import WorldModel
 from fleet.core.schedule.actor_constraints import actors_apart, task_counts
-from fleet.core.schedule.plan_schedule import Schedule, schedule, valid_schedule
+from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
+from fleet.scheduling.plan_shop import AllocationContext
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 
@@ -24,7 +25,7 @@ class Allocated:
     """
 
     allocation: Mapping[str, str]
-    schedule: Schedule
+    schedule: PlanSchedule
     lower_bound_s: float | None = None
     notes: tuple[str, ...] = ()
 
@@ -52,25 +53,6 @@ class Assignment:
 
 
 @dataclass(frozen=True)
-class Circumstances:
-    """What counts in an allocation besides plan and world.
-
-    `ready_s` says from when on a robot is free [s from now]; `priority` of a goal decides between
-    equal makespans (each step up counts twice); `due_s` says when a goal should be done
-    [s from now]. `home` is the robot of each actor in the plan that this is the rest of, and
-    `sequence` the order in which they were to begin: few actors should change hands. Actors that
-    are `under_way` go on at once.
-    """
-
-    ready_s: Mapping[str, float] = field(default_factory=dict)
-    priority: Mapping[str, int] = field(default_factory=dict)
-    due_s: Mapping[str, float] = field(default_factory=dict)
-    home: Mapping[str, str] = field(default_factory=dict)
-    sequence: tuple[str, ...] = ()
-    under_way: frozenset[str] = frozenset()
-
-
-@dataclass(frozen=True)
 class NotAllocated:
     """Why there is no allocation; never empty."""
 
@@ -89,7 +71,7 @@ class AllocationProblem:
     able: Mapping[str, tuple[str, ...]]
     load: Mapping[str, int]
     apart: frozenset[tuple[str, str]]
-    circumstances: Circumstances = field(default_factory=Circumstances)
+    context: AllocationContext = field(default_factory=AllocationContext)
 
     @property
     def plan(self) -> Plan:
@@ -103,75 +85,62 @@ class AllocationProblem:
 
 
 class Allocator(ABC):
-    """Binds actors to robots. Subclasses choose; this class checks what they chose."""
+    """Binds actors to robots. Subclasses choose; this class checks what comes out."""
 
     name: str
     reschedules = False
-    """Whether it heeds `Circumstances.home` itself; for others, whoever can stays where he is."""
+    """Whether it heeds the context's `home` itself; for others, whoever can stays where he is."""
 
     def allocate(
-        self, checked: CheckedPlan, circumstances: Circumstances | None = None
+        self, checked: CheckedPlan, context: AllocationContext | None = None
     ) -> Allocated | NotAllocated:
         """A checked allocation of a plan to the connected robots of its world, or why none.
 
         Tasks of one actor go to one robot, in order; a robot does its actors one after the other.
         """
-        circumstances = circumstances or Circumstances()
-        if circumstances.home and not self.reschedules:
-            plan, team = checked.plan, checked.world.team
-            pins = {a: robot for a, robot in circumstances.home.items() if robot in team}
-            pins = {a: robot for a, robot in {**pins, **plan.pins}.items() if a in plan.actors}
+        context = context or AllocationContext()
+        if context.home and not self.reschedules:
+            plan, world = checked.plan, checked.world
+            stay = {a: robot for a, robot in context.home.items() if robot in world.team}
+            pins = {a: robot for a, robot in {**stay, **plan.pins}.items() if a in plan.actors}
             if pins != plan.pins:
-                pinned = check_plan(msgspec.structs.replace(plan, pins=pins), checked.world)
+                pinned = check_plan(msgspec.structs.replace(plan, pins=pins), world)
                 if isinstance(pinned, CheckedPlan):
-                    found = self._allocate(pinned, circumstances)
+                    found = self._allocate(pinned, context)
                     if isinstance(found, Allocated):
                         return found
-        return self._allocate(checked, circumstances)
+        return self._allocate(checked, context)
 
     def _allocate(
-        self, checked: CheckedPlan, circumstances: Circumstances
+        self, checked: CheckedPlan, context: AllocationContext
     ) -> Allocated | NotAllocated:
         problem = AllocationProblem(
             checked=checked,
             able=checked.able,
             load=task_counts(checked.plan),
             apart=actors_apart(checked),
-            circumstances=circumstances,
+            context=context,
         )
         chosen = self._assign(problem)
         if isinstance(chosen, NotAllocated):
             return chosen
         if not isinstance(chosen, Assignment):
             chosen = Assignment(chosen)
-        found = self._scheduled(problem, chosen)
-        if isinstance(found, NotAllocated) and chosen.sequence is not None:
-            # What the order's maker did not know of may still work out in another order.
-            chosen = replace(chosen, sequence=None)
-            found = self._scheduled(problem, chosen)
-        return found
-
-    def _scheduled(
-        self, problem: AllocationProblem, chosen: Assignment
-    ) -> Allocated | NotAllocated:
-        checked, allocation = problem.checked, chosen.allocation
-        ready_s = problem.circumstances.ready_s
-        if chosen.sequence is None:
-            order = valid_schedule(checked, allocation, problem.circumstances.under_way, ready_s)
-            if isinstance(order, tuple):
-                return NotAllocated(order)
-            return Allocated(allocation, order, chosen.lower_bound_s, chosen.notes)
-        groups = [(actor,) for actor in chosen.sequence]
-        given = schedule(checked, allocation, groups, ready_s)
-        if given is None:
-            sentence = f"{self.name}: in this order robots wait for each other for ever"
-            return NotAllocated((Violation(code="no-allocation", sentence=sentence),))
-        if violations := check_allocation(
-            problem.plan, problem.world, allocation, given.extra_after
-        ):
-            return NotAllocated(violations)
-        return Allocated(allocation, given, chosen.lower_bound_s, chosen.notes)
+        return _scheduled(problem, chosen)
 
     @abstractmethod
     def _assign(self, problem: AllocationProblem) -> Mapping[str, str] | Assignment | NotAllocated:
         """A robot for every actor, among those able; or why there is none."""
+
+
+def _scheduled(problem: AllocationProblem, chosen: Assignment) -> Allocated | NotAllocated:
+    """In the order that was chosen with the robots, if that will do, or else in another one."""
+    allocation = chosen.allocation
+    plan = AllocatedPlan(problem.checked, allocation, problem.context)
+    found = plan.schedule(chosen.sequence) if chosen.sequence is not None else None
+    if found is None or plan.violations(found):
+        other = plan.valid_schedule(search=True)
+        if isinstance(other, tuple):
+            return NotAllocated(other)
+        found = other
+    return Allocated(allocation, found, chosen.lower_bound_s, chosen.notes)

@@ -11,11 +11,10 @@ from typing import Any
 import msgspec
 
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
-from fleet.core.checker.checked_plan import check_allocation
-from fleet.core.schedule.plan_schedule import best_schedule
 from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
 from fleet.llm.quoting import fenced
 from fleet.llm.structured_output import StructuredAnswer, enumerated, read_answer, schema_of
+from fleet.scheduling.plan_schedule import AllocatedPlan
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.plans import Violation
 
@@ -122,12 +121,13 @@ def read_allocation(text: str, problem: AllocationProblem) -> dict[str, str] | R
     allocation = {row.actor: row.robot for row in answer.robots}
     if sentences := _wrong(answer, allocation, problem):
         return Rejected(tuple(Violation(code="no-robot", sentence=text) for text in sentences))
-    schedule = best_schedule(problem.checked, allocation)
+    allocated = AllocatedPlan(problem.checked, allocation)
+    schedule = next(allocated.schedules(), None)
     if schedule is None:
         return Rejected.because(
             "no-allocation", "with these robots some wait for each other for ever: choose others"
         )
-    violations = check_allocation(problem.plan, problem.world, allocation, schedule.extra_after)
+    violations = allocated.violations(schedule)
     return Rejected(violations) if violations else allocation
 
 

@@ -8,17 +8,16 @@ from fleet.allocators.base import (
     AllocationProblem,
     Allocator,
     Assignment,
-    Circumstances,
     NotAllocated,
 )
 from fleet.allocators.min_max_load import assign_with_least_travel
-from fleet.allocators.plan_shop import PlanShop, plan_shop
 from fleet.jobshop.bounds import lower_bound
 from fleet.jobshop.budget import Budget, Clock
 from fleet.jobshop.instance import Instance
 from fleet.jobshop.portfolio import solve
 from fleet.jobshop.problem import Schedule
 from fleet.jobshop.rescheduling import reschedule
+from fleet.scheduling.plan_shop import AllocationContext, PlanShop, plan_shop
 
 DEADLINE_S = 1.0
 """Time that the search may take, s."""
@@ -56,10 +55,10 @@ class MakespanAllocator(Allocator):
         self._clock = clock
 
     def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
-        made = plan_shop(problem)
-        if problem.circumstances.home:
+        made = plan_shop(problem.checked, problem.able, problem.apart, problem.context)
+        if problem.context.home:
             budget = Budget(RESCHEDULE_SHARE * self._deadline_s, self._clock)
-            rescheduled = _rescheduled(made, problem.circumstances, budget, self._seed)
+            rescheduled = _rescheduled(made, problem.context, budget, self._seed)
             if rescheduled is not None:
                 return rescheduled
         found = solve(made.shop, Budget(self._deadline_s, self._clock), self._exact, self._seed)
@@ -87,15 +86,15 @@ def _assignment(
 
 
 def _rescheduled(
-    made: PlanShop, told: Circumstances, budget: Budget, seed: int
+    made: PlanShop, context: AllocationContext, budget: Budget, seed: int
 ) -> Assignment | None:
     """The allocation there was, with few actors in other hands."""
     machine = {robot: i for i, robot in enumerate(made.robots)}
     named = made.shop.blocks[len(made.actors) :]
-    home = [machine.get(told.home.get(actor, ""), NOBODY) for actor in made.actors]
+    home = [machine.get(context.home.get(actor, ""), NOBODY) for actor in made.actors]
     home += [block.machines[0] for block in named]
     block_of = {actor: block for block, actor in enumerate(made.actors)}
-    order = [block_of[actor] for actor in told.sequence if actor in block_of]
+    order = [block_of[actor] for actor in context.sequence if actor in block_of]
     found = reschedule(made.shop, home, order, budget, seed=seed)
     if found is None:
         return None

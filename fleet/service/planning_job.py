@@ -19,7 +19,7 @@ from fleet.core.state import State
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
 from fleet.planners.plan_repair import repair_plan
-from fleet.service.allocation_context import circumstances_of, robots_under_way
+from fleet.service.allocation_context import context_of, robots_under_way
 from fleet.service.composition import Composition
 from keyexpr_schema.facts import SEARCHED
 from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
@@ -126,7 +126,7 @@ class _Run:
     def _allocate(self, checked: CheckedPlan, busy: Mapping[str, str]) -> Allocated | NotAllocated:
         """With actors that robots are `busy` with left where they are and begun with, if that can
         be; else only left where they are; else as if nothing were under way."""
-        context = circumstances_of(self.job, self.state, frozenset(busy))
+        context = context_of(self.job, self.state, frozenset(busy))
         calm = changed(context, under_way=frozenset())
         plan = checked.plan
         pins = {**busy, **plan.pins}

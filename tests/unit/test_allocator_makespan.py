@@ -8,9 +8,10 @@ import pytest
 from msgspec.structs import replace
 
 from benchmarks.allocation.shops import random_shop
-from fleet.allocators.base import Allocated, Circumstances, NotAllocated
+from fleet.allocators.base import Allocated, NotAllocated
 from fleet.allocators.makespan import MakespanAllocator
 from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
+from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from fleet.jobshop.budget import Budget, StepClock
 from fleet.jobshop.cpsat import CpSat, installed
@@ -21,7 +22,8 @@ from fleet.jobshop.problem import BadShop, Block, Machine, Operation, Shop
 from fleet.jobshop.rescheduling import reschedule, without_machines
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
-from keyexpr_schema.ids import actor_arg
+from fleet.scheduling.plan_shop import AllocationContext
+from keyexpr_schema.ids import actor_arg, bound
 from keyexpr_schema.payloads.plans import Plan, Task
 from tests.household import bring, carrier, checked, home, manipulator
 
@@ -45,7 +47,7 @@ def planned(world: WorldModel, *goals: tuple[int, str]) -> Plan:
 
 
 def allocated(allocator: MakespanAllocator | MinMaxLoadAllocator, plan: Plan, world: WorldModel,
-              told: Circumstances | None = None) -> Allocated:  # fmt: skip
+              told: AllocationContext | None = None) -> Allocated:  # fmt: skip
     found = allocator.allocate(checked(plan, world), told)
     assert isinstance(found, Allocated), found
     return found
@@ -69,22 +71,26 @@ def test_it_is_no_longer_than_the_balanced_plan_and_says_how_far_from_optimal() 
     assert balanced.lower_bound_s is None and balanced.gap is None
 
 
-def test_what_the_core_predicts_is_what_the_schedule_says() -> None:
-    """The shop and the plan's own schedule are two ways to reckon; both must agree."""
+def test_tasks_start_as_soon_as_those_before_them_end() -> None:
+    """With the way from where the robot is by then; robots take actors in the schedule's order."""
     world = team()
     plan = planned(world, (1, "hallway"), (2, "living_room"), (3, "hallway"))
-
-    class Telling(MakespanAllocator):
-        def _assign(self, problem):  # type: ignore[no-untyped-def]
-            from fleet.allocators.plan_shop import plan_shop
-
-            self.core_s = solve(plan_shop(problem).shop, steps(0.1), exact=False)
-            return super()._assign(problem)
-
-    allocator = Telling(deadline_s=0.1, exact=False, clock=StepClock())
-    found = allocated(allocator, plan, world)
-    assert allocator.core_s is not None
-    assert found.schedule.makespan_s == pytest.approx(allocator.core_s.makespan_s, abs=1e-6)
+    found = allocated(QUICK, plan, world)
+    schedule = found.schedule
+    extra = schedule.extra_after
+    graph = TaskGraph({t.task: {*t.after, *extra.get(t.task, ())} for t in plan.tasks})
+    tasks = {task.task: task for task in plan.tasks}
+    where = {robot: world.value("at", robot) for robot in world.team}
+    for task in graph.order:
+        args = {name: bound(arg, found.allocation) for name, arg in tasks[task].args.items()}
+        action = world.skills[tasks[task].skill].ground(args)
+        befores = graph.predecessors[task]
+        start_s = max((schedule.end_s[before] for before in befores), default=0.0)
+        end_s = start_s + world.duration_s(action, where[action.actor], action.actor)
+        assert (schedule.start_s[task], schedule.end_s[task]) == pytest.approx((start_s, end_s))
+        for key, value in action.after:
+            if key == ("at", action.actor):
+                where[action.actor] = value
 
 
 def test_the_same_question_has_the_same_answer_where_it_is_settled_at_once() -> None:
@@ -97,9 +103,9 @@ def test_a_robot_that_is_busy_gets_no_work_that_another_can_do_sooner() -> None:
     world = home((manipulator("arm_1"), manipulator("arm_2")), cups=1)
     plan = planned(world, (1, "hallway"))
     for busy, free in (("arm_1", "arm_2"), ("arm_2", "arm_1")):
-        found = allocated(QUICK, plan, world, Circumstances(ready_s={busy: 100.0}))
+        found = allocated(QUICK, plan, world, AllocationContext(ready_s={busy: 100.0}))
         assert set(found.allocation.values()) == {free}
-    both = allocated(QUICK, plan, world, Circumstances(ready_s={"arm_1": 100.0, "arm_2": 50.0}))
+    both = allocated(QUICK, plan, world, AllocationContext(ready_s={"arm_1": 100.0, "arm_2": 50.0}))
     assert min(both.schedule.start_s.values()) == pytest.approx(50.0)
 
 
@@ -107,7 +113,7 @@ def test_of_equal_makespans_the_urgent_goal_is_done_first() -> None:
     world = home((manipulator("arm_1"),), cups=3)
     plan = planned(world, (1, "hallway"), (2, "hallway"), (3, "hallway"))
     for urgent in ("g1", "g2", "g3"):
-        found = allocated(QUICK, plan, world, Circumstances(priority={urgent: 6}))
+        found = allocated(QUICK, plan, world, AllocationContext(priority={urgent: 6}))
         ends = {
             goal: max(found.schedule.end_s[t.task] for t in plan.tasks if t.goal == goal)
             for goal in plan.goals

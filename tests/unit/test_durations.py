@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from fleet.core import events
 from fleet.core.model.durations import FASTEST, FULL_ATTEMPTS, SLOWEST, learn, pace, work_s
-from fleet.core.schedule.plan_schedule import predicted_duration_s
 from fleet.core.state import State
 from fleet.core.step import step
 from keyexpr_schema.keyspace import DURATIONS
@@ -107,7 +106,7 @@ def test_reports_teach_and_the_next_plan_counts_with_it() -> None:
     assert model.documents["durations/hsr"] == known
     world = model.state.world(SKILLS)
     pick = PICK.ground({"robot": "hsr", "object": "cup_2", "place": "kitchen"})
-    assert predicted_duration_s(pick, "kitchen", "hsr", world) == known.skills["pick"].mean
+    assert world.duration_s(pick, "kitchen", "hsr") == known.skills["pick"].mean
     model.plan(bring(2, "hallway"))
     predicted = {r.skill: r.duration_s for r in model.state.plans["plan-2"].current()}
     assert predicted["pick"] == known.skills["pick"].mean

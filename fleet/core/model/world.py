@@ -112,6 +112,12 @@ class WorldModel:
         """Seconds that a skill takes a robot, without the way to it."""
         return work_s(self._durations(robot), skill)
 
+    def duration_s(self, action: Action, origin: Value, robot: str) -> float:
+        """Seconds that a robot takes for an action, travel from `origin` to it included."""
+        to = action.skill.travel_to
+        travel_s = 0.0 if to is None else self.travel_s(robot, origin, action.args[to])
+        return self.work_s(robot, action.skill) + travel_s
+
     def travel_s(self, robot: str, origin: Value, target: str) -> float:
         """Seconds that a robot takes from one place to another; from anywhere if unknown."""
         return pace(self._durations(robot)) * self.way_s(robot, origin, target)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from fleet.core.checker.checked_plan import (
     CheckedPlan,
     InvalidPlan,
-    check_allocation,
     check_plan,
 )
 from fleet.core.model.world import WorldModel
 from fleet.core.schedule.actor_constraints import least_loaded
-from fleet.core.schedule.plan_schedule import best_schedule
+from fleet.scheduling.plan_schedule import AllocatedPlan
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 
@@ -29,7 +28,8 @@ def verify(plan: Plan, world: WorldModel) -> CheckedPlan | InvalidPlan:
             "there are fewer able robots than the plan needs at the same time: "
             "let the same actor do more of it",
         )
-    found = best_schedule(checked, allocation)
+    allocated = AllocatedPlan(checked, allocation)
+    found = next(allocated.schedules(), None)
     if found is None:
         return _invalid(
             checked,
@@ -37,7 +37,7 @@ def verify(plan: Plan, world: WorldModel) -> CheckedPlan | InvalidPlan:
             "with the robots there are, some would wait for each other for ever: "
             "let actors that meet do less in between",
         )
-    violations = check_allocation(plan, world, allocation, found.extra_after)
+    violations = allocated.violations(found)
     return InvalidPlan(plan, world, violations) if violations else checked
 
 

@@ -9,7 +9,6 @@ from msgspec.structs import replace
 
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
-from fleet.core.schedule.plan_schedule import predicted_duration_s
 from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import ActionSequence
 from fleet.planners.symbolic.search import (
@@ -178,7 +177,7 @@ def _cheapest_few(
         where = now.get(stands[number]) or facts.get(stands[number])
         cost = seconds.get((number, where))
         if cost is None:
-            cost = predicted_duration_s(action, where, action.actor, world)
+            cost = world.duration_s(action, where, action.actor)
             cost += REUSE_CHARGE_S * used.get(_signature(action), 0)
             seconds[number, where] = cost
         return cost
@@ -200,7 +199,7 @@ def _with_true_cost(found: Solution, world: WorldModel, facts: Facts) -> Solutio
     where: dict[str, Value] = {robot: facts.get(FactKey(AT, robot)) for robot in world.robots}
     seconds = 0.0
     for action in found.actions:
-        seconds += predicted_duration_s(action, where.get(action.actor), action.actor, world)
+        seconds += world.duration_s(action, where.get(action.actor), action.actor)
         for literal in action.after:
             if literal.variable == FactKey(AT, action.actor):
                 where[action.actor] = literal.value

@@ -23,7 +23,6 @@ from fleet.core.checker.checked_plan import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.model.world import WorldModel
 from fleet.core.schedule.actor_constraints import least_loaded
 from fleet.core.schedule.actor_order import carried_at_end
-from fleet.core.schedule.plan_schedule import Schedule, best_schedule, valid_schedule
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.deordering import ActionSequence, deordered
 from fleet.planners.symbolic.action_sequences import (
@@ -35,6 +34,7 @@ from fleet.planners.symbolic.action_sequences import (
     subgoals_in_order,
 )
 from fleet.planners.symbolic.search import Facts
+from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
 from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.plans import Plan
 
@@ -118,13 +118,13 @@ class _Candidate:
 
     def verify(self) -> _Candidate | NoPlan:
         """The candidate with the cost of its shortest schedule that passes the checker."""
-        found = valid_schedule(self.checked, self.allocation)
+        found = AllocatedPlan(self.checked, self.allocation).valid_schedule()
         if isinstance(found, tuple):
             return NoPlan(found[0].sentence, found)
         return replace(self, cost=_cost(found, self.checked), verified=True)
 
 
-def _cost(schedule: Schedule, checked: CheckedPlan) -> Cost:
+def _cost(schedule: PlanSchedule, checked: CheckedPlan) -> Cost:
     unloading_s = UNLOADING_S * len(carried_at_end(checked))
     return round(schedule.makespan_s + unloading_s, 3), schedule.work_s
 
@@ -243,7 +243,7 @@ def _candidate(
     allocation = least_loaded(checked)
     if allocation is None:
         return NoPlan("there are fewer robots than the plan needs at the same time")
-    schedule = best_schedule(checked, allocation)
+    schedule = next(AllocatedPlan(checked, allocation).schedules(), None)
     cost = (inf, inf) if schedule is None else _cost(schedule, checked)
     return _Candidate(choice, checked, allocation, cost)
 

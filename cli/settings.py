@@ -95,14 +95,9 @@ def config_file(environ: Mapping[str, str], cwd: Path | None = None) -> Path | N
 
 
 def _read(path: Path) -> dict[str, Any]:
-    import yaml
+    from keyexpr_schema.config_files import read_yaml
 
-    try:
-        written = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadSettings(f"cannot read {path}: {error}") from None
-    except yaml.YAMLError as error:
-        raise BadSettings(f"{path} is not YAML: {one_line(error)}") from None
+    written = read_yaml(path, BadSettings)
     if written is None:
         return {}
     if not isinstance(written, dict):
@@ -182,8 +177,3 @@ def _planner(written: object, path: Path) -> PlannerSettings:
         llm_config=None if llm is None else path.parent / Path(llm).expanduser(),
         skills=tuple(path.parent / Path(each).expanduser() for each in skills),
     )
-
-
-def one_line(error: object) -> str:
-    """The text of an error on one line."""
-    return " ".join(str(error).split())

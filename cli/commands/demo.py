@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, command
+from cli.command import Call, single
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -17,10 +17,8 @@ if TYPE_CHECKING:
     from cli.demo.summary import Summary
     from cli.views.live import ChangePrinter
 
-app = typer.Typer(rich_markup_mode=None, add_completion=False)
 
-
-@command(app)
+@single
 async def demo(
     call: Call,
     mission: Annotated[

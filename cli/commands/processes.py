@@ -11,13 +11,7 @@ from typing import Annotated, TypeVar
 
 import typer
 
-from cli.command import Call, command
-
-router_app = typer.Typer(rich_markup_mode=None, add_completion=False)
-planner_app = typer.Typer(rich_markup_mode=None, add_completion=False)
-worker_app = typer.Typer(rich_markup_mode=None, add_completion=False)
-sim_app = typer.Typer(rich_markup_mode=None, add_completion=False)
-record_app = typer.Typer(rich_markup_mode=None, add_completion=False)
+from cli.command import Call, single
 
 T = TypeVar("T")
 SIM = "sim"
@@ -32,7 +26,7 @@ DataOption = Annotated[
 ]
 
 
-@command(router_app)
+@single
 def router(
     call: Call,
     listen: Annotated[
@@ -59,7 +53,7 @@ def router(
     )
 
 
-@command(planner_app)
+@single
 def planner(
     call: Call,
     data: DataOption = None,
@@ -119,7 +113,7 @@ def planner(
     )
 
 
-@command(worker_app)
+@single
 def worker(
     call: Call,
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Which registered robot.")],
@@ -149,7 +143,7 @@ def worker(
     )
 
 
-@command(sim_app)
+@single
 def sim(
     call: Call,
     mission: Annotated[
@@ -196,7 +190,7 @@ def sim(
     )
 
 
-@command(record_app)
+@single
 def record(
     call: Call,
     out: Annotated[Path, typer.Argument(metavar="OUT.rrd", help="The recording.")],

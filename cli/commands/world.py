@@ -6,21 +6,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, command
+from cli.command import Call, command, group
 from cli.commands.world_add import add
-from cli.parsing import Group
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from keyexpr_schema.transport.session import Session
 
-app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, add_completion=False)
-
-
-@app.callback()
-def world() -> None:
-    """Places, objects, facts and statements: what the fleet is told of its world."""
+app = group("Places, objects, facts and statements: what the fleet is told of its world.")
 
 
 @command(app, "load")

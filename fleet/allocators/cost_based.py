@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from fleet.allocators.approach import first_destinations
-from fleet.allocators.balancing_problem import balancing_problem, named
+from fleet.allocators.balancing_problem import balancing_problem
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
-from fleet.allocators.infeasibility import explained
-from fleet.allocators.load_balancing.balance import balance
-from fleet.allocators.load_balancing.problem import NoAssignment
+from fleet.allocators.min_max_load import assign_balanced
 from keyexpr_schema.facts import AT, Value
 from keyexpr_schema.ids import actor_arg
 
@@ -109,11 +108,11 @@ def _predecessors(problem: AllocationProblem) -> dict[str, set[str]]:
 
 def _balanced_instead(problem: AllocationProblem, actor: str) -> Assignment | NotAllocated:
     """By load, where the rounds have left an actor without a robot; or why there is no way."""
-    found = balance(balancing_problem(problem))
-    if isinstance(found, NoAssignment):
-        return explained(problem, found)
+    found = assign_balanced(problem)
+    if isinstance(found, NotAllocated):
+        return found
     note = (
         "allocated by load and not by travel: after some rounds, every robot that can be actor "
         f"{actor} was one that it must be apart from"
     )
-    return Assignment(named(problem, found.robot), notes=(note,))
+    return replace(found, notes=(note, *found.notes))

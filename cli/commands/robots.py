@@ -13,7 +13,7 @@ from cli.command import Call, single
 async def register(
     call: Call,
     files: Annotated[
-        list[str], typer.Argument(metavar="FILE", help="Robot files; see configs/robots.")
+        list[str], typer.Argument(metavar="FILE", help="Robots' files, or names as hsr.")
     ],
 ) -> None:
     """Declare robots from YAML files; declaring one again replaces what was said of it."""

@@ -19,9 +19,10 @@ app = group("Places, objects, facts and statements: what the fleet is told of it
 
 @command(app, "load")
 async def load(
-    call: Call, file: Annotated[str, typer.Argument(metavar="FILE", help="See configs/worlds.")]
+    call: Call,
+    file: Annotated[str, typer.Argument(metavar="FILE", help="A world's file, or name as home.")],
 ) -> None:
-    """Tell the fleet the places and objects of a world file (not where the objects are)."""
+    """Put the places and objects of a world file (not where the objects are)."""
     from cli.client.world import put_world
     from sim.files.world_file import load_world
     from sim.files.world_payloads import object_payloads, place_payloads

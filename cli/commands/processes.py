@@ -18,6 +18,12 @@ SIM = "sim"
 """The embodiment that is not a plug-in."""
 BACKENDS = ("mujoco", "kinematic")
 
+MissionArgument = Annotated[
+    str, typer.Argument(metavar="MISSION", help="A mission's file, or name as two-cups.")
+]
+BackendOption = Annotated[
+    str, typer.Option("--backend", help="mujoco (physics) or kinematic (fast, no physics).")
+]
 DataOption = Annotated[
     Path | None,
     typer.Option(
@@ -128,11 +134,11 @@ def worker(
     from keyexpr_schema.plug_ins import plug_in_names
     from sim.embodiment import sim_embodiment
     from workers.embodiment import EMBODIMENTS, installed_embodiment
-    from workers.process import run
+    from workers.process import run_worker
 
     check_known("embodiment", embodiment, [SIM, *plug_in_names(EMBODIMENTS)])
     end_with_parent()
-    run(
+    run_worker(
         robot=robot,
         endpoints=call.settings.routers,
         realm=call.settings.realm,
@@ -146,12 +152,8 @@ def worker(
 @single
 def sim(
     call: Call,
-    mission: Annotated[
-        str, typer.Argument(metavar="MISSION", help="A mission's file, or name as two-cups.")
-    ],
-    backend: Annotated[
-        str, typer.Option("--backend", help="mujoco (physics) or kinematic (fast, no physics).")
-    ] = "mujoco",
+    mission: MissionArgument,
+    backend: BackendOption = "mujoco",
     speed: Annotated[
         str, typer.Option("--speed", help="Simulated seconds a second, or max.")
     ] = "1",
@@ -176,10 +178,10 @@ def sim(
         raise BadArgument("--spread and --failing are for --backend kinematic; physics needs none")
     from cli.demo.child_processes import end_with_parent
     from sim.kinematic.backend import MotionModel
-    from sim.server.process import run
+    from sim.server.process import run_simulation
 
     end_with_parent()
-    run(
+    run_simulation(
         mission=mission,
         endpoints=call.settings.routers,
         realm=call.settings.realm,
@@ -198,10 +200,10 @@ def record(
 ) -> None:
     """Record everything that happens for Rerun."""
     from cli.demo.child_processes import end_with_parent
-    from fleet.timeline.process import run
+    from fleet.timeline.process import run_recorder
 
     end_with_parent()
-    run(endpoints=call.settings.routers, realm=call.settings.realm, out=out, view=view)
+    run_recorder(endpoints=call.settings.routers, realm=call.settings.realm, out=out, view=view)
 
 
 def parse_speed(written: str) -> float | None:

@@ -99,7 +99,7 @@ async def journal(
 
     async with call.session() as session:
         # What a query key replies is not in its type; the key table says it is a StoreJournal.
-        page: StoreJournal = await session.ask(
+        page: StoreJournal = await session.query(
             STORE_JOURNAL, StoreAddress(), StoreQuery(after=after, limit=limit)
         )
 

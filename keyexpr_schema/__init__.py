@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "errors": (
-        "SchemaError ForeignKey InvalidId NoAnswer NoConfigFile Unconfirmed UndecodablePayload "
+        "SchemaError ForeignKey InvalidId NoReply NoConfigFile Unconfirmed UndecodablePayload "
         "Unreachable"
     ),
     "facts": (

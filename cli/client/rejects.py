@@ -31,9 +31,8 @@ async def current_rejects(session: Session, rejects: Iterable[Reject]) -> list[R
         if not key.stored:
             left.append(reject)
             continue
-        for wire in await session.listing(reject.keyexpr, ASK_S):
-            try:
-                session.decode(key, wire)
-            except UndecodablePayload:
-                left.append(reject)
+        try:
+            await session.get(key, key.parse(reject.keyexpr), ASK_S)
+        except UndecodablePayload:
+            left.append(reject)
     return left

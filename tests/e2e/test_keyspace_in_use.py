@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from cli.demo.mission_run import DemoOptions, running
+from cli.demo.bring_up import DemoOptions
+from cli.demo.mission_run import running_demo
 from keyexpr_schema.key import Component
 from keyexpr_schema.keyspace import GOAL_SPEC, KEYSPACE, REJECT
 from keyexpr_schema.payloads.goals import GoalAddress
@@ -66,13 +67,13 @@ async def mission(folder: Path) -> None:
     options = DemoOptions(mission="two-cups", out=folder / "run", backend="kinematic")
     (folder / "plan.yaml").write_text(f"plan: mine{PLAN}", encoding="utf-8")
 
-    async with running(options) as demo:
-        robotctl = Robotctl(demo.fleet.endpoint, folder, demo.fleet.realm)
+    async with running_demo(options) as demo:
+        robotctl = Robotctl(demo.processes.endpoint, folder, demo.processes.realm)
         robotctl.env[TRACE_VARIABLE] = str(folder / "trace.txt")
 
         async def play() -> None:
-            await demo.give()
-            await demo.ended()
+            await demo.submit()
+            await demo.wait_until_ended()
             key, link = GOAL_SPEC.build(GoalAddress("bad")), demo.session.link
             link.send_soon(key, b"{", "application/json", block=True)
 
@@ -99,7 +100,7 @@ async def mission(folder: Path) -> None:
             refused = await robotctl.soon("replan", "plan-1")
             assert "not running" in refused.err
 
-        await demo.fleet.guard(play())
+        await demo.processes.guard(play())
 
 
 def allowed(column: Component, name: str, key: str, at: str) -> bool:

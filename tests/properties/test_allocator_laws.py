@@ -16,8 +16,7 @@ from fleet.allocators.base import AllocationProblem, Assignment, NotAllocated
 from fleet.allocators.cost_based import assign_in_rounds
 from fleet.allocators.min_max_load import assign_balanced, assign_with_least_travel
 from fleet.allocators.round_robin import assign_in_turn
-from fleet.core.checker.plan_checker import check_plan
-from tests.household import drives, fact, home, manipulator
+from tests.household import checked, drives, fact, home, manipulator
 
 ROBOTS = {"r0": "kitchen", "r1": "hallway", "r2": "living_room"}
 WORLD = home(
@@ -34,9 +33,7 @@ def problems(draw: st.DrawFn) -> AllocationProblem:
     some = st.lists(st.sampled_from(sorted(ROBOTS)), min_size=1, unique=True).map(sorted)
     pairs = [(a, b) for i, a in enumerate(actors) for b in actors[i + 1 :]]
     return AllocationProblem(
-        plan=plan,
-        world=WORLD,
-        checked=check_plan(plan, WORLD),
+        checked=checked(plan, WORLD),
         able={actor: tuple(draw(some)) for actor in actors},
         load={actor: draw(st.integers(1, 6)) for actor in actors},
         apart=frozenset(draw(st.lists(st.sampled_from(pairs), max_size=4)) if pairs else ()),

@@ -30,7 +30,7 @@ async def test_a_confirmed_value_is_read_back_listed_and_deleted(session_config)
         assert await session.list(GOAL_SPEC, goal="g2") == {GoalAddress("g2"): goal("g2")}
         await session.delete(GOAL_SPEC, GoalAddress("g1"))
         assert await session.get(GOAL_SPEC, GoalAddress("g1")) is None
-        journal = await session.ask(STORE_JOURNAL, StoreAddress(), StoreQuery())
+        journal = await session.query(STORE_JOURNAL, StoreAddress(), StoreQuery())
         assert [(e.keyexpr, e.deleted) for e in journal.entries] == [
             (GOAL_SPEC.build(GoalAddress("g1")), False),
             (GOAL_SPEC.build(GoalAddress("g2")), False),
@@ -67,7 +67,7 @@ async def test_realms_do_not_see_each_other(session_config):
             await south.confirm(GOAL_SPEC, GoalAddress("g2"), goal("g2"))
             change = await asyncio.wait_for(anext(watch), 5)
             assert change.address == GoalAddress("g2")
-        journal = await south.ask(STORE_JOURNAL, StoreAddress(), StoreQuery())
+        journal = await south.query(STORE_JOURNAL, StoreAddress(), StoreQuery())
         assert [e.keyexpr for e in journal.entries] == [GOAL_SPEC.build(GoalAddress("g2"))]
 
 

@@ -14,7 +14,7 @@ import zenoh
 
 from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.errors import (
-    NoAnswer,
+    NoReply,
     Unconfirmed,
     UndecodablePayload,
     Unreachable,
@@ -25,9 +25,9 @@ from keyexpr_schema.payloads.motions import MotionOutcome, MotionState, Senses
 from keyexpr_schema.payloads.robots import AliveAddress
 from keyexpr_schema.payloads.simulation import MotionCall, SimRobotAddress
 from keyexpr_schema.payloads.world import Fact, FactAddress
+from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.session import Session, Watch, open_session
 from keyexpr_schema.transport.storage import Write
-from keyexpr_schema.transport.wire import zenoh_config
 
 AT = FactAddress("cup_1", "at")
 
@@ -118,8 +118,8 @@ async def test_without_its_router_everything_says_so(router, session_config):
             await session.wait_connected(0.2)
         with pytest.raises(Unconfirmed, match=r"goals/g1/spec was not confirmed .* no router"):
             await session.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"), 0.3)
-        with pytest.raises(NoAnswer, match="no router answers"):
-            await session.ask(SIM_MOTION, SimRobotAddress("r1"), _call("c1"))
+        with pytest.raises(NoReply, match="no router answers"):
+            await session.query(SIM_MOTION, SimRobotAddress("r1"), _call("c1"))
         router.restart()
         await session.wait_connected(10)
         assert await session.get(GOAL_SPEC, GoalAddress("g1"), 10) is None
@@ -357,8 +357,8 @@ async def _ask_whoever_comes(client, address, call="c1"):
     async with asyncio.timeout(10):
         while True:
             try:
-                return await client.ask(SIM_MOTION, address, _call(call))
-            except NoAnswer as error:
+                return await client.query(SIM_MOTION, address, _call(call))
+            except NoReply as error:
                 if "nobody serves" not in str(error):
                     raise
 
@@ -394,19 +394,19 @@ async def test_a_failing_slow_or_absent_server_is_no_answer_with_a_sentence(sess
         open_session(session_config(component="sim")) as server,
         open_session(session_config()) as client,
     ):
-        with pytest.raises(NoAnswer, match="nobody serves sim/robots/r1/motion"):
-            await client.ask(SIM_MOTION, r1, _call("c1"))
+        with pytest.raises(NoReply, match="nobody serves sim/robots/r1/motion"):
+            await client.query(SIM_MOTION, r1, _call("c1"))
         async with server.serve(SIM_MOTION, handler, robot="r1"):
-            with pytest.raises(NoAnswer, match="sim failed: the arm is stuck"):
+            with pytest.raises(NoReply, match="sim failed: the arm is stuck"):
                 await _ask_whoever_comes(client, r1)
-            with pytest.raises(NoAnswer, match="nobody serves sim/robots/r2/motion"):
-                await client.ask(SIM_MOTION, SimRobotAddress("r2"), _call("c1"))
-            with pytest.raises(NoAnswer, match=r"did not answer within 0\.3 s"):
-                await client.ask(SIM_MOTION, r1, _call("slow"), 0.3)
-            waiting = asyncio.create_task(client.ask(SIM_MOTION, r1, _call("slow"), 30))
+            with pytest.raises(NoReply, match="nobody serves sim/robots/r2/motion"):
+                await client.query(SIM_MOTION, SimRobotAddress("r2"), _call("c1"))
+            with pytest.raises(NoReply, match=r"did not answer within 0\.3 s"):
+                await client.query(SIM_MOTION, r1, _call("slow"), 0.3)
+            waiting = asyncio.create_task(client.query(SIM_MOTION, r1, _call("slow"), 30))
             done, _ = await asyncio.wait({waiting}, timeout=0.2)
             assert not done
-        with pytest.raises(NoAnswer, match="sim is going away"):
+        with pytest.raises(NoReply, match="sim is going away"):
             await asyncio.wait_for(waiting, 5)
 
 

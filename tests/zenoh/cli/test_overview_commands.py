@@ -19,8 +19,8 @@ from keyexpr_schema.keyspace import (
     REJECT,
 )
 from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState, GoalStatus
+from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from keyexpr_schema.transport.wire import zenoh_config
 from tests.robotctl import Robotctl
 
 CONFIGS = Path(__file__).parents[3] / "configs"

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from typing import Any
 
 import msgspec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import CheckedPlan, check_plan
 from fleet.llm.quoting import fenced
 from fleet.llm.structured_output import read_answer
 from fleet.planners.base import PlanningProblem
 from fleet.planners.llm.action_elimination import without_redundant_tasks
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema
-from fleet.planners.llm.candidate import CandidatePlan, candidate_of, merged, plan_of
-from fleet.planners.llm.verification import violations_of
+from fleet.planners.llm.candidate import candidate_of, merged
+from fleet.planners.llm.verification import verify
 from keyexpr_schema.payloads.plans import Plan
 from tests.household import bring, home, manipulator
 
@@ -36,6 +37,16 @@ TASKS = st.fixed_dictionaries(
         "goal": st.sampled_from(["g1", "g2", "g9"]),
     }
 )
+DETOURS = st.fixed_dictionaries(
+    {
+        "task": st.sampled_from(["t1", "t2", "t3", "t4"]),
+        "skill": st.just("navigate"),
+        "args": st.fixed_dictionaries({"robot": st.just("?c"), "to": st.just("kitchen")}),
+        "after": st.sampled_from([[], ["13"]]),
+        "goal": st.just("g1"),
+    }
+)
+"""Tasks that do no harm, and that no goal needs."""
 PINS = st.lists(
     st.fixed_dictionaries(
         {"actor": st.just("?a"), "robot": st.sampled_from(["r1", "r2", "nobody"])}
@@ -64,51 +75,63 @@ def carry(number: int, place: str, actor: str) -> list[dict[str, Any]]:
     ]
 
 
-def consider(answer: dict[str, Any], flat: bool) -> Plan | None:
-    """The plan of an answer, as the planner makes it, or `None` for one that is refused."""
+def consider(answer: dict[str, Any], flat: bool) -> Plan | set[str]:
+    """The plan of an answer, as the planner makes it, or the codes of what is wrong with it."""
     read = read_answer(json.dumps(answer), ListAnswer if flat else GraphAnswer)
     if isinstance(read, str):
-        return None
+        return {"malformed"}
     problem = PlanningProblem("p", GOALS, WORLD)
-    plan = plan_of(candidate_of(read, WORLD, GOALS), problem, GOALS)
-    if violations := violations_of(plan, WORLD):
+    plan = candidate_of(read, problem, GOALS, WORLD)
+    if violations := verify(plan, WORLD).violations:
         assert all(row.sentence for row in violations)
-        return None
+        return {row.code for row in violations}
     plan = without_redundant_tasks(plan, WORLD)
-    made = merged([CandidatePlan(plan.tasks, plan.pins)], problem, keep_order=not flat)
-    assert check_plan(made, WORLD).valid
+    made = merged([plan], problem, keep_order=not flat)
+    assert isinstance(check_plan(made, WORLD), CheckedPlan)
     # What is stored must be readable again, whatever names the model made up.
     assert msgspec.json.decode(msgspec.json.encode(made), type=Plan) == made
     return made
 
 
-@given(st.lists(TASKS, max_size=6), PINS)
-def test_anything_at_all(tasks: list[dict[str, Any]], pins: list[dict[str, str]]) -> None:
-    consider({"tasks": tasks, "pins": pins}, flat=False)
-    rows = [{name: row[name] for name in ("skill", "args", "goal")} for row in tasks]
-    consider({"tasks": rows, "pins": pins}, flat=True)
+def test_anything_at_all() -> None:
+    outcomes: Counter[str] = Counter()
+
+    @given(st.lists(TASKS, max_size=6), PINS, st.booleans())
+    def law(tasks: list[dict[str, Any]], pins: list[dict[str, str]], flat: bool) -> None:
+        if flat:
+            tasks = [{name: row[name] for name in ("skill", "args", "goal")} for row in tasks]
+        made = consider({"tasks": tasks, "pins": pins}, flat)
+        outcomes.update(made if isinstance(made, set) else {"plan"})
+
+    law()
+    assert len(outcomes) > 2, outcomes
 
 
-@given(
-    st.lists(TASKS, max_size=3),
-    st.sampled_from(["?a", "?b"]),
-    st.booleans(),
-    st.randoms(use_true_random=False),
-)
-def test_a_good_plan_with_anything_mixed_in(
-    extra: list[dict[str, Any]], second: str, joined: bool, random: Any
-) -> None:
-    good = [*carry(1, "hallway", "?a"), *carry(2, "living_room", second)]
-    if second == "?a" or joined:
-        good[4]["after"] = ["13"]
-    assert consider({"tasks": good}, flat=False) is not None
-    mixed = [*good, *extra]
-    random.shuffle(mixed)
-    made = consider({"tasks": mixed}, flat=False)
-    if made is not None:
-        assert sorted(task.skill for task in made.tasks) == sorted(
-            ["navigate", "pick", "navigate", "place"] * 2
-        ), "nothing that no goal needs"
+def test_a_good_plan_with_anything_mixed_in() -> None:
+    outcomes: Counter[str] = Counter()
+
+    @given(
+        st.one_of(st.lists(TASKS, max_size=3), st.lists(DETOURS, min_size=1, max_size=2)),
+        st.sampled_from(["?a", "?b"]),
+        st.booleans(),
+        st.randoms(use_true_random=False),
+    )
+    def law(extra: list[dict[str, Any]], second: str, joined: bool, random: Any) -> None:
+        good = [*carry(1, "hallway", "?a"), *carry(2, "living_room", second)]
+        if second == "?a" or joined:
+            good[4]["after"] = ["13"]
+        assert isinstance(consider({"tasks": good}, flat=False), Plan)
+        mixed = [*good, *extra]
+        random.shuffle(mixed)
+        made = consider({"tasks": mixed}, flat=False)
+        outcomes["thinned" if isinstance(made, Plan) and extra else type(made).__name__] += 1
+        if isinstance(made, Plan):
+            assert sorted(task.skill for task in made.tasks) == sorted(
+                ["navigate", "pick", "navigate", "place"] * 2
+            ), "nothing that no goal needs"
+
+    law()
+    assert outcomes["set"] and outcomes["thinned"], outcomes
 
 
 @given(st.recursive(st.text(), lambda inner: st.dictionaries(st.text(), inner)))

@@ -1,48 +1,20 @@
-"""Configuration and prompts of the language-model planner; the processes that ask."""
+"""Configuration of the language model, and its prompts."""
 
 from __future__ import annotations
 
-import queue
-import sys
-import threading
-from collections.abc import Iterator
 from pathlib import Path
 from string import Template
-from typing import Any
 
 import msgspec
 import pytest
 
 from fleet.errors import BadLlmConfig
-from fleet.llm.client import ModelClient
 from fleet.llm.configuration import LlmConfig, load_llm_config
 from fleet.llm.prompts import PROMPTS_DIR, load_prompts
 from fleet.planners.llm.answers import StepAnswer, TaskAnswer
 from keyexpr_schema.payloads.plans import Task
-from tests.llm_server import LlmServer, Reply
 
-ROOT = Path(__file__).parents[2]
-KEY = "sk-very-secret"
-
-
-@pytest.fixture(scope="module")
-def client() -> Iterator[ModelClient]:
-    """Its processes have a key in their environment, and are started once."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROBOTFLEET_TEST_KEY", KEY)
-        client = ModelClient()
-        client.warm()
-        yield client
-        client.close()
-
-
-def request(server: LlmServer, key_env: str | None = None) -> dict[str, Any]:
-    return {
-        "model": "openai/scripted",
-        "messages": [{"role": "user", "content": "hello"}],
-        "api_base": server.api_base,
-        "api_key_env": key_env,
-    }
+ROOT = Path(__file__).parents[3]
 
 
 def write(path: Path, text: str) -> Path:
@@ -106,7 +78,8 @@ def test_rules_replace_prompts_of_the_same_name(tmp_path: Path) -> None:
     config = load_llm_config(path)
     prompts = load_prompts(config)
     assert prompts.version.startswith("v1+rules-")
-    assert prompts.fill("system").endswith("Cups cost $5 each.")
+    for system in ("system", "interpret-system", "allocate-system"):
+        assert prompts.fill(system).endswith("Cups cost $5 each.")
     plain = load_prompts(LlmConfig())
     assert plain.version == "v1"
     assert "Cups" not in plain.fill("system")
@@ -161,44 +134,3 @@ def test_answers_have_the_types_of_tasks() -> None:
     for answer in (StepAnswer, TaskAnswer):
         for field in msgspec.structs.fields(answer):
             assert field.type == types[field.name]
-
-
-def test_calls_go_on_side_by_side_and_litellm_stays_outside(client: ModelClient) -> None:
-    kinds: queue.Queue[str] = queue.Queue()
-    with LlmServer(Reply(silent=True), Reply("hello")) as server:
-        threads = [
-            threading.Thread(target=lambda: kinds.put(client.call(request(server), 600).kind))
-            for _ in range(2)
-        ]
-        for thread in threads:
-            thread.start()
-        assert kinds.get(timeout=60) == "answer", "though the other one waits"
-        assert kinds.empty()
-    for thread in threads:
-        thread.join()
-    assert "litellm" not in sys.modules
-
-
-def test_keys_go_to_the_server_and_not_into_messages(client: ModelClient) -> None:
-    echo = f'{{"error": {{"message": "bad key {KEY}"}}}}'.encode()
-    with LlmServer(Reply(status=401, raw=echo)) as server:
-        answer = client.call(request(server, "ROBOTFLEET_TEST_KEY"), 30.0)
-        assert server.keys == [f"Bearer {KEY}"]
-    assert answer.kind == "key"
-    assert "bad key ***" in answer.error
-
-
-def test_close_ends_a_call_that_is_under_way(client: ModelClient) -> None:
-    """The last one here, since no call follows a close."""
-    kinds: list[str] = []
-    with LlmServer(Reply(silent=True)) as server:
-        thread = threading.Thread(
-            target=lambda: kinds.append(client.call(request(server), 600).kind)
-        )
-        thread.start()
-        assert server.asked.wait(60)
-        client.close()
-        thread.join(10)
-        assert kinds == ["failed"]
-        assert client.call(request(server), 600).kind == "closed"
-        assert len(server.requests) == 1

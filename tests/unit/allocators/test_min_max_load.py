@@ -73,7 +73,7 @@ def test_many_robots_that_are_alike_do_not_keep_the_solver_busy(
     monkeypatch.setattr(min_max_load, "TRAVEL_LIMIT_S", 600.0)
     problem = problem_of(team_of(20), *[1] * 202)
     travel_s = approach_s(problem)
-    balanced, near = assign_balanced(problem), assign_with_least_travel(problem)
+    balanced, near = assign_balanced(problem), assign_with_least_travel(problem, 600.0)
     assert isinstance(balanced, Assignment) and isinstance(near, Assignment)
     assert near.notes == ()
     assert max_load(balanced.allocation, problem.load) == 11

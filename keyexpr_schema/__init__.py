@@ -42,11 +42,11 @@ _NAMES = {
     "ids": "Id check_id slug",
     "key": "Address Component Delivery Key Payload",
     "keyspace": (
-        "GOAL_SPEC GOAL_STATUS FACT STATEMENT STATEMENT_STATUS PLACE OBJECT ROBOT_SPEC ROBOT_STATE "
-        "ROBOT_ALIVE ORDER REPORT DURATIONS PLAN_SPEC PLAN_PROPOSAL PLAN_STATUS TASK_RECORD "
-        "PLAN_REQUEST REPLAN_REQUEST CONTROL_REQUEST ANSWER PLANNER_STATUS PLANNER_ALIVE REJECT "
-        "STORE_JOURNAL SIM_MOTION SIM_SENSES SIM_CLOCK SIM_FRAMES SIM_SCENE SIM_TRUTH SIM_CONTACTS "
-        "KEYSPACE key_of"
+        "GOAL_SPEC GOAL_STATUS FACT STATEMENT STATEMENT_STATUS PLACE OBJECT ROBOT_SPEC "
+        "ROBOT_STATE ROBOT_ALIVE ORDER REPORT DURATIONS PLAN_SPEC PLAN_PROPOSAL PLAN_STATUS "
+        "TASK_RECORD PLAN_REQUEST REPLAN_REQUEST CONTROL_REQUEST ANSWER PLANNER_STATUS "
+        "PLANNER_ALIVE UNDECODABLE STORE_JOURNAL SIM_MOTION SIM_SENSES SIM_CLOCK SIM_FRAMES "
+        "SIM_SCENE SIM_TRUTH SIM_CONTACTS KEYSPACE key_of"
     ),
     "payloads.durations": "Durations DurationsAddress Estimate",
     "payloads.goals": "Condition ENDED_GOALS Goal GoalAddress GoalState GoalStatus",
@@ -59,8 +59,8 @@ _NAMES = {
         "Alive AliveAddress PoseMRad RobotActivity RobotAddress RobotSpec RobotState"
     ),
     "payloads.service": (
-        "JournalEntry PlannerAddress PlannerAliveAddress PlannerStatus Reject RejectAddress "
-        "StoreAddress StoreJournal StoreQuery"
+        "JournalEntry PlannerAddress PlannerAliveAddress PlannerStatus StoreAddress StoreJournal "
+        "StoreQuery UndecodableAddress UndecodableValue"
     ),
     "payloads.simulation": (
         "Body ContactCount Frame Frames MotionCall QuaternionWxyz Scene Shape ShapeKind SimAddress "

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cli.errors import CliError
-from cli.parsing import Command
-from cli.settings import Settings, load_settings, one_line
+from cli.parsing import Command, Group
+from cli.settings import Settings, load_settings
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -104,10 +104,22 @@ class Call:
 Body = Callable[..., Coroutine[Any, Any, None] | None]
 
 
+def group(about: str) -> typer.Typer:
+    """A command with subcommands; `about` is its help."""
+    return typer.Typer(
+        cls=Group, help=about, no_args_is_help=True, rich_markup_mode=None, add_completion=False
+    )
+
+
+def single(body: Body) -> typer.Typer:
+    """`body(call, …)` as a command without subcommands."""
+    app = typer.Typer(rich_markup_mode=None, add_completion=False)
+    command(app)(body)
+    return app
+
+
 def command(
-    app: typer.Typer,
-    name: str | None = None,
-    cls: type[Command] = Command,
+    app: typer.Typer, name: str | None = None, cls: type[Command] = Command
 ) -> Callable[[Body], Body]:
     """Register `body(call, …)`, plain or async, as a command of `app` with the global options."""
 
@@ -164,7 +176,7 @@ class one_sentence_errors:  # noqa: N801 - used like a function, as contextlib's
         if found is not None:
             # Some libraries print to a buffered stdout; keep what was said before the error first.
             sys.stdout.flush()
-            typer.echo(f"Error: {one_line(found)}", err=True)
+            typer.echo(f"Error: {' '.join(str(found).split())}", err=True)
             raise typer.Exit(1) from None
 
 

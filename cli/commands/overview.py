@@ -6,19 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli.command import Call, command
+from cli.command import Call, single
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from keyexpr_schema.transport.session import Change
 
-status_app = typer.Typer(rich_markup_mode=None, add_completion=False)
-watch_app = typer.Typer(rich_markup_mode=None, add_completion=False)
-journal_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 
-
-@command(status_app)
+@single
 async def status(call: Call) -> None:
     """The whole fleet on one page: router, planner, robots, goals, plans, unreadable values."""
     from cli.client.fleet_view import FLEET_KEYS, snapshot
@@ -55,7 +51,7 @@ async def status(call: Call) -> None:
     )
 
 
-@command(watch_app)
+@single
 async def watch(
     call: Call,
     plan: Annotated[
@@ -91,7 +87,7 @@ def _as_json(change: Change[Any, Any]) -> None:
     typer.echo(msgspec.json.encode(what).decode())
 
 
-@command(journal_app)
+@single
 async def journal(
     call: Call,
     after: Annotated[int, typer.Option("--after", min=0, help="Only entries after this.")] = 0,

@@ -12,7 +12,6 @@ from cli.command import Call
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from cli.plans.comparison import PlanSide
     from fleet.core.model.world import WorldModel
     from keyexpr_schema.payloads.plans import Plan
     from keyexpr_schema.transport.session import Session
@@ -209,21 +208,14 @@ async def diff(
     from cli.plans.comparison import compare
     from cli.plans.sources import finished_tasks, plan_in_file, plan_named
 
-    sides: list[PlanSide | None] = [plan_in_file(a), plan_in_file(b)]
+    before, now = plan_in_file(a), plan_in_file(b)
     finished: list[str] = []
-    if None in sides:
+    if before is None or now is None:
         async with call.session() as session:
-            for number, name in enumerate((a, b)):
-                if sides[number] is None:
-                    sides[number] = await plan_named(session, name)
-            first, second = sides
-            assert first is not None
-            assert second is not None
-            if first.plan.plan == second.plan.plan:
-                finished = await finished_tasks(session, first.plan.plan)
-    before, now = sides
-    assert before is not None
-    assert now is not None
+            before = before or await plan_named(session, a)
+            now = now or await plan_named(session, b)
+            if before.plan.plan == now.plan.plan:
+                finished = await finished_tasks(session, now.plan.plan)
     found = compare(before, now, finished)
 
     def draw() -> RenderableType:

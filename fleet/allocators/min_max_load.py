@@ -9,7 +9,7 @@ from enum import Enum
 from fleet.allocators.approach import approach_s
 from fleet.allocators.balancing_problem import balancing_problem, named
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
-from fleet.allocators.infeasibility import explained
+from fleet.allocators.infeasibility import explanation
 from fleet.allocators.load_balancing.balance import balance
 from fleet.allocators.load_balancing.problem import BalancedAssignment, NoAssignment
 from fleet.allocators.min_max_load_program import MinMaxLoadProgram, Status, max_load, solve
@@ -77,7 +77,7 @@ def assign_balanced(problem: AllocationProblem) -> Assignment | NotAllocated:
     small problems, and wherever the lower bound is met."""
     found = balance(balancing_problem(problem))
     if isinstance(found, NoAssignment):
-        return explained(problem, found)
+        return explanation(problem, found)
     robots = named(problem, found.robot)
     if found.optimal:
         return Assignment(robots)
@@ -106,10 +106,10 @@ def assign_with_least_travel(
             )
             return Assignment(named(problem, balanced.robot), notes=(note,))
     elif balanced.proven:
-        return explained(problem, balanced)
+        return explanation(problem, balanced)
     robots, proven = _least_max_load(problem, balanced, time_limit_s)
     if robots is None:
-        return explained(problem, NoAssignment(proven))
+        return explanation(problem, NoAssignment(proven))
     most = max_load(robots, problem.load)
     left_s = min(TRAVEL_LIMIT_S, end_s - time.monotonic())
     robots = _least_travel(problem, most, left_s) or robots

@@ -16,7 +16,7 @@ from fleet.llm.structured_output import read_answer
 from fleet.planners.base import PlanningProblem
 from fleet.planners.llm.action_elimination import without_redundant_tasks
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema
-from fleet.planners.llm.candidate import CandidatePlan, candidate_of, merged, plan_of
+from fleet.planners.llm.candidate import candidate_of, merged
 from fleet.planners.llm.verification import violations_of
 from keyexpr_schema.payloads.plans import Plan
 from tests.household import bring, home, manipulator
@@ -81,12 +81,12 @@ def consider(answer: dict[str, Any], flat: bool) -> Plan | set[str]:
     if isinstance(read, str):
         return {"malformed"}
     problem = PlanningProblem("p", GOALS, WORLD)
-    plan = plan_of(candidate_of(read, WORLD, GOALS), problem, GOALS)
+    plan = candidate_of(read, problem, GOALS, WORLD)
     if violations := violations_of(plan, WORLD):
         assert all(row.sentence for row in violations)
         return {row.code for row in violations}
     plan = without_redundant_tasks(plan, WORLD)
-    made = merged([CandidatePlan(plan.tasks, plan.pins)], problem, keep_order=not flat)
+    made = merged([plan], problem, keep_order=not flat)
     assert check_plan(made, WORLD).valid
     # What is stored must be readable again, whatever names the model made up.
     assert msgspec.json.decode(msgspec.json.encode(made), type=Plan) == made

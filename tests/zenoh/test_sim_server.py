@@ -233,8 +233,8 @@ async def test_without_a_simulation_the_body_is_unreachable(session_config: Make
 
 async def test_the_process_says_when_it_is_ready_and_ends_on_sigterm(router: Any) -> None:
     code = (
-        "from sim.server.process import run; "
-        f"run('two-cups', ({router.endpoint!r},), backend='kinematic', speed=None)"
+        "from sim.server.process import run_simulation; "
+        f"run_simulation('two-cups', ({router.endpoint!r},), backend='kinematic', speed=None)"
     )
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-c", code, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE

@@ -24,7 +24,7 @@ from sim.kinematic.backend import KinematicBackend, MotionModel
 from tests.conftest import RouterProcess
 from tests.worker_world import DEADLINE_S, Fleet, running_fleet
 from workers.context import SkillContext
-from workers.skill import skill
+from workers.skill_registry import skill
 
 MakeFleet = Callable[..., AbstractAsyncContextManager[Fleet]]
 

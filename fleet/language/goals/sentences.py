@@ -222,7 +222,7 @@ class Sentences(Clauses):
             if mention.type not in wanted:
                 raise NotUnderstood(
                     f"{self.cursor.quote(self.began)!r}: {relation} is said of "
-                    f"{'places' if relation == 'searched' else 'objects'} only"
+                    f"{'places' if relation == SEARCHED else 'objects'} only"
                 )
             self.draft.add(relation, mention, True)
         if relation != SEARCHED:
@@ -232,9 +232,7 @@ class Sentences(Clauses):
     def no_clause(self, start: int | None = None) -> NotUnderstood:
         """What comes next is nothing that a goal could say."""
         cursor = self.cursor
-        here = cursor.at
-        first = here if start is None else start
-        cursor.at = here
+        first = cursor.at if start is None else start
         special = cursor.refusal("")
         cursor.at = first
         if cursor.word() == "another" or cursor.word(1) == "other":

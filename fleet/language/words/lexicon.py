@@ -195,11 +195,7 @@ def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
         )
         for surface in place.surfaces:
             yield Entity(
-                surface.surface,
-                "surface",
-                place.place,
-                _names(surface.surface),
-                frozenset(),
+                surface.surface, "surface", place.place, _names(surface.surface), frozenset()
             )
 
 

@@ -5,7 +5,7 @@ After H. Nakhost and M. Müller, "Action Elimination and Plan Neighborhood Graph
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from msgspec.structs import replace
 
@@ -28,31 +28,22 @@ def without_redundant_tasks(plan: Plan, world: WorldModel) -> Plan:
     )
     if not check_plan(plan, unlocated).valid:
         unlocated = world
-    for removal in (_with_successors, _alone):
-        plan = _eliminated(plan, unlocated, removal)
+    for with_successors in (True, False):
+        plan = _eliminated(plan, unlocated, with_successors)
     return plan
 
 
-def _eliminated(
-    plan: Plan, world: WorldModel, removal: Callable[[TaskGraph, str], frozenset[str]]
-) -> Plan:
+def _eliminated(plan: Plan, world: WorldModel, with_successors: bool) -> Plan:
     graph = TaskGraph({task.task: task.after for task in plan.tasks})
     for task in graph.order:
         if all(task != row.task for row in plan.tasks):
             continue
-        reduced = _without(plan, removal(graph, task))
+        after = [t for t in graph.order if graph.precedes(task, t)] if with_successors else []
+        reduced = _without(plan, frozenset({task, *after}))
         if check_plan(reduced, world).valid:
             plan = reduced
             graph = TaskGraph({row.task: row.after for row in plan.tasks})
     return plan
-
-
-def _with_successors(graph: TaskGraph, task: str) -> frozenset[str]:
-    return frozenset({task, *(other for other in graph.order if graph.precedes(task, other))})
-
-
-def _alone(graph: TaskGraph, task: str) -> frozenset[str]:
-    return frozenset({task})
 
 
 def _without(plan: Plan, removed: frozenset[str]) -> Plan:

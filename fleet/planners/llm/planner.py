@@ -15,14 +15,7 @@ from fleet.llm.structured_output import read_answer
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.llm.action_elimination import without_redundant_tasks
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema
-from fleet.planners.llm.candidate import (
-    CandidatePlan,
-    candidate_of,
-    conditions_of,
-    merged,
-    plan_of,
-    world_after,
-)
+from fleet.planners.llm.candidate import candidate_of, conditions_of, merged, world_after
 from fleet.planners.llm.prompt_text import problem_text, skills_text, team_skills
 from fleet.planners.llm.verification import violations_of
 from keyexpr_schema.facts import AT
@@ -74,7 +67,7 @@ class LlmPlanner(Planner):
             return merged((), problem, keep_order=True)
         if sought := _not_located(goals, problem.world):
             return GivenUp(f"nobody knows where {sought} is, and only {self._fallback.name} looks")
-        candidates: list[CandidatePlan] = []
+        candidates: list[Plan] = []
         world = problem.world
         # Together, goals that hold already are listed, too: they must still hold at the end.
         groups = [(goal,) for goal in goals] if problem.strategy == PER_GOAL else [problem.goals]
@@ -94,25 +87,24 @@ class LlmPlanner(Planner):
 
     def _candidate(
         self, problem: PlanningProblem, goals: Sequence[Goal], world: WorldModel, budget: Budget
-    ) -> CandidatePlan | GivenUp:
+    ) -> Plan | GivenUp:
         """A verified candidate for some goals in `world`, without redundant tasks."""
         flat = problem.strategy == MONOLITHIC
         form: type[GraphAnswer] | type[ListAnswer] = ListAnswer if flat else GraphAnswer
         max_tasks = self._model.config.max_tasks
         keep = [c for c in conditions_of(problem.goals) if world.holds(c)]
 
-        def read(text: str) -> CandidatePlan | Rejected:
+        def read(text: str) -> Plan | Rejected:
             answer = read_answer(text, form)
             if isinstance(answer, str):
                 return Rejected.because("malformed", answer)
             if len(answer.tasks) > max_tasks:
                 sentence = f"the plan has {len(answer.tasks)} tasks; {max_tasks} are allowed"
                 return Rejected.because("too-many-tasks", sentence)
-            plan = plan_of(candidate_of(answer, world, goals), problem, goals, keep)
+            plan = candidate_of(answer, problem, goals, world, keep)
             if violations := violations_of(plan, world):
                 return Rejected(violations)
-            plan = without_redundant_tasks(plan, world)
-            return CandidatePlan(plan.tasks, plan.pins)
+            return without_redundant_tasks(plan, world)
 
         return self._model.ask(
             system="system",

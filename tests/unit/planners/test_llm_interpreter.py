@@ -123,5 +123,4 @@ def test_the_sentence_stays_inside_its_fence(model_client: ModelClient) -> None:
 
 def test_without_a_model_nothing_is_asked() -> None:
     interpreter = LlmInterpreter(LanguageModel(LlmConfig()), SKILLS)
-    assert not interpreter.configured
     assert "no language model is configured" in str(interpreter.interpret("tidy up", WORDS))

@@ -122,11 +122,12 @@ def test_candidates_wait_for_what_they_need_of_each_other() -> None:
     on = [{**row, "goal": "g2"} for row in carry(1, "living_room", "?a")]
     for row in on[:2]:
         row["args"] = {k: v.replace("kitchen", "hallway") for k, v in row["args"].items()}
+    problem = PlanningProblem("p", (first, second), world)
     candidates = [
-        candidate_of(msgspec.convert(graph(*rows), GraphAnswer), world, [goal])
+        candidate_of(msgspec.convert(graph(*rows), GraphAnswer), problem, [goal], world)
         for rows, goal in ((carry(1, "hallway", "?a"), first), (on, second))
     ]
-    plan = merged(candidates, PlanningProblem("p", (first, second), world), keep_order=True)
+    plan = merged(candidates, problem, keep_order=True)
     assert [t.task for t in plan.tasks if not t.after] == ["t1", "t5"]
     assert set(plan.tasks[5].after) == {"t4", "t5"}, "picked up again once it was put down"
 

@@ -10,7 +10,7 @@ import pytest
 
 from fleet.timeline.drawing.sink import open_stream
 from fleet.timeline.errors import UnreadableRecording, UnwritableRecording
-from fleet.timeline.read import rows, summary
+from fleet.timeline.reader import rows, summary
 from fleet.timeline.recorder import Recorder
 from keyexpr_schema import keyspace as keys
 from keyexpr_schema.payloads.plans import PlanAddress

@@ -6,14 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice, pairwise
 
-from fleet.core.checker.plan_checker import CheckedPlan, check_plan
-from fleet.core.model.world import WorldModel
-from fleet.core.schedule.actor_constraints import actors_of
+from fleet.core.checker.checked_plan import CheckedPlan, check_allocation
 from fleet.jobshop.budget import Budget, StepClock
 from fleet.jobshop.forward_pass import schedule_of
 from fleet.jobshop.sequencing import sequences
 from fleet.scheduling.plan_shop import AllocationContext, PlanShop, plan_shop
-from keyexpr_schema.payloads.plans import Plan, Violation
+from keyexpr_schema.payloads.plans import Violation
 
 MAX_SEQUENCES_CHECKED = 24
 """Sequences put to the checker before an allocation is given up, the shortest first."""
@@ -49,21 +47,16 @@ class AllocatedPlan:
 
     def __init__(
         self,
-        plan: Plan,
         checked: CheckedPlan,
         allocation: Mapping[str, str],
-        world: WorldModel,
         context: AllocationContext | None = None,
     ) -> None:
-        self.plan, self.checked, self.world = plan, checked, world
-        self.allocation, self.context = allocation, context
+        self.checked, self.allocation, self.context = checked, allocation, context
         self._simple = self._shop(actors_only=True)
 
     def _shop(self, actors_only: bool) -> PlanShop:
-        robot = {actor: (self.allocation[actor],) for actor in actors_of(self.plan)}
-        return plan_shop(
-            self.plan, self.checked, self.world, robot, frozenset(), self.context, actors_only
-        )
+        robot = {actor: (self.allocation[actor],) for actor in self.checked.plan.actors}
+        return plan_shop(self.checked, robot, frozenset(), self.context, actors_only)
 
     def schedule(self, sequence: Sequence[str]) -> PlanSchedule | None:
         """The earliest one if robots take actors in this order; `None` on deadlock."""
@@ -119,5 +112,5 @@ class AllocatedPlan:
 
     def violations(self, schedule: PlanSchedule) -> tuple[Violation, ...]:
         """What the checker says with robots for actors, in this order."""
-        extra_after = schedule.extra_after
-        return check_plan(self.plan, self.world, self.allocation, extra_after).violations
+        plan, world = self.checked.plan, self.checked.world
+        return check_allocation(plan, world, self.allocation, schedule.extra_after)

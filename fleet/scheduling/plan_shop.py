@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 
-from fleet.core.checker.plan_checker import CheckedPlan
+from fleet.core.checker.checked_plan import CheckedPlan
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
@@ -53,9 +53,7 @@ class PlanShop:
 
 
 def plan_shop(
-    plan: Plan,
     checked: CheckedPlan,
-    world: WorldModel,
     able: Mapping[str, Sequence[str]],
     apart: frozenset[tuple[str, str]] = frozenset(),
     context: AllocationContext | None = None,
@@ -71,13 +69,12 @@ def plan_shop(
         BadShop: some actor has no robot that can be it.
     """
     context = context or AllocationContext()
-    graph = checked.graph
-    assert graph is not None, "a valid plan has a graph"
+    world, graph = checked.world, checked.graph
     robots = tuple(world.team)
     block_of = {actor_arg(actor): i for i, actor in enumerate(able)}
     number = {task: i for i, task in enumerate(graph.order)}
     numbers = _Numbers(world, robots)
-    weights, dues_s = _weights_and_dues(plan, graph, context)
+    weights, dues_s = _weights_and_dues(checked.plan, graph, context)
     operations: list[Operation] = []
     members: list[list[int]] = [[] for _ in able]
     for i, task in enumerate(graph.order):

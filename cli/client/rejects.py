@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload
 from keyexpr_schema.keyspace import key_of
-from keyexpr_schema.payloads.service import Reject
+from keyexpr_schema.payloads.service import UndecodableValue
 
 if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Session
@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 ASK_S = 3.0
 
 
-async def current_rejects(session: Session, rejects: Iterable[Reject]) -> list[Reject]:
+async def current_rejects(
+    session: Session, rejects: Iterable[UndecodableValue]
+) -> list[UndecodableValue]:
     """Those whose key still has a value that does not decode.
 
     A reject stays on its key when the bad value is replaced or deleted. What is not stored, and

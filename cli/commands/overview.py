@@ -24,10 +24,10 @@ async def status(call: Call) -> None:
     from cli.views.goals import goal_rows
     from cli.views.robots import robot_rows
     from cli.views.status import status_page
-    from keyexpr_schema.keyspace import REJECT
+    from keyexpr_schema.keyspace import UNDECODABLE
 
     async with call.session() as session:
-        view = await snapshot(session, *FLEET_KEYS, REJECT)
+        view = await snapshot(session, *FLEET_KEYS, UNDECODABLE)
         planner = await planner_status(session)
         planning = await planner_alive(session)
         connected = await robots_alive(session)

@@ -139,7 +139,7 @@ def _scheduled(problem: AllocationProblem, chosen: Assignment) -> Allocated | No
     plan = AllocatedPlan(problem.checked, allocation, problem.context)
     found = plan.schedule(chosen.sequence) if chosen.sequence is not None else None
     if found is None or plan.violations(found):
-        other = plan.valid_schedule(search=True)
+        other = plan.valid_schedule(thorough=True)
         if isinstance(other, tuple):
             return NotAllocated(other)
         found = other

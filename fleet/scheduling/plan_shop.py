@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 
 from fleet.core.checker.checked_plan import CheckedPlan
@@ -20,6 +20,7 @@ MOST_PRIORITY = 8
 """Priorities beyond this count as this: weights double with each step."""
 ANYWHERE = 0
 """The site that stands for wherever a robot may be."""
+ANY = Position.ANYWHERE
 
 
 @dataclass(frozen=True)
@@ -51,19 +52,29 @@ class PlanShop:
     robots: tuple[str, ...]
     tasks: tuple[str, ...]
 
+    def actors_only(self) -> PlanShop:
+        """The same, but robots that the plan names take part in any number of tasks at once, and
+        any actor may come first or last."""
+        count, shop = len(self.actors), self.shop
+        if len(shop.blocks) == count and all(b.position == ANY for b in shop.blocks):
+            return self
+        blocks = tuple(replace(block, position=ANY) for block in shop.blocks[:count])
+        operations = tuple(
+            replace(operation, blocks=tuple(b for b in operation.blocks if b < count))
+            for operation in shop.operations
+        )
+        return replace(self, shop=replace(shop, blocks=blocks, operations=operations))
+
 
 def plan_shop(
     checked: CheckedPlan,
     able: Mapping[str, Sequence[str]],
     apart: frozenset[tuple[str, str]] = frozenset(),
     context: AllocationContext | None = None,
-    actors_only: bool = False,
 ) -> PlanShop:
     """The plan in numbers. Durations are the skill models', at each kind of robot's speed.
 
     `able` has the robots that each actor may be, `apart` the pairs that must be different ones.
-    With `actors_only` robots that the plan names itself take part in everything at once, and any
-    actor may come first or last.
 
     Raises:
         BadShop: some actor has no robot that can be it.
@@ -82,8 +93,6 @@ def plan_shop(
         blocks: dict[int, None] = {}
         for participant in action.participants:
             if participant not in block_of:
-                if actors_only:
-                    continue
                 block_of[participant] = len(members)
                 members.append([])
             blocks[block_of[participant]] = None
@@ -103,7 +112,7 @@ def plan_shop(
         )
     machine = {robot: i for i, robot in enumerate(robots)}
     able_of = {actor_arg(actor): rows for actor, rows in able.items()}
-    positions = {} if actors_only else _positions(checked, able, context)
+    positions = _positions(checked, able, context)
     kept_apart: dict[str, set[int]] = {}
     for pair in apart:
         one, other = map(actor_arg, pair)
@@ -114,7 +123,7 @@ def plan_shop(
         Block(
             operations=tuple(members[block]),
             machines=tuple(machine[robot] for robot in able_of.get(name, (name,))),
-            position=positions.get(name, Position.ANYWHERE),
+            position=positions.get(name, ANY),
             apart=frozenset(kept_apart.get(name, ())),
         )
         for name, block in block_of.items()

@@ -20,7 +20,7 @@ from typing import Any
 
 from rich.console import Console
 
-from benchmarks.allocation import bench_household, bench_makespan, report
+from benchmarks.allocation import bench_balanced, bench_household, bench_makespan, report
 from benchmarks.planning.report import machine
 from fleet.allocators.makespan import DEADLINE_S
 
@@ -101,7 +101,7 @@ def _runs(given: argparse.Namespace, console: Console) -> dict[str, Callable[[],
 def _balanced() -> list[dict[str, Any]]:
     """Rows of bench_balanced at its largest size, each in a process of its own."""
     found = []
-    for kind in ("alike", "types", "different", "random", "sparse", "skewed", "weighted", "apart"):
+    for kind in bench_balanced.KINDS:
         command = [sys.executable, "-m", "benchmarks.allocation.bench_balanced", "--one"]
         ran = subprocess.run(
             [*command, kind, "10000", "1000"], capture_output=True, text=True, check=True

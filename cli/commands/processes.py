@@ -18,6 +18,12 @@ SIM = "sim"
 """The embodiment that is not a plug-in."""
 BACKENDS = ("mujoco", "kinematic")
 
+MissionArgument = Annotated[
+    str, typer.Argument(metavar="MISSION", help="A mission's file, or name as two-cups.")
+]
+BackendOption = Annotated[
+    str, typer.Option("--backend", help="mujoco (physics) or kinematic (fast, no physics).")
+]
 DataOption = Annotated[
     Path | None,
     typer.Option(
@@ -146,12 +152,8 @@ def worker(
 @single
 def sim(
     call: Call,
-    mission: Annotated[
-        str, typer.Argument(metavar="MISSION", help="A mission's file, or name as two-cups.")
-    ],
-    backend: Annotated[
-        str, typer.Option("--backend", help="mujoco (physics) or kinematic (fast, no physics).")
-    ] = "mujoco",
+    mission: MissionArgument,
+    backend: BackendOption = "mujoco",
     speed: Annotated[
         str, typer.Option("--speed", help="Simulated seconds a second, or max.")
     ] = "1",

@@ -6,7 +6,7 @@ from typing import Any
 
 from fleet.allocators.base import Allocated
 from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import CheckedPlan
 from fleet.core.model.world import WorldModel
 from fleet.llm.client import ModelClient
 from fleet.llm.configuration import LlmConfig
@@ -16,7 +16,7 @@ from fleet.planners.llm.planner import LlmPlanner
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan
-from tests.household import bring, home
+from tests.household import bring, checked, home
 from tests.llm_server import LlmServer
 
 GOALS = (bring(1, "hallway"), bring(2, "living_room"))
@@ -76,10 +76,11 @@ def solve(
     planner = LlmPlanner(LanguageModel(config(server, **fields), client), SymbolicPlanner())
     problem = PlanningProblem("p", goals, world, strategy=strategy, first_task=first_task)
     made = planner.plan(problem)
-    assert isinstance(made, Plan), made
-    assert check_plan(made, world).valid
-    assert isinstance(MinMaxLoadAllocator(TieBreak.TRAVEL).allocate(made, world), Allocated)
-    return made
+    assert isinstance(made, CheckedPlan), made
+    assert isinstance(
+        MinMaxLoadAllocator(TieBreak.TRAVEL).allocate(checked(made.plan, world)), Allocated
+    )
+    return made.plan
 
 
 def fell_back(plan: Plan, words: str) -> None:

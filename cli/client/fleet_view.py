@@ -19,7 +19,6 @@ from keyexpr_schema.keyspace import (
     GOAL_STATUS,
     PLAN_SPEC,
     PLAN_STATUS,
-    REJECT,
     ROBOT_SPEC,
     ROBOT_STATE,
     SIM_CLOCK,
@@ -28,12 +27,13 @@ from keyexpr_schema.keyspace import (
     SIM_SENSES,
     SIM_TRUTH,
     TASK_RECORD,
+    UNDECODABLE,
 )
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalStatus
 from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.plans import Plan, PlanStatus
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
-from keyexpr_schema.payloads.service import Reject
+from keyexpr_schema.payloads.service import UndecodableValue
 from keyexpr_schema.payloads.simulation import ContactCount, Scene, SimClock, Truth
 from keyexpr_schema.payloads.tasks import TaskRecord
 from keyexpr_schema.payloads.world import Fact
@@ -66,7 +66,7 @@ _TABLES = {
     ROBOT_SPEC.name: "robot_specs",
     ROBOT_STATE.name: "robot_states",
     FACT.name: "facts",
-    REJECT.name: "rejects",
+    UNDECODABLE.name: "rejects",
     SIM_TRUTH.name: "truths",
     SIM_SENSES.name: "senses",
 }
@@ -90,7 +90,7 @@ class FleetView:
     robot_specs: dict[str, RobotSpec] = field(default_factory=dict)
     robot_states: dict[str, RobotState] = field(default_factory=dict)
     facts: dict[FactKey, Fact] = field(default_factory=dict)
-    rejects: dict[tuple[str, str], Reject] = field(default_factory=dict)
+    rejects: dict[tuple[str, str], UndecodableValue] = field(default_factory=dict)
     truths: dict[str, Truth] = field(default_factory=dict)
     senses: dict[str, Senses] = field(default_factory=dict)
     clock: SimClock | None = None

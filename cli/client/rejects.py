@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload
 from keyexpr_schema.keyspace import key_of
-from keyexpr_schema.payloads.service import Reject
+from keyexpr_schema.payloads.service import UndecodableValue
 
 if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Session
@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 ASK_S = 3.0
 
 
-async def current_rejects(session: Session, rejects: Iterable[Reject]) -> list[Reject]:
+async def current_rejects(
+    session: Session, rejects: Iterable[UndecodableValue]
+) -> list[UndecodableValue]:
     """Those whose key still has a value that does not decode.
 
     A reject stays on its key when the bad value is replaced or deleted. What is not stored, and
@@ -31,9 +33,8 @@ async def current_rejects(session: Session, rejects: Iterable[Reject]) -> list[R
         if not key.stored:
             left.append(reject)
             continue
-        for wire in await session.listing(reject.keyexpr, ASK_S):
-            try:
-                session.decode(key, wire)
-            except UndecodablePayload:
-                left.append(reject)
+        try:
+            await session.get(key, key.parse(reject.keyexpr), ASK_S)
+        except UndecodablePayload:
+            left.append(reject)
     return left

@@ -24,10 +24,10 @@ async def status(call: Call) -> None:
     from cli.views.goals import goal_rows
     from cli.views.robots import robot_rows
     from cli.views.status import status_page
-    from keyexpr_schema.keyspace import REJECT
+    from keyexpr_schema.keyspace import UNDECODABLE
 
     async with call.session() as session:
-        view = await snapshot(session, *FLEET_KEYS, REJECT)
+        view = await snapshot(session, *FLEET_KEYS, UNDECODABLE)
         planner = await planner_status(session)
         planning = await planner_alive(session)
         connected = await robots_alive(session)
@@ -99,7 +99,7 @@ async def journal(
 
     async with call.session() as session:
         # What a query key replies is not in its type; the key table says it is a StoreJournal.
-        page: StoreJournal = await session.ask(
+        page: StoreJournal = await session.query(
             STORE_JOURNAL, StoreAddress(), StoreQuery(after=after, limit=limit)
         )
 

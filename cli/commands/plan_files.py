@@ -59,7 +59,7 @@ async def check(
     """
     from cli.plans.files import read_plan
     from cli.plans.worlds import world_of_files, world_of_fleet
-    from fleet.core.checker.plan_checker import check_plan
+    from fleet.core.checker.checked_plan import check_plan
     from fleet.service.composition import load_all_skills
 
     _only_with_world(world, connected, robots, facts)
@@ -76,12 +76,12 @@ async def check(
     def draw() -> RenderableType:
         from cli.views.plans import violations_table
 
-        if checked.valid:
+        if not checked.violations:
             return f"plan {plan.plan} is valid: {_size(plan, model)}"
         return violations_table(checked.violations)
 
     call.show(checked.violations, draw)
-    if not checked.valid:
+    if checked.violations:
         count = len(checked.violations)
         call.warn(
             f"Error: {file}: {count} {'thing speaks' if count == 1 else 'things speak'} "

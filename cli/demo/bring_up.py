@@ -13,7 +13,7 @@ from cli.client.planner import check_skills
 from cli.client.world import put_world
 from cli.demo.child_processes import ChildProcesses
 from cli.errors import TooLate
-from keyexpr_schema.errors import NoAnswer, Unreachable
+from keyexpr_schema.errors import NoReply, Unreachable
 from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import PLANNER_ALIVE, ROBOT_ALIVE, ROBOT_SPEC, STORE_JOURNAL
@@ -69,9 +69,9 @@ async def router_up(processes: ChildProcesses) -> None:
         async with asyncio.timeout(READY_S), open_session(config) as session:
             while True:
                 try:
-                    await session.ask(STORE_JOURNAL, StoreAddress(), StoreQuery(limit=1), 1.0)
+                    await session.query(STORE_JOURNAL, StoreAddress(), StoreQuery(limit=1), 1.0)
                     return
-                except NoAnswer:
+                except NoReply:
                     await session.wait_connected()
     except (TimeoutError, Unreachable):
         raise TooLate(

@@ -13,7 +13,7 @@ from cli.views.console import table
 from cli.views.goals import GoalRow, goals_table
 from cli.views.plans import plans_table
 from cli.views.robots import RobotRow, robots_table
-from keyexpr_schema.payloads.service import PlannerStatus, Reject, StoreJournal
+from keyexpr_schema.payloads.service import PlannerStatus, StoreJournal, UndecodableValue
 
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
@@ -30,7 +30,7 @@ def status_page(
     robots: Sequence[RobotRow],
     goals: Sequence[GoalRow],
     view: FleetView,
-    rejects: Sequence[Reject],
+    rejects: Sequence[UndecodableValue],
 ) -> Group:
     """One page; a part with nothing in it is one short line."""
     plans = set(view.plans) | set(view.plan_status)
@@ -63,7 +63,7 @@ def _planner(planner: PlannerStatus | None, planning: bool) -> str:
     return "\n".join([f"running, epoch {planner.epoch}", *lines])
 
 
-def rejects_table(rejects: Sequence[Reject]) -> Table:
+def rejects_table(rejects: Sequence[UndecodableValue]) -> Table:
     """One line a value that somebody could not read."""
     return table(
         ["key", "told by", "times", "reason"],

@@ -1,4 +1,4 @@
-"""The allocator interface: actors in, robots out, checked on both sides."""
+"""The allocator interface: actors in, robots out, with their check."""
 
 from __future__ import annotations
 
@@ -8,14 +8,9 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from fleet.core.checker.plan_checker import CheckedPlan, check_plan
+from fleet.core.checker.checked_plan import CheckedPlan, check_plan
 from fleet.core.model.world import WorldModel
-from fleet.core.schedule.actor_constraints import (
-    able_robots,
-    actors_apart,
-    task_counts,
-    tasks_nobody_can_do,
-)
+from fleet.core.schedule.actor_constraints import actors_apart, task_counts
 from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
 from fleet.scheduling.plan_shop import AllocationContext
 from keyexpr_schema.payloads.plans import Plan, Violation
@@ -72,54 +67,58 @@ class AllocationProblem:
     pairs of actors that must be different robots.
     """
 
-    plan: Plan
-    world: WorldModel
     checked: CheckedPlan
     able: Mapping[str, tuple[str, ...]]
     load: Mapping[str, int]
     apart: frozenset[tuple[str, str]]
     context: AllocationContext = field(default_factory=AllocationContext)
 
+    @property
+    def plan(self) -> Plan:
+        """The plan to be allocated."""
+        return self.checked.plan
+
+    @property
+    def world(self) -> WorldModel:
+        """The world that the plan is valid in."""
+        return self.checked.world
+
 
 class Allocator(ABC):
-    """Binds actors to robots. Subclasses choose; this class checks what goes in and comes out."""
+    """Binds actors to robots. Subclasses choose; this class checks what comes out."""
 
     name: str
     reschedules = False
     """Whether it heeds the context's `home` itself; for others, whoever can stays where he is."""
 
     def allocate(
-        self, plan: Plan, world: WorldModel, context: AllocationContext | None = None
+        self, checked: CheckedPlan, context: AllocationContext | None = None
     ) -> Allocated | NotAllocated:
-        """A checked allocation of `plan` to the available robots of `world`, or why there is none.
+        """A checked allocation of a plan to the connected robots of its world, or why none.
 
         Tasks of one actor go to one robot, in order; a robot does its actors one after the other.
         """
         context = context or AllocationContext()
         if context.home and not self.reschedules:
+            plan, world = checked.plan, checked.world
             stay = {a: robot for a, robot in context.home.items() if robot in world.team}
-            actors = task_counts(plan)
-            pins = {a: robot for a, robot in {**stay, **plan.pins}.items() if a in actors}
+            pins = {a: robot for a, robot in {**stay, **plan.pins}.items() if a in plan.actors}
             if pins != plan.pins:
-                found = self._allocate(msgspec.structs.replace(plan, pins=pins), world, context)
-                if isinstance(found, Allocated):
-                    return found
-        return self._allocate(plan, world, context)
+                pinned = check_plan(msgspec.structs.replace(plan, pins=pins), world)
+                if isinstance(pinned, CheckedPlan):
+                    found = self._allocate(pinned, context)
+                    if isinstance(found, Allocated):
+                        return found
+        return self._allocate(checked, context)
 
     def _allocate(
-        self, plan: Plan, world: WorldModel, context: AllocationContext
+        self, checked: CheckedPlan, context: AllocationContext
     ) -> Allocated | NotAllocated:
-        checked = check_plan(plan, world)
-        if not checked.valid:
-            lacking = tasks_nobody_can_do(plan, checked, world) if checked.actions else ()
-            return NotAllocated((*lacking, *checked.violations))
         problem = AllocationProblem(
-            plan=plan,
-            world=world,
             checked=checked,
-            able=able_robots(plan, checked),
-            load=task_counts(plan),
-            apart=actors_apart(plan, checked),
+            able=checked.able,
+            load=task_counts(checked.plan),
+            apart=actors_apart(checked),
             context=context,
         )
         chosen = self._assign(problem)
@@ -137,10 +136,10 @@ class Allocator(ABC):
 def _scheduled(problem: AllocationProblem, chosen: Assignment) -> Allocated | NotAllocated:
     """In the order that was chosen with the robots, if that will do, or else in another one."""
     allocation = chosen.allocation
-    plan = AllocatedPlan(problem.plan, problem.checked, allocation, problem.world, problem.context)
+    plan = AllocatedPlan(problem.checked, allocation, problem.context)
     found = plan.schedule(chosen.sequence) if chosen.sequence is not None else None
     if found is None or plan.violations(found):
-        other = plan.valid_schedule(search=True)
+        other = plan.valid_schedule(thorough=True)
         if isinstance(other, tuple):
             return NotAllocated(other)
         found = other

@@ -75,8 +75,7 @@ class LlmAllocator(Allocator):
 
 def problem_text(problem: AllocationProblem) -> str:
     """Robots, actors with their tasks and able robots, and who must be apart, fenced."""
-    graph = problem.checked.graph
-    rank = {task: i for i, task in enumerate(graph.order if graph else ())}
+    rank = {task: i for i, task in enumerate(problem.checked.graph.order)}
     tasks = sorted(problem.plan.tasks, key=lambda task: rank[task.task])
     world = problem.world
     return fenced(
@@ -122,7 +121,7 @@ def read_allocation(text: str, problem: AllocationProblem) -> dict[str, str] | R
     allocation = {row.actor: row.robot for row in answer.robots}
     if sentences := _wrong(answer, allocation, problem):
         return Rejected(tuple(Violation(code="no-robot", sentence=text) for text in sentences))
-    allocated = AllocatedPlan(problem.plan, problem.checked, allocation, problem.world)
+    allocated = AllocatedPlan(problem.checked, allocation)
     schedule = next(allocated.schedules(), None)
     if schedule is None:
         return Rejected.because(

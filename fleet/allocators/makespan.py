@@ -55,14 +55,7 @@ class MakespanAllocator(Allocator):
         self._clock = clock
 
     def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
-        made = plan_shop(
-            problem.plan,
-            problem.checked,
-            problem.world,
-            problem.able,
-            problem.apart,
-            problem.context,
-        )
+        made = plan_shop(problem.checked, problem.able, problem.apart, problem.context)
         if problem.context.home:
             budget = Budget(RESCHEDULE_SHARE * self._deadline_s, self._clock)
             rescheduled = _rescheduled(made, problem.context, budget, self._seed)

@@ -75,6 +75,8 @@ class _Search:
         self.makespan = begin.makespan_s
         self.cost = begin.cost + self._moves_price()
         self.best, self.best_cost = begin, self.cost
+        self.settled = all(len(block.machines) == 1 for block in instance.shop.blocks)
+        """Whether only the order is left to choose."""
         self.index_of = [0] * len(self.order)
         self.critical: list[int] = []
         self._index(0, len(self.order))
@@ -101,7 +103,7 @@ class _Search:
                 temperature = scale * HOT * (COLD / HOT) ** spent
             tries += 1
             limit = self.cost - temperature * log(1.0 - random.random())
-            pick = random.random()
+            pick = 1.0 if self.settled else random.random()
             if pick < REASSIGN:
                 self._reassign(limit)
             elif pick < SWAP:

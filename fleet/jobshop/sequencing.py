@@ -6,16 +6,17 @@ from collections.abc import Iterator
 from itertools import permutations
 
 from fleet.jobshop.annealing import anneal
-from fleet.jobshop.bounds import lower_bound
 from fleet.jobshop.branch_and_bound import branch_and_bound
 from fleet.jobshop.budget import Budget
 from fleet.jobshop.forward_pass import Solution, evaluate
 from fleet.jobshop.instance import Instance
-from fleet.jobshop.list_scheduling import ALPHAS, list_schedule
+from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.problem import Shop
 
 FEW = 5
 """Components of which every order is given (120), behind those that were searched for."""
+ALPHAS = (0.1, 1.0)
+"""Dispatching rules that a search begins from."""
 MOST_NODES = 1000
 """Placements looked at for the best order of a small shop."""
 
@@ -23,19 +24,19 @@ MOST_NODES = 1000
 def sequences(shop: Shop, budget: Budget) -> Iterator[list[int]]:
     """Orders of all blocks, the best first, each different on some machine.
 
-    Every block has one machine. They are those of list scheduling and dispatching rules, the best
-    there is in a small shop, and in a larger one what annealing finds within the `budget`.
+    Every block has one machine. They are those of dispatching rules, and the best there is in a
+    small shop, or in a larger one what annealing finds within the `budget`.
     """
     instance = Instance(shop)
-    found = [list_schedule(instance, alpha) for alpha in (None, *ALPHAS)]
+    found = [list_schedule(instance, alpha) for alpha in ALPHAS]
     solutions = [solution for solution in found if solution is not None]
     if solutions:
         best = min(solutions, key=_cost)
         optimum = branch_and_bound(instance, best, MOST_NODES)
         if optimum is not None:
             solutions.append(optimum.solution)
-        elif not budget.over:
-            solutions.append(anneal(instance, best, budget, lower_bound(instance)))
+        else:
+            solutions.append(anneal(instance, best, budget))
     given: set[tuple[tuple[int, ...], ...]] = set()
     for solution in sorted(solutions, key=_cost):
         yield from _new(instance, solution.order, given)

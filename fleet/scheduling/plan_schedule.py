@@ -6,19 +6,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice, pairwise
 
-from fleet.core.checker.plan_checker import CheckedPlan, check_plan
-from fleet.core.model.world import WorldModel
-from fleet.core.schedule.actor_constraints import actors_of
+from fleet.core.checker.checked_plan import CheckedPlan, check_allocation
 from fleet.jobshop.budget import Budget, StepClock
 from fleet.jobshop.forward_pass import schedule_of
 from fleet.jobshop.sequencing import sequences
-from fleet.scheduling.plan_shop import AllocationContext, PlanShop, plan_shop
-from keyexpr_schema.payloads.plans import Plan, Violation
+from fleet.scheduling.plan_shop import AllocationContext, plan_shop
+from keyexpr_schema.payloads.plans import Violation
 
 MAX_SEQUENCES_CHECKED = 24
 """Sequences put to the checker before an allocation is given up, the shortest first."""
-SEARCH_S = 0.25
-"""Of a `StepClock`: a thousand moves, whatever the machine."""
+QUICK_S, THOROUGH_S = 2.0**-5, 2.0**-2
+"""Of a `StepClock`: a hundred moves to compare plans, a thousand to carry one out."""
 
 
 @dataclass(frozen=True)
@@ -49,21 +47,14 @@ class AllocatedPlan:
 
     def __init__(
         self,
-        plan: Plan,
         checked: CheckedPlan,
         allocation: Mapping[str, str],
-        world: WorldModel,
         context: AllocationContext | None = None,
     ) -> None:
-        self.plan, self.checked, self.world = plan, checked, world
-        self.allocation, self.context = allocation, context
-        self._simple = self._shop(actors_only=True)
-
-    def _shop(self, actors_only: bool) -> PlanShop:
-        robot = {actor: (self.allocation[actor],) for actor in actors_of(self.plan)}
-        return plan_shop(
-            self.plan, self.checked, self.world, robot, frozenset(), self.context, actors_only
-        )
+        self.checked, self.allocation = checked, allocation
+        robot = {actor: (allocation[actor],) for actor in checked.plan.actors}
+        self._shop = plan_shop(checked, robot, context=context)
+        self._simple = self._shop.actors_only()
 
     def schedule(self, sequence: Sequence[str]) -> PlanSchedule | None:
         """The earliest one if robots take actors in this order; `None` on deadlock."""
@@ -90,27 +81,25 @@ class AllocatedPlan:
             {task: tuple(sorted(befores)) for task, befores in extra_after.items()},
         )
 
-    def schedules(self, search: bool = False) -> Iterator[PlanSchedule]:
-        """In various orders, the shortest first; none if all that were tried deadlock.
-
-        With `search` more orders are looked at than rules and small plans give.
-        """
-        budget = Budget(SEARCH_S if search else 0.0, StepClock())
-        for made in (self._shop(actors_only=False), self._simple):
-            # What is kept in place, or named, may leave no order in which the checker finds one.
-            for blocks in sequences(made.shop, budget):
+    def schedules(self, thorough: bool = False) -> Iterator[PlanSchedule]:
+        """In various orders, the shortest first; none if all that were tried deadlock."""
+        search_s = THOROUGH_S if thorough else QUICK_S
+        shops = [self._shop] if self._simple is self._shop else [self._shop, self._simple]
+        for made in shops:
+            # What must be first or last, or is named, may leave no order that the checker passes.
+            for blocks in sequences(made.shop, Budget(search_s, StepClock())):
                 actors = [made.actors[b] for b in blocks if b < len(made.actors)]
                 found = self.schedule(actors)
                 if found is not None:
                     yield found
 
-    def valid_schedule(self, search: bool = False) -> PlanSchedule | tuple[Violation, ...]:
+    def valid_schedule(self, thorough: bool = False) -> PlanSchedule | tuple[Violation, ...]:
         """The shortest one that passes the checker with robots for actors, or what is wrong.
 
         Another order than the shortest may be the one that leaves every goal reached.
         """
         violations: tuple[Violation, ...] = ()
-        for found in islice(self.schedules(search), MAX_SEQUENCES_CHECKED):
+        for found in islice(self.schedules(thorough), MAX_SEQUENCES_CHECKED):
             violations = self.violations(found)
             if not violations:
                 return found
@@ -119,5 +108,5 @@ class AllocatedPlan:
 
     def violations(self, schedule: PlanSchedule) -> tuple[Violation, ...]:
         """What the checker says with robots for actors, in this order."""
-        extra_after = schedule.extra_after
-        return check_plan(self.plan, self.world, self.allocation, extra_after).violations
+        plan, world = self.checked.plan, self.checked.world
+        return check_allocation(plan, world, self.allocation, schedule.extra_after)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 
-from fleet.core.checker.plan_checker import CheckedPlan
+from fleet.core.checker.checked_plan import CheckedPlan
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
@@ -20,6 +20,7 @@ MOST_PRIORITY = 8
 """Priorities beyond this count as this: weights double with each step."""
 ANYWHERE = 0
 """The site that stands for wherever a robot may be."""
+ANY = Position.ANYWHERE
 
 
 @dataclass(frozen=True)
@@ -51,33 +52,40 @@ class PlanShop:
     robots: tuple[str, ...]
     tasks: tuple[str, ...]
 
+    def actors_only(self) -> PlanShop:
+        """The same, but robots that the plan names take part in any number of tasks at once, and
+        any actor may come first or last."""
+        count, shop = len(self.actors), self.shop
+        if len(shop.blocks) == count and all(b.position == ANY for b in shop.blocks):
+            return self
+        blocks = tuple(replace(block, position=ANY) for block in shop.blocks[:count])
+        operations = tuple(
+            replace(operation, blocks=tuple(b for b in operation.blocks if b < count))
+            for operation in shop.operations
+        )
+        return replace(self, shop=replace(shop, blocks=blocks, operations=operations))
+
 
 def plan_shop(
-    plan: Plan,
     checked: CheckedPlan,
-    world: WorldModel,
     able: Mapping[str, Sequence[str]],
     apart: frozenset[tuple[str, str]] = frozenset(),
     context: AllocationContext | None = None,
-    actors_only: bool = False,
 ) -> PlanShop:
     """The plan in numbers. Durations are the skill models', at each kind of robot's speed.
 
     `able` has the robots that each actor may be, `apart` the pairs that must be different ones.
-    With `actors_only` robots that the plan names itself take part in everything at once, and any
-    actor may come first or last.
 
     Raises:
         BadShop: some actor has no robot that can be it.
     """
     context = context or AllocationContext()
-    graph = checked.graph
-    assert graph is not None, "a valid plan has a graph"
+    world, graph = checked.world, checked.graph
     robots = tuple(world.team)
     block_of = {actor_arg(actor): i for i, actor in enumerate(able)}
     number = {task: i for i, task in enumerate(graph.order)}
     numbers = _Numbers(world, robots)
-    weights, dues_s = _weights_and_dues(plan, graph, context)
+    weights, dues_s = _weights_and_dues(checked.plan, graph, context)
     operations: list[Operation] = []
     members: list[list[int]] = [[] for _ in able]
     for i, task in enumerate(graph.order):
@@ -85,8 +93,6 @@ def plan_shop(
         blocks: dict[int, None] = {}
         for participant in action.participants:
             if participant not in block_of:
-                if actors_only:
-                    continue
                 block_of[participant] = len(members)
                 members.append([])
             blocks[block_of[participant]] = None
@@ -106,7 +112,7 @@ def plan_shop(
         )
     machine = {robot: i for i, robot in enumerate(robots)}
     able_of = {actor_arg(actor): rows for actor, rows in able.items()}
-    positions = {} if actors_only else _positions(checked, able, context)
+    positions = _positions(checked, able, context)
     kept_apart: dict[str, set[int]] = {}
     for pair in apart:
         one, other = map(actor_arg, pair)
@@ -117,7 +123,7 @@ def plan_shop(
         Block(
             operations=tuple(members[block]),
             machines=tuple(machine[robot] for robot in able_of.get(name, (name,))),
-            position=positions.get(name, Position.ANYWHERE),
+            position=positions.get(name, ANY),
             apart=frozenset(kept_apart.get(name, ())),
         )
         for name, block in block_of.items()

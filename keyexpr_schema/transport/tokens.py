@@ -17,7 +17,7 @@ from typing import Any, Generic
 from keyexpr_schema.errors import ForeignKey
 from keyexpr_schema.key import A, Key
 from keyexpr_schema.transport.link import Link
-from keyexpr_schema.transport.wire import Wire
+from keyexpr_schema.transport.samples import Sample
 
 REUNION_S = 2.0
 """After the own link came back: how long the others have. They retry every 0.5 s."""
@@ -44,7 +44,7 @@ class TokenWatch(Generic[A]):
         self._synced = asyncio.Event()
         self._wake = asyncio.Event()
         self._failure: BaseException | None = None
-        self._generation = link.generation
+        self._generation = link.router.generation
 
     def __aiter__(self) -> TokenWatch[A]:
         return self
@@ -63,10 +63,10 @@ class TokenWatch(Generic[A]):
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[TokenWatch[A]]:
-        """Subscribe and judge, until the block ends."""
+        """Subscribe and look, until the block ends."""
         async with self._link.tokens_watched(self._pattern, self._on_sample):
-            with self._link.listening(self._wake.set):
-                task = asyncio.create_task(self._judge_for_ever())
+            with self._link.router.listening(self._wake.set):
+                task = asyncio.create_task(self._watch_for_ever())
                 task.add_done_callback(self._end)
                 try:
                     yield self
@@ -74,12 +74,12 @@ class TokenWatch(Generic[A]):
                     task.cancel()
                     await asyncio.gather(task, return_exceptions=True)
 
-    def _on_sample(self, wire: Wire) -> None:
+    def _on_sample(self, sample: Sample) -> None:
         try:
-            address = self._key.parse(wire.keyexpr)
+            address = self._key.parse(sample.keyexpr)
         except ForeignKey:
             return
-        if not wire.deleted:
+        if not sample.deleted:
             self._see(address)
         elif address in self._alive:
             self._doubt(address, self._debounce_s)
@@ -100,23 +100,23 @@ class TokenWatch(Generic[A]):
         self._filled.set()
 
     def _end(self, task: asyncio.Task[None]) -> None:
-        """A fault of the judge must reach the reader, who would wait for ever."""
+        """A fault of the watching task must reach the reader, who would wait for ever."""
         if not task.cancelled():
             self._failure = task.exception()
             self._filled.set()
             self._synced.set()
 
-    async def _judge_for_ever(self) -> None:
+    async def _watch_for_ever(self) -> None:
         loop = asyncio.get_running_loop()
         while True:
-            await self._link.wait_up()
+            await self._link.router.wait_up()
             self._wake.clear()
-            if self._link.generation != self._generation or not self._synced.is_set():
-                if self._link.generation != self._generation:
+            if self._link.router.generation != self._generation or not self._synced.is_set():
+                if self._link.router.generation != self._generation:
                     for address in self._alive:
                         self._doubt(address, max(REUNION_S, self._debounce_s))
                     self._wake.clear()
-                self._generation = self._link.generation
+                self._generation = self._link.router.generation
                 if await self._look() is not None:
                     self._synced.set()
             due = [a for a, until_s in self._doubted_until_s.items() if until_s <= loop.time()]
@@ -142,11 +142,11 @@ class TokenWatch(Generic[A]):
     async def _look(self) -> set[A] | None:
         """See the tokens there are; None when that says nothing because the link is new or down."""
         replies = await self._link.tokens(self._pattern, 3.0)
-        healthy = self._link.up and self._link.generation == self._generation
+        healthy = self._link.router.up and self._link.router.generation == self._generation
         seen = set()
-        for wire in replies.values:
+        for sample in replies.values:
             try:
-                address = self._key.parse(wire.keyexpr)
+                address = self._key.parse(sample.keyexpr)
             except ForeignKey:
                 continue
             seen.add(address)

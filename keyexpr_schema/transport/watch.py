@@ -14,12 +14,14 @@ from collections import OrderedDict
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol
+from typing import Any, Generic
 
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload, Unreachable
 from keyexpr_schema.key import A, Delivery, Key, P
 from keyexpr_schema.transport.link import Link
-from keyexpr_schema.transport.wire import Wire, text_of_stamp
+from keyexpr_schema.transport.samples import Sample, decode_value, text_of_stamp
+from keyexpr_schema.transport.store_client import StoreClient
+from keyexpr_schema.transport.undecodable import UndecodableReports
 
 RELIST_S = 5.0
 """Period of re-listing while nothing seems wrong."""
@@ -36,24 +38,6 @@ class Change(Generic[A, P]):
     timestamp: str
 
 
-class Reader(Protocol):
-    """What a watch needs of a session."""
-
-    @property
-    def link(self) -> Link: ...
-
-    @property
-    def component(self) -> str: ...
-
-    def decode(self, key: Key[Any, P], wire: Wire) -> P: ...
-
-    def reject(self, keyexpr: str, data: bytes, reason: str) -> None: ...
-
-    async def listing(self, pattern: str, timeout_s: float) -> tuple[Wire, ...]: ...
-
-    async def store_answers(self, timeout_s: float) -> bool: ...
-
-
 class _Selection:
     """One watched pattern and what is known of the keys in it."""
 
@@ -64,47 +48,47 @@ class _Selection:
         self.missing: set[str] = set()
         self.missing_generation = 0
 
-    def offer(self, wire: Wire) -> None:
+    def offer(self, sample: Sample) -> None:
         """Pass on what is newer than what is known of its key."""
-        stamp = wire.stamp
-        known = self.stamps.get(wire.keyexpr)
-        if "*" in wire.keyexpr:
+        stamp = sample.stamp
+        known = self.stamps.get(sample.keyexpr)
+        if "*" in sample.keyexpr:
             # A wildcard put or delete: it concerns the keys that exist, which a listing shows.
             self.watch.relist()
             return
         try:
-            address = self.key.parse(wire.keyexpr)
+            address = self.key.parse(sample.keyexpr)
         except ForeignKey as error:
             # The pattern matches it and the store may keep it, but nobody can have an id in it.
-            self.watch.reader.reject(wire.keyexpr, wire.data, str(error))
+            self.watch.undecodable.report(sample.keyexpr, sample.data, str(error))
             return
         if known is not None and stamp <= known and stamp:
             return
         if stamp:
-            self.stamps[wire.keyexpr] = stamp
-        self.missing.discard(wire.keyexpr)
-        (self.live.discard if wire.deleted else self.live.add)(wire.keyexpr)
+            self.stamps[sample.keyexpr] = stamp
+        self.missing.discard(sample.keyexpr)
+        (self.live.discard if sample.deleted else self.live.add)(sample.keyexpr)
         try:
-            value = None if wire.deleted else self.watch.reader.decode(self.key, wire)
+            value = None if sample.deleted else decode_value(self.key, sample)
         except UndecodablePayload as error:
-            self.watch.reader.reject(wire.keyexpr, wire.data, str(error))
+            self.watch.undecodable.report(sample.keyexpr, sample.data, str(error))
             return
-        self.watch.deliver(wire.keyexpr, Change(self.key, address, value, text_of_stamp(stamp)))
+        self.watch.deliver(sample.keyexpr, Change(self.key, address, value, text_of_stamp(stamp)))
 
     async def relist(self) -> bool:
         """List once; whether it has to be done again soon (something known was not in it)."""
-        link = self.watch.reader.link
-        generation = link.generation
+        router = self.watch.link.router
+        generation = router.generation
         known = set(self.live)
-        wires = await self.watch.reader.listing(self.pattern, 3.0)
-        for wire in wires:
-            self.offer(wire)
-        missing = (known & self.live) - {wire.keyexpr for wire in wires}
-        if link.generation != generation or not link.up:
+        samples = await self.watch.store.list(self.pattern, 3.0)
+        for sample in samples:
+            self.offer(sample)
+        missing = (known & self.live) - {sample.keyexpr for sample in samples}
+        if router.generation != generation or not router.up:
             return True
         again = self.missing & missing if self.missing_generation == generation else set()
         self.missing, self.missing_generation = missing - again, generation
-        if again and not (wires or await self.watch.reader.store_answers(1.0)):
+        if again and not (samples or await self.watch.store.answers(1.0)):
             self.missing = missing
             return False  # cannot be told apart from a store that is away: keep what is known
         for keyexpr in sorted(again & self.live):
@@ -122,11 +106,19 @@ class Watch:
     same key; of other keys every change that was seen is delivered.
     """
 
-    def __init__(self, reader: Reader, selections: list[tuple[Key[Any, Any], str]]) -> None:
-        self.reader = reader
+    def __init__(
+        self,
+        link: Link,
+        store: StoreClient,
+        undecodable: UndecodableReports,
+        selections: list[tuple[Key[Any, Any], str]],
+    ) -> None:
+        self.link, self.store, self.undecodable = link, store, undecodable
         self._selections = [_Selection(self, key, pattern) for key, pattern in selections]
         self._ready: OrderedDict[object, Change[Any, Any]] = OrderedDict()
         self._number = 0
+        self.listings = 0
+        """How often all that is stored was listed."""
         self._filled = asyncio.Event()
         self._synced = asyncio.Event()
         self._wake = asyncio.Event()
@@ -163,11 +155,12 @@ class Watch:
     @asynccontextmanager
     async def running(self) -> AsyncIterator[Watch]:
         """Subscribe, then list and keep listing, until the block ends."""
-        link = self.reader.link
         async with AsyncExitStack() as stack:
             for selection in self._selections:
-                await stack.enter_async_context(link.subscribed(selection.pattern, selection.offer))
-            stack.enter_context(link.listening(self.relist))
+                await stack.enter_async_context(
+                    self.link.subscribed(selection.pattern, selection.offer)
+                )
+            stack.enter_context(self.link.router.listening(self.relist))
             task = asyncio.create_task(self._list_for_ever())
             task.add_done_callback(self._end)
             try:
@@ -194,6 +187,7 @@ class Watch:
             try:
                 for selection in stored:
                     again |= await selection.relist()
+                self.listings += 1
                 self._synced.set()
             except Unreachable:
                 again = True

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from cli.demo.mission_run import DemoOptions, running
+from cli.demo.bring_up import DemoOptions
+from cli.demo.mission_run import running_demo
 from keyexpr_schema.key import Component
-from keyexpr_schema.keyspace import GOAL_SPEC, KEYSPACE, REJECT
+from keyexpr_schema.keyspace import GOAL_SPEC, KEYSPACE, UNDECODABLE
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.transport.trace import TRACE_VARIABLE, WRITES, Operation
 from tests.planner_process import until
@@ -66,18 +67,18 @@ async def mission(folder: Path) -> None:
     options = DemoOptions(mission="two-cups", out=folder / "run", backend="kinematic")
     (folder / "plan.yaml").write_text(f"plan: mine{PLAN}", encoding="utf-8")
 
-    async with running(options) as demo:
-        robotctl = Robotctl(demo.fleet.endpoint, folder, demo.fleet.realm)
+    async with running_demo(options) as demo:
+        robotctl = Robotctl(demo.processes.endpoint, folder, demo.processes.realm)
         robotctl.env[TRACE_VARIABLE] = str(folder / "trace.txt")
 
         async def play() -> None:
-            await demo.give()
-            await demo.ended()
+            await demo.submit()
+            await demo.wait_until_ended()
             key, link = GOAL_SPEC.build(GoalAddress("bad")), demo.session.link
             link.send_soon(key, b"{", "application/json", block=True)
 
             async def unread() -> bool:
-                found = {address.component for address in await demo.session.list(REJECT)}
+                found = {address.component for address in await demo.session.list(UNDECODABLE)}
                 return found == {"planner", "recorder", "robotctl"}
 
             await until(unread, "all who read goals to say that they cannot read this one")
@@ -99,7 +100,7 @@ async def mission(folder: Path) -> None:
             refused = await robotctl.soon("replan", "plan-1")
             assert "not running" in refused.err
 
-        await demo.fleet.guard(play())
+        await demo.processes.guard(play())
 
 
 def allowed(column: Component, name: str, key: str, at: str) -> bool:

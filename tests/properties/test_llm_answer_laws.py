@@ -10,14 +10,14 @@ import msgspec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import CheckedPlan, check_plan
 from fleet.llm.quoting import fenced
 from fleet.llm.structured_output import read_answer
 from fleet.planners.base import PlanningProblem
 from fleet.planners.llm.action_elimination import without_redundant_tasks
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema
 from fleet.planners.llm.candidate import candidate_of, merged
-from fleet.planners.llm.verification import violations_of
+from fleet.planners.llm.verification import verify
 from keyexpr_schema.payloads.plans import Plan
 from tests.household import bring, home, manipulator
 
@@ -82,12 +82,12 @@ def consider(answer: dict[str, Any], flat: bool) -> Plan | set[str]:
         return {"malformed"}
     problem = PlanningProblem("p", GOALS, WORLD)
     plan = candidate_of(read, problem, GOALS, WORLD)
-    if violations := violations_of(plan, WORLD):
+    if violations := verify(plan, WORLD).violations:
         assert all(row.sentence for row in violations)
         return {row.code for row in violations}
     plan = without_redundant_tasks(plan, WORLD)
     made = merged([plan], problem, keep_order=not flat)
-    assert check_plan(made, WORLD).valid
+    assert isinstance(check_plan(made, WORLD), CheckedPlan)
     # What is stored must be readable again, whatever names the model made up.
     assert msgspec.json.decode(msgspec.json.encode(made), type=Plan) == made
     return made

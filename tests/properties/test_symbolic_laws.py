@@ -6,13 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fleet.allocators.base import Allocated
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import CheckedPlan, check_allocation, check_plan
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import PlanningProblem
 from fleet.service.composition import compose
 from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.payloads.goals import Goal
-from keyexpr_schema.payloads.plans import Plan
 from tests.household import bring, carrier, home, manipulator
 
 PARTS = compose()
@@ -59,9 +58,10 @@ def test_what_can_be_done_is_planned_and_allocated(
 ) -> None:
     world, goals = mission
     problem = PlanningProblem("p", goals, world, strategy=strategy)
-    plan = PARTS.planners["symbolic"].plan(problem)
-    assert isinstance(plan, Plan), plan.reason
-    assert check_plan(plan, world).valid
-    found = PARTS.allocators["milp"].allocate(plan, world)
+    made = PARTS.planners["symbolic"].plan(problem)
+    assert isinstance(made, CheckedPlan), made.reason
+    assert isinstance(check_plan(made.plan, world), CheckedPlan)
+    found = PARTS.allocators["milp"].allocate(made)
     assert isinstance(found, Allocated), found.violations
-    assert check_plan(plan, world, found.allocation, found.schedule.extra_after).valid
+    order = found.schedule.extra_after
+    assert check_allocation(made.plan, world, found.allocation, order) == ()

@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 
 import pytest
+from msgspec.structs import replace
 
 from benchmarks.allocation.shops import random_shop
 from fleet.allocators.base import Allocated, NotAllocated
 from fleet.allocators.makespan import MakespanAllocator
 from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from fleet.jobshop.budget import Budget, StepClock
 from fleet.jobshop.cpsat import CpSat, installed
@@ -22,8 +23,9 @@ from fleet.jobshop.rescheduling import reschedule, without_machines
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from fleet.scheduling.plan_shop import AllocationContext
-from keyexpr_schema.payloads.plans import Plan
-from tests.household import bring, carrier, home, manipulator
+from keyexpr_schema.ids import actor_arg, bound
+from keyexpr_schema.payloads.plans import Plan, Task
+from tests.household import bring, carrier, checked, home, manipulator
 
 QUICK = MakespanAllocator(deadline_s=0.2, exact=False, clock=StepClock())
 
@@ -41,12 +43,12 @@ def planned(world: WorldModel, *goals: tuple[int, str]) -> Plan:
         PlanningProblem(plan="p", goals=tuple(bring(n, where) for n, where in goals), world=world)
     )
     assert not isinstance(made, NoPlan)
-    return made
+    return made.plan
 
 
 def allocated(allocator: MakespanAllocator | MinMaxLoadAllocator, plan: Plan, world: WorldModel,
               told: AllocationContext | None = None) -> Allocated:  # fmt: skip
-    found = allocator.allocate(plan, world, told)
+    found = allocator.allocate(checked(plan, world), told)
     assert isinstance(found, Allocated), found
     return found
 
@@ -75,12 +77,14 @@ def test_tasks_start_as_soon_as_those_before_them_end() -> None:
     plan = planned(world, (1, "hallway"), (2, "living_room"), (3, "hallway"))
     found = allocated(QUICK, plan, world)
     schedule = found.schedule
-    checked = check_plan(plan, world, found.allocation, schedule.extra_after)
-    assert checked.graph is not None
+    extra = schedule.extra_after
+    graph = TaskGraph({t.task: {*t.after, *extra.get(t.task, ())} for t in plan.tasks})
+    tasks = {task.task: task for task in plan.tasks}
     where = {robot: world.value("at", robot) for robot in world.team}
-    for task in checked.graph.order:
-        action = checked.actions[task]
-        befores = checked.graph.predecessors[task]
+    for task in graph.order:
+        args = {name: bound(arg, found.allocation) for name, arg in tasks[task].args.items()}
+        action = world.skills[tasks[task].skill].ground(args)
+        befores = graph.predecessors[task]
         start_s = max((schedule.end_s[before] for before in befores), default=0.0)
         end_s = start_s + world.duration_s(action, where[action.actor], action.actor)
         assert (schedule.start_s[task], schedule.end_s[task]) == pytest.approx((start_s, end_s))
@@ -118,9 +122,22 @@ def test_of_equal_makespans_the_urgent_goal_is_done_first() -> None:
 
 
 def test_too_few_robots_is_a_sentence() -> None:
-    world = home((carrier("cart_1"),), cups=1)
-    plan = planned(home(cups=1), (1, "hallway"))
-    found = QUICK.allocate(plan, world)
+    """One robot has a hand and a basket, and cannot give anything to itself."""
+    one = replace(manipulator(), capabilities={**manipulator().capabilities, "basket": 1.0})
+    world = home((one,), cups=1)
+    cup = {"object": "cup_1", "place": "kitchen"}
+    calls = (
+        ("go", "navigate", "a1", (), {"to": "kitchen"}),
+        ("pick", "pick", "a1", ("go",), cup),
+        ("come", "navigate", "a2", (), {"to": "kitchen"}),
+        ("give", "place_on_robot", "a1", ("pick", "come"), {**cup, "carrier": actor_arg("a2")}),
+    )
+    tasks = tuple(
+        Task(task=t, skill=skill, actor=a, after=after, args={"robot": actor_arg(a), **args})
+        for t, skill, a, after, args in calls
+    )
+    plan = Plan(plan="p", goals=(), conditions=(), tasks=tasks)
+    found = QUICK.allocate(checked(plan, world))
     assert isinstance(found, NotAllocated)
     assert found.violations[0].sentence
 

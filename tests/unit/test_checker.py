@@ -8,8 +8,8 @@ from dataclasses import replace as model_replace
 import pytest
 from msgspec.structs import replace
 
-from fleet.core.checker.plan_checker import check_plan
-from fleet.core.model.skills import skills_from_data
+from fleet.core.checker.checked_plan import CheckedPlan, check_allocation, check_plan
+from fleet.core.model.skill_file import skills_from_data
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan, Task
@@ -157,10 +157,10 @@ def test_a_basket_takes_what_it_takes() -> None:
     goals = (at("cup_1", "living_room"), at("cup_2", "living_room"))
     assert codes(tasks, *goals) == []
     assert codes(tasks, *goals, robots=(manipulator(), carrier(basket=1))) == ["no-robot"]
-    full = check_plan(
+    full = check_allocation(
         plan(tasks), home((manipulator(), carrier(basket=1))), {"a1": "hsr", "a2": "locobot"}
     )
-    assert [violation.code for violation in full.violations] == ["no-space"]
+    assert [violation.code for violation in full] == ["no-space"]
 
 
 def test_giving_away_what_lies_in_a_basket_does_not_count_while_a_hand_holds_it() -> None:
@@ -171,7 +171,7 @@ def test_weight_and_skills_decide_who_can_be_an_actor() -> None:
     assert codes(fetch(), robots=(carrier(),)) == ["no-robot"]
     assert codes(fetch(), robots=(manipulator(grip_kg=0.1),)) == ["no-robot"]
     heavy = check_plan(plan(fetch()), home((manipulator(grip_kg=0.1), manipulator("strong"))))
-    assert heavy.valid
+    assert isinstance(heavy, CheckedPlan)
 
 
 def test_a_hand_must_reach_as_high_as_the_highest_surface() -> None:
@@ -183,7 +183,7 @@ def test_a_hand_must_reach_as_high_as_the_highest_surface() -> None:
     assert violation.code == "no-robot"
     assert "kitchen has a height of 1.4 m, hsr's reach is 1 m" in violation.sentence
     tall = replace(manipulator(), capabilities={**manipulator().capabilities, "reach": 1.4})
-    assert check_plan(plan(fetch()), model_replace(world, robots={"hsr": tall})).valid
+    assert not check_plan(plan(fetch()), model_replace(world, robots={"hsr": tall})).violations
 
 
 def test_a_robot_lacks_a_capability_or_a_skill() -> None:
@@ -206,8 +206,8 @@ def test_what_is_in_the_basket_at_the_start_takes_room() -> None:
     robots = (manipulator(), carrier(basket=1))
     assert codes(handover(), robots=robots, facts=full) == ["no-robot"]
     bound = {"a1": "hsr", "a2": "locobot"}
-    found = check_plan(plan(handover()), home(robots, facts=full), bound)
-    assert [violation.code for violation in found.violations] == ["no-space"]
+    found = check_allocation(plan(handover()), home(robots, facts=full), bound)
+    assert [violation.code for violation in found] == ["no-space"]
 
 
 def test_an_open_end_reaches_no_goal() -> None:
@@ -231,11 +231,11 @@ def test_an_open_end_reaches_no_goal() -> None:
         task("one", "light", "a1", place="kitchen"),
         task("two", "darken", "a2", place="kitchen"),
     )
-    assert check_plan(plan([one], lit), world).valid
+    assert isinstance(check_plan(plan([one], lit), world), CheckedPlan)
     for tasks in ([one, two], [two, one]):
         assert [v.code for v in check_plan(plan(tasks, lit), world).violations] == ["goal-unmet"]
     ordered = [two, replace(one, after=("two",))]
-    assert check_plan(plan(ordered, lit), world).valid
+    assert isinstance(check_plan(plan(ordered, lit), world), CheckedPlan)
 
 
 def test_an_actor_that_must_hold_something_at_the_start() -> None:
@@ -250,9 +250,9 @@ def test_an_actor_that_must_hold_something_at_the_start() -> None:
 
 def test_an_able_robot_that_is_bound_to_what_it_cannot() -> None:
     world = home((manipulator(), manipulator("weak", grip_kg=0.1)))
-    found = check_plan(plan(fetch()), world, {"a1": "weak"})
-    assert [violation.code for violation in found.violations] == ["no-robot"]
-    assert "cup_1 has a mass of 0.15 kg, weak's grip is 0.1 kg" in found.violations[0].sentence
+    found = check_allocation(plan(fetch()), world, {"a1": "weak"})
+    assert [violation.code for violation in found] == ["no-robot"]
+    assert "cup_1 has a mass of 0.15 kg, weak's grip is 0.1 kg" in found[0].sentence
 
 
 def test_an_allocated_plan_is_checked_with_robots_for_actors() -> None:
@@ -271,18 +271,18 @@ def test_an_allocated_plan_is_checked_with_robots_for_actors() -> None:
     ]
     world = home()
     one_robot = {"a1": "hsr", "a2": "hsr"}
-    assert check_plan(plan(both), world).valid
-    assert not check_plan(plan(both), world, one_robot).valid
-    assert check_plan(plan(both), world, one_robot, {"go2": ("put",)}).valid
-    wrong = check_plan(plan(fetch()), world, {"a1": "locobot"})
-    assert "no-robot" in [violation.code for violation in wrong.violations]
+    assert isinstance(check_plan(plan(both), world), CheckedPlan)
+    assert check_allocation(plan(both), world, one_robot)
+    assert not check_allocation(plan(both), world, one_robot, {"go2": ("put",)})
+    wrong = check_allocation(plan(fetch()), world, {"a1": "locobot"})
+    assert "no-robot" in [violation.code for violation in wrong]
 
 
 def test_a_pin_is_kept() -> None:
     pinned = plan(fetch(), pins={"a1": "r2"})
     world = home((manipulator(), manipulator("r2")))
-    assert check_plan(pinned, world, {"a1": "r2"}).valid
-    assert not check_plan(pinned, world, {"a1": "hsr"}).valid
+    assert not check_allocation(pinned, world, {"a1": "r2"})
+    assert check_allocation(pinned, world, {"a1": "hsr"})
 
 
 def test_a_thousand_tasks_are_checked_within_the_timeout() -> None:
@@ -297,7 +297,7 @@ def test_a_thousand_tasks_are_checked_within_the_timeout() -> None:
             tasks.append(replace(t, task=name, after=after, args={**t.args, **object_}))
     world = home(cups=250)
     started = time.perf_counter()
-    assert check_plan(plan(tasks), world).valid
+    assert isinstance(check_plan(plan(tasks), world), CheckedPlan)
     print(f"1000 tasks checked in {time.perf_counter() - started:.2f} s")
 
 

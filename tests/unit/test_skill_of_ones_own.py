@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import CheckedPlan
+from fleet.core.model.skill_file import skills_from_data
 from fleet.core.model.skill_phrases import phrases_of
-from fleet.core.model.skills import skills_from_data
 from fleet.core.model.world import WorldModel
 from fleet.errors import NotUnderstood
 from fleet.language import Vocabulary, read_goal
@@ -17,7 +17,18 @@ from keyexpr_schema.ids import bare_name
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.payloads.world import Fact
-from tests.household import PLACES, SKILLS, UNLOAD, at, bring, carrier, cup, fact, manipulator
+from tests.household import (
+    PLACES,
+    SKILLS,
+    UNLOAD,
+    at,
+    bring,
+    carrier,
+    checked,
+    cup,
+    fact,
+    manipulator,
+)
 from tests.language_house import WORDS, shown
 
 OWN = {
@@ -57,10 +68,9 @@ def world(*facts: Fact) -> WorldModel:
 
 def planned(strategy: str, model: WorldModel, *goals: Goal) -> Plan:
     problem = PlanningProblem("p", goals, model, strategy=strategy)
-    plan = SymbolicPlanner().plan(problem)
-    assert isinstance(plan, Plan), plan
-    assert check_plan(plan, model).valid
-    return plan
+    made = SymbolicPlanner().plan(problem)
+    assert isinstance(made, CheckedPlan), made
+    return checked(made.plan, model).plan
 
 
 @pytest.mark.parametrize(

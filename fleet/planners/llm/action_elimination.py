@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from msgspec.structs import replace
 
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import check_plan
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import AT, FactKey
@@ -26,7 +26,7 @@ def without_redundant_tasks(plan: Plan, world: WorldModel) -> Plan:
     unlocated = world.with_facts(
         {FactKey(AT, robot): None for robot in world.robots if robot not in mentioned}
     )
-    if not check_plan(plan, unlocated).valid:
+    if check_plan(plan, unlocated).violations:
         unlocated = world
     for with_successors in (True, False):
         plan = _eliminated(plan, unlocated, with_successors)
@@ -40,7 +40,7 @@ def _eliminated(plan: Plan, world: WorldModel, with_successors: bool) -> Plan:
             continue
         after = [t for t in graph.order if graph.precedes(task, t)] if with_successors else []
         reduced = _without(plan, frozenset({task, *after}))
-        if check_plan(reduced, world).valid:
+        if not check_plan(reduced, world).violations:
             plan = reduced
             graph = TaskGraph({row.task: row.after for row in plan.tasks})
     return plan

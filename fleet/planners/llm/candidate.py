@@ -10,7 +10,7 @@ from fleet.core.model.skills import SkillModel
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import PlanningProblem
-from fleet.planners.deordering import Strand, tasks_from
+from fleet.planners.deordering import ActionSequence, deordered
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, StepAnswer, TaskAnswer
 from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.ids import actor_arg, actor_in, bare_name
@@ -92,7 +92,7 @@ def merged(candidates: Sequence[Plan], problem: PlanningProblem, keep_order: boo
     model's own order is kept, too, if `keep_order`.
     """
     world = problem.world
-    strands: list[Strand] = []
+    sequences: list[ActionSequence] = []
     rows: list[Task] = []
     for candidate in candidates:
         graph = TaskGraph({task.task: task.after for task in candidate.tasks})
@@ -106,8 +106,8 @@ def merged(candidates: Sequence[Plan], problem: PlanningProblem, keep_order: boo
             )
             for task in ordered
         )
-        strands.append(Strand("", actions, frozenset(robots.values())))
-    tasks, pins = tasks_from(strands, problem.first_task)
+        sequences.append(ActionSequence("", actions, frozenset(robots.values())))
+    tasks, pins = deordered(sequences, problem.first_task)
     if keep_order:
         tasks = _with_model_order(tasks, rows, candidates)
     tasks = tuple(replace(task, goal=row.goal) for task, row in zip(tasks, rows, strict=True))

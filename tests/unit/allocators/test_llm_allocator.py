@@ -12,7 +12,7 @@ from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.llm.client import ModelAnswer, ModelClient
 from fleet.llm.configuration import LlmConfig
 from fleet.llm.conversation import LanguageModel
-from tests.household import drives, home, manipulator
+from tests.household import checked, drives, home, manipulator
 from tests.llm_server import LlmServer, Reply
 
 TEAM = (manipulator("r1"), manipulator("r2"))
@@ -36,7 +36,7 @@ def test_a_language_model_is_told_what_is_wrong_and_mends_it(model_client: Model
     world, plan = home(TEAM), drives("", "r2")
     replies = (Reply("no idea"), answer(a0="r9", a1="r1"), answer(a0="r2", a1="r2"))
     with LlmServer(*replies) as server:
-        made = by_model(server, model_client).allocate(plan, world)
+        made = by_model(server, model_client).allocate(checked(plan, world))
     assert isinstance(made, Allocated)
     assert made.allocation == {"a0": "r2", "a1": "r2"}
     question = json.dumps(server.requests[2]["messages"])
@@ -49,7 +49,7 @@ def test_a_language_model_that_is_never_right_is_replaced_and_that_is_said(
 ) -> None:
     world, plan = home(TEAM), drives("", "")
     with LlmServer(answer(a0="r1")) as server:
-        made = by_model(server, model_client).allocate(plan, world)
+        made = by_model(server, model_client).allocate(checked(plan, world))
     assert isinstance(made, Allocated)
     assert set(made.allocation.values()) == {"r1", "r2"}
     (note,) = made.notes
@@ -63,6 +63,6 @@ def test_a_language_model_that_fails_stops_nothing() -> None:
             raise OSError("no network")
 
     model = LanguageModel(LlmConfig(model="openai/scripted"), Unreachable())
-    made = LlmAllocator(model, RoundRobinAllocator()).allocate(drives(""), home(TEAM))
+    made = LlmAllocator(model, RoundRobinAllocator()).allocate(checked(drives(""), home(TEAM)))
     assert isinstance(made, Allocated)
     assert made.notes[0].endswith("asking the language model failed: no network")

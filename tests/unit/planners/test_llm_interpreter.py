@@ -54,11 +54,11 @@ def test_a_sentence_becomes_stages(model_client: ModelClient) -> None:
             Condition(relation="holding", subject="hsr", value="nothing"),
         ),
     )
-    told = server.said(0)
-    assert "Everyone has tea, then go and look" in told
-    assert '"at": "kitchen"' in told
-    assert "- located(object) = true: it is known where the object is" in told
-    assert "- at(object) = place or at(object) = robot or at(robot) = place" in told
+    prompt = server.prompt(0)
+    assert "Everyone has tea, then go and look" in prompt
+    assert '"at": "kitchen"' in prompt
+    assert "- located(object) = true: it is known where the object is" in prompt
+    assert "- at(object) = place or at(object) = robot or at(robot) = place" in prompt
 
 
 @pytest.mark.parametrize(
@@ -76,13 +76,13 @@ def test_a_sentence_becomes_stages(model_client: ModelClient) -> None:
         ({**row("at", "cup_1", "hallway"), "shell": "rm"}, "unknown field `shell`"),
     ],
 )
-def test_what_does_not_fit_goes_back_and_is_mended(
+def test_what_does_not_fit_goes_back_and_is_corrected(
     model_client: ModelClient, wrong: dict[str, Any], words: str
 ) -> None:
     right = stages([row("at", "cup_1", "hallway")])
     made, server = interpret(model_client, Reply(stages([wrong])), Reply(right))
     assert made == ((at("cup_1", "hallway"),),)
-    assert words in server.said(1)
+    assert words in server.prompt(1)
 
 
 @pytest.mark.parametrize(

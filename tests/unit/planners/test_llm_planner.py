@@ -36,9 +36,9 @@ def test_a_good_answer_becomes_the_plan(model_client: ModelClient) -> None:
     assert making.wall_s > 0
     asked = server.requests[0]["response_format"]["json_schema"]["schema"]
     assert asked["properties"]["tasks"]["items"]["anyOf"][0]["properties"]["skill"]
-    told = server.said(0)
+    prompt = server.prompt(0)
     for words in ("at(cup_1) = kitchen", "Bring cup 1 to the hallway", "grip >= mass(object)"):
-        assert words in told
+        assert words in prompt
     assert server.keys == ["Bearer none"]
 
 
@@ -82,7 +82,7 @@ def test_each_goal_gets_a_graph_of_its_own(model_client: ModelClient) -> None:
     assert plan.making.rounds == 2
     assert len({t.actor for t in plan.tasks}) == 2
     assert [t.task for t in plan.tasks if not t.after] == ["t1", "t5"]
-    assert "cup 2 to the" not in server.said(0)
+    assert "cup 2 to the" not in server.prompt(0)
 
 
 def test_a_robot_that_a_goal_names_is_pinned(model_client: ModelClient) -> None:
@@ -96,7 +96,7 @@ def test_a_robot_that_a_goal_names_is_pinned(model_client: ModelClient) -> None:
         plan = solve(server, model_client, (bring(1, "hallway"), second), strategy="per-goal")
     assert plan.made_by == "llm"
     assert list(plan.pins.values()) == ["locobot"]
-    assert '"at(cup_1) = hallway"' in server.said(1), "what the first goal reached is to be kept"
+    assert '"at(cup_1) = hallway"' in server.prompt(1), "what the first goal reached is to be kept"
 
 
 def test_a_goal_does_not_undo_another(model_client: ModelClient) -> None:
@@ -139,16 +139,16 @@ def test_goals_that_hold_cost_nothing(model_client: ModelClient) -> None:
     assert server.requests == []
 
 
-# --- repair --------------------------------------------------------------------------------------
-def test_a_wrong_answer_is_mended_with_the_checkers_sentences(model_client: ModelClient) -> None:
+# --- correction ----------------------------------------------------------------------------------
+def test_a_wrong_answer_is_corrected_by_the_checkers_sentences(model_client: ModelClient) -> None:
     with LlmServer(Reply(WRONG), Reply(GOOD)) as server:
         plan = solve(server, model_client)
     assert plan.made_by == "llm"
     assert plan.making.rounds == 2
-    told = server.requests[1]["messages"][-1]["content"]
-    assert "at(cup_2) = living_room does not hold when the plan is done" in told
-    assert '"code": "goal-unmet"' in told
-    assert '"subject": "cup_2"' in told
+    prompt = server.requests[1]["messages"][-1]["content"]
+    assert "at(cup_2) = living_room does not hold when the plan is done" in prompt
+    assert '"code": "goal-unmet"' in prompt
+    assert '"subject": "cup_2"' in prompt
     assert "put2" in server.requests[1]["messages"][-2]["content"]
 
 
@@ -156,7 +156,7 @@ def test_a_misspelt_name_is_answered_with_the_choices(model_client: ModelClient)
     bad = graph(*carry(1, "hall", "?a1"), *carry(2, "living_room", "?a2"))
     with LlmServer(Reply(bad), Reply(GOOD)) as server:
         assert solve(server, model_client).made_by == "llm"
-    assert "(there are hallway, kitchen, living_room)" in server.said(1)
+    assert "(there are hallway, kitchen, living_room)" in server.prompt(1)
 
 
 def test_more_robots_than_there_are_is_said(model_client: ModelClient) -> None:

@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
+from fleet.core.checker.checked_plan import CheckedPlan
 from fleet.llm.client import ModelClient
 from fleet.llm.configuration import LlmConfig
 from fleet.llm.conversation import LanguageModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.llm.planner import LlmPlanner
 from fleet.planners.symbolic.planner import SymbolicPlanner
-from keyexpr_schema.payloads.plans import Plan
 from tests.household import carrier, fact, home
 from tests.llm_plans import GOALS, GOOD, WRONG, config, fell_back, graph, solve
 from tests.llm_server import LlmServer, Reply
@@ -97,8 +97,8 @@ def test_nobody_listens(model_client: ModelClient) -> None:
     made = LlmPlanner(LanguageModel(gone, model_client), SymbolicPlanner()).plan(
         PlanningProblem("p", GOALS, home())
     )
-    assert isinstance(made, Plan)
-    fell_back(made, "(unavailable)")
+    assert isinstance(made, CheckedPlan)
+    fell_back(made.plan, "(unavailable)")
 
 
 # --- budget --------------------------------------------------------------------------------------
@@ -168,5 +168,5 @@ def test_after_close_the_symbolic_planner_plans() -> None:
         planner = LlmPlanner(model, SymbolicPlanner())
         model.close()
         made = planner.plan(PlanningProblem("p", GOALS, home()))
-    assert isinstance(made, Plan)
-    fell_back(made, "closed")
+    assert isinstance(made, CheckedPlan)
+    fell_back(made.plan, "closed")

@@ -66,4 +66,4 @@ def test_actors_and_pins_cannot_name_what_does_not_exist(model_client: ModelClie
         plan = solve(server, model_client, (bring(1, "hallway"),))
     assert plan.making.rounds == 3
     assert {t.actor for t in plan.tasks} == {"a1"}
-    assert "there is no robot nobody" in server.said(2)
+    assert "there is no robot nobody" in server.prompt(2)

@@ -1,21 +1,17 @@
-"""What travels on a Zenoh link, in plain Python: configuration, stamps, encodings, samples.
-
-`wire`, `link`, `connecting` and `router` are the only modules that import zenoh.
-"""
+"""What travels on a Zenoh link, in plain Python: samples, their timestamps, their encodings."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import zenoh
 
 from keyexpr_schema.errors import UndecodablePayload
-from keyexpr_schema.key import SCHEMA_PREFIX, P, decode_payload
+from keyexpr_schema.key import SCHEMA_PREFIX, Key, P, Payload, decode_payload
 
 ENCODING_PREFIX = "application/json;"
+_REPLY_VERSION = 1
 _ID_BITS = 128
 _ID_MASK = (1 << _ID_BITS) - 1
 
@@ -60,17 +56,23 @@ def _swap(source: int) -> int:
 
 
 @dataclass(frozen=True)
-class Wire:
-    """A value or a deletion as it came over the link. `stamp` 0: it carried no timestamp."""
+class Encoded:
+    """Bytes as they came over the link, on which key, and what they say they are."""
 
     keyexpr: str
     data: bytes
     encoding: str
+
+
+@dataclass(frozen=True)
+class Sample(Encoded):
+    """A value or a deletion. `stamp` 0: it carried no timestamp."""
+
     stamp: int
     deleted: bool
 
 
-def read_sample(sample: zenoh.Sample) -> Wire:
+def read_sample(sample: zenoh.Sample) -> Sample:
     """Copy `sample` out of Zenoh.
 
     The stamp is the one in the attachment where there is one (replies of the embedded store,
@@ -86,75 +88,54 @@ def read_sample(sample: zenoh.Sample) -> Wire:
     if not stamp and sample.timestamp is not None:
         stamp = stamp_of_text(str(sample.timestamp))
     deleted = sample.kind == zenoh.SampleKind.DELETE
-    return Wire(
+    return Sample(
         str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding), stamp, deleted
     )
 
 
-def encoding_of(schema: str) -> str:
-    """The Zenoh encoding of JSON with this schema, e.g. `application/json;robotfleet/fact/1`."""
-    return ENCODING_PREFIX + schema
+def encoding_of(key: Key[Any, Any]) -> str:
+    """The Zenoh encoding of values of `key`, e.g. `application/json;robotfleet/fact/1`."""
+    return ENCODING_PREFIX + key.schema
 
 
-def decode_wire(
-    data: bytes, encoding: str, kind: type[P], name: str, version: int, where: str
-) -> P:
-    """Decode `data`, found at `where`, as version `version` or older of schema `name`.
+def reply_encoding_of(key: Key[Any, Any]) -> str:
+    """The Zenoh encoding of replies on `key`, e.g. `…;robotfleet/store_journal_reply/1`."""
+    return f"{ENCODING_PREFIX}{SCHEMA_PREFIX}/{key.name}_reply/{_REPLY_VERSION}"
+
+
+def decode_value(key: Key[Any, P], found: Encoded) -> P:
+    """The payload in `found`, of the version of `key` or an older one.
 
     Bytes without a schema in their encoding (somebody put them by hand) are taken at their word.
 
     Raises:
         UndecodablePayload: another schema, a newer version, or not a payload of this type.
     """
-    _, _, schema = encoding.partition(";")
+    return _decode(found, key.payload, key.name, key.version)
+
+
+def decode_reply(key: Key[Any, Any], found: Encoded) -> Payload:
+    """The reply in `found`, of type `key.reply`.
+
+    Raises:
+        UndecodablePayload: as `decode_value`.
+    """
+    assert key.reply is not None
+    return _decode(found, key.reply, f"{key.name}_reply", _REPLY_VERSION)
+
+
+def _decode(found: Encoded, kind: type[P], name: str, version: int) -> P:
+    _, _, schema = found.encoding.partition(";")
     if schema:
         parts = schema.split("/")
         if len(parts) != 3 or parts[:2] != [SCHEMA_PREFIX, name] or not parts[2].isdecimal():
             raise UndecodablePayload(
-                f"the value at {where} says it is {schema!r}, but this key carries "
+                f"the value at {found.keyexpr} says it is {schema!r}, but this key carries "
                 f"'{SCHEMA_PREFIX}/{name}/{version}'"
             )
         if int(parts[2]) > version:
             raise UndecodablePayload(
-                f"the value at {where} is version {parts[2]} of {name}, but this program knows "
-                f"versions up to {version}: update it"
+                f"the value at {found.keyexpr} is version {parts[2]} of {name}, but this program "
+                f"knows versions up to {version}: update it"
             )
-    return decode_payload(kind, data, where)
-
-
-def zenoh_config(
-    mode: str,
-    *,
-    connect: Sequence[str] = (),
-    listen: Sequence[str] = (),
-    lease_s: float = 2.0,
-    namespace: str | None = None,
-    connect_timeout_ms: int | None = None,
-) -> zenoh.Config:
-    """A Zenoh configuration: no multicast, source timestamps, no shared memory, quick retries.
-
-    Shared memory is off because with it a router refuses sessions past 351.
-    """
-    values: dict[str, Any] = {
-        "mode": mode,
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": mode == "router",
-        "timestamping/enabled": True,
-        "transport/shared_memory/enabled": False,
-        "transport/link/tx/lease": round(lease_s * 1000),
-        "connect/endpoints": list(connect),
-        "connect/retry": {
-            "period_init_ms": 100,
-            "period_max_ms": 500,
-            "period_increase_factor": 2,
-        },
-        "listen/endpoints": list(listen),
-    }
-    if namespace is not None:
-        values["namespace"] = namespace
-    if connect_timeout_ms is not None:
-        values["connect/timeout_ms"] = connect_timeout_ms
-    config = zenoh.Config()
-    for path, value in values.items():
-        config.insert_json5(path, json.dumps(value))
-    return config
+    return decode_payload(kind, found.data, found.keyexpr)

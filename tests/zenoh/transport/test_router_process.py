@@ -13,11 +13,15 @@ import zenoh
 
 from fleet.service.router_process import with_port
 from fleet.stores.sqlite import SqliteStore
+from keyexpr_schema.errors import CannotListen
 from keyexpr_schema.keyspace import GOAL_SPEC
 from keyexpr_schema.payloads.goals import Goal, GoalAddress
-from keyexpr_schema.transport.router import CannotListen, run_router
+from keyexpr_schema.transport.connecting import zenoh_config
+from keyexpr_schema.transport.router import run_router
+from keyexpr_schema.transport.samples import read_sample, stamp_of_text
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from keyexpr_schema.transport.wire import read_sample, stamp_of_text, zenoh_config
+from keyexpr_schema.transport.store_client import StoreClient
+from keyexpr_schema.transport.trace import Trace
 
 MODULE = "fleet.service.router_process"
 KEYEXPR = "robotfleet/goals/g1/spec"
@@ -91,12 +95,13 @@ async def test_run_router_says_when_it_cannot_listen(router):
 async def test_a_plain_client_gets_value_encoding_and_timestamp(router, session_config):
     async with open_session(session_config()) as session:
         await session.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"))
-        [wire] = await session.listing(GOAL_SPEC.build(GoalAddress("g1")), 3)
+        store = StoreClient(session.link, (router.endpoint,), Trace("test"))
+        [stored] = await store.list(GOAL_SPEC.build(GoalAddress("g1")), 3)
         router.restart()
         await session.wait_connected(10)
-        [again] = await session.listing(GOAL_SPEC.build(GoalAddress("g1")), 10)
+        [again] = await store.list(GOAL_SPEC.build(GoalAddress("g1")), 10)
     # Exact after a restart, too, where Python cannot rebuild the timestamp.
-    assert again == wire
+    assert again == stored
 
     def get() -> zenoh.Sample:
         with zenoh.open(zenoh_config("client", connect=[router.endpoint])) as client:
@@ -107,8 +112,8 @@ async def test_a_plain_client_gets_value_encoding_and_timestamp(router, session_
     sample = await asyncio.to_thread(get)
     assert str(sample.key_expr) == KEYEXPR
     assert str(sample.encoding) == "application/json;robotfleet/goal_spec/1"
-    assert read_sample(sample).stamp == wire.stamp
-    assert 0 <= wire.stamp - stamp_of_text(str(sample.timestamp)) < 40 << 128
+    assert read_sample(sample).stamp == stored.stamp
+    assert 0 <= stored.stamp - stamp_of_text(str(sample.timestamp)) < 40 << 128
 
 
 async def test_only_stored_keys_are_kept(router, session_config):

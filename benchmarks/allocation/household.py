@@ -18,7 +18,7 @@ from typing import Any
 
 import yaml
 
-from fleet.core.model.skills import skills_from_data
+from fleet.core.model.skill_file import skills_from_data
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import AT
 from keyexpr_schema.ids import actor_arg

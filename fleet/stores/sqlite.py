@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal, Self
 
-from fleet.stores.errors import StoreError, StoreInUse
+from fleet.errors import StoreError, StoreInUse
 from fleet.stores.index import Index
 from keyexpr_schema.transport.storage import AppliedWrite, Write
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 
-from keyexpr_schema.keyspace import REJECT
-from keyexpr_schema.payloads.service import Reject, RejectAddress
+from keyexpr_schema.keyspace import UNDECODABLE
+from keyexpr_schema.payloads.service import UndecodableAddress, UndecodableValue
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.samples import encoding_of
 from keyexpr_schema.transport.trace import Operation, Trace
@@ -26,7 +26,11 @@ class UndecodableReports:
             return
         self._reported[keyexpr] = (value, count + 1)
         digest = hashlib.sha256(keyexpr.encode()).hexdigest()[:12]
-        where = REJECT.build(RejectAddress(self._component, digest))
-        payload = Reject(component=self._component, keyexpr=keyexpr, reason=reason, count=count + 1)
-        self._trace.note(Operation.PUT, REJECT, where)
-        self._link.send_soon(where, REJECT.encode(payload), encoding_of(REJECT), block=True)
+        where = UNDECODABLE.build(UndecodableAddress(self._component, digest))
+        payload = UNDECODABLE.encode(
+            UndecodableValue(
+                component=self._component, keyexpr=keyexpr, reason=reason, count=count + 1
+            )
+        )
+        self._trace.note(Operation.PUT, UNDECODABLE, where)
+        self._link.send_soon(where, payload, encoding_of(UNDECODABLE), block=True)

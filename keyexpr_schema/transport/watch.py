@@ -117,6 +117,8 @@ class Watch:
         self._selections = [_Selection(self, key, pattern) for key, pattern in selections]
         self._ready: OrderedDict[object, Change[Any, Any]] = OrderedDict()
         self._number = 0
+        self.listings = 0
+        """How often all that is stored was listed."""
         self._filled = asyncio.Event()
         self._synced = asyncio.Event()
         self._wake = asyncio.Event()
@@ -185,6 +187,7 @@ class Watch:
             try:
                 for selection in stored:
                     again |= await selection.relist()
+                self.listings += 1
                 self._synced.set()
             except Unreachable:
                 again = True

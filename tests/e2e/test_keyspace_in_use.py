@@ -12,7 +12,7 @@ import pytest
 from cli.demo.bring_up import DemoOptions
 from cli.demo.mission_run import running_demo
 from keyexpr_schema.key import Component
-from keyexpr_schema.keyspace import GOAL_SPEC, KEYSPACE, REJECT
+from keyexpr_schema.keyspace import GOAL_SPEC, KEYSPACE, UNDECODABLE
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.transport.trace import TRACE_VARIABLE, WRITES, Operation
 from tests.planner_process import until
@@ -78,7 +78,7 @@ async def mission(folder: Path) -> None:
             link.send_soon(key, b"{", "application/json", block=True)
 
             async def unread() -> bool:
-                found = {address.component for address in await demo.session.list(REJECT)}
+                found = {address.component for address in await demo.session.list(UNDECODABLE)}
                 return found == {"planner", "recorder", "robotctl"}
 
             await until(unread, "all who read goals to say that they cannot read this one")

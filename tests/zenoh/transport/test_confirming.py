@@ -1,23 +1,18 @@
-"""The typed session against a real router and store."""
+"""What is confirmed is stored, and is read back by get and list."""
 
 from __future__ import annotations
 
 import asyncio
-import re
-import time
 
 import pytest
 
-from keyexpr_schema.errors import UndecodablePayload, Unreachable
+from keyexpr_schema.errors import UndecodablePayload
 from keyexpr_schema.keyspace import GOAL_SPEC, PLAN_REQUEST, STORE_JOURNAL
-from keyexpr_schema.payloads.goals import Goal, GoalAddress
+from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
 from keyexpr_schema.payloads.service import StoreAddress, StoreQuery
-from keyexpr_schema.transport.session import SessionConfig, open_session
-
-
-def goal(name: str, text: str = "bring the cup") -> Goal:
-    return Goal(goal=name, text=text)
+from keyexpr_schema.transport.session import open_session
+from tests.session_values import goal, not_connected, until
 
 
 async def test_a_confirmed_value_is_read_back_listed_and_deleted(session_config):
@@ -37,21 +32,6 @@ async def test_a_confirmed_value_is_read_back_listed_and_deleted(session_config)
             (GOAL_SPEC.build(GoalAddress("g1")), True),
         ]
         assert journal.last == 3
-
-
-async def test_without_a_router_opening_fails_with_one_sentence_and_in_time():
-    started_s = time.monotonic()
-    with pytest.raises(Unreachable, match=r"no router answers at tcp/127.0.0.1:9: start one with"):
-        async with open_session(SessionConfig(endpoints=("tcp/127.0.0.1:9",))):
-            pass
-    assert time.monotonic() - started_s < 3.5
-
-
-@pytest.mark.parametrize("endpoint", ["nonsense", "127.0.0.1:7447", "tcp/no-such-host.invalid:1"])
-async def test_an_endpoint_that_is_none_is_one_sentence(endpoint):
-    with pytest.raises(Unreachable, match=re.escape(endpoint)):
-        async with open_session(SessionConfig(endpoints=(endpoint,), connect_timeout_s=1.0)):
-            pass
 
 
 async def test_realms_do_not_see_each_other(session_config):
@@ -79,3 +59,44 @@ async def test_what_no_reader_could_read_is_not_put(session_config):
         ):
             await session.confirm(PLAN_REQUEST, RequestAddress("r1"), asked)
         assert await session.get(PLAN_REQUEST, RequestAddress("r1")) is None
+
+
+async def test_every_confirmed_write_outlives_kill_9_in_mid_stream(router, session_config):
+    async with open_session(session_config()) as session:
+        confirmed: list[int] = []
+
+        async def write_for_ever(first: int) -> None:
+            for number in range(first, 1_000_000, 4):
+                address = GoalAddress(f"g{number}")
+                await session.confirm(GOAL_SPEC, address, goal(address.goal), 30.0)
+                confirmed.append(number)
+
+        for _ in range(4):
+            before = len(confirmed)
+            first = max(confirmed, default=0) // 4 * 4 + 4
+            tasks = [asyncio.create_task(write_for_ever(first + i)) for i in range(4)]
+
+            async def grown(least: int = before + 200) -> bool:
+                return len(confirmed) >= least
+
+            await until(grown)
+            router.kill()
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            promised = set(confirmed)
+            router.restart()
+            stored = await session.list(GOAL_SPEC, 10.0)
+            missing = promised - {int(address.goal[1:]) for address in stored}
+            assert not missing
+
+
+async def test_a_confirm_that_spans_the_routers_death_arrives(router, session_config):
+    async with open_session(session_config()) as session:
+        router.kill()
+        task = asyncio.create_task(session.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"), 20))
+        await until(lambda: not_connected(session))
+        assert not task.done()
+        router.restart()
+        await task
+        assert await session.get(GOAL_SPEC, GoalAddress("g1")) == goal("g1")

@@ -10,7 +10,7 @@ import zenoh
 
 from keyexpr_schema.keyspace import KEYSPACE
 
-CONFIGS = Path(__file__).parents[2] / "configs" / "routers"
+CONFIGS = Path(__file__).parents[3] / "configs" / "routers"
 
 
 @pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.json5")), ids=lambda path: path.name)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from fleet.stores.errors import StoreError, StoreInUse
+from fleet.errors import StoreError, StoreInUse
 from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.transport.storage import Write
 

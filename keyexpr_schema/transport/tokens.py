@@ -57,6 +57,11 @@ class TokenWatch(Generic[A]):
             await self._filled.wait()
         return self._ready.popleft()
 
+    @property
+    def alive(self) -> frozenset[A]:
+        """The tokens that are there, whatever was handed to the iterator so far."""
+        return frozenset(self._alive)
+
     async def synced(self) -> None:
         """Wait until every token that was there at the start was handed to the iterator."""
         await self._synced.wait()

@@ -66,7 +66,7 @@ _TABLES = {
     ROBOT_SPEC.name: "robot_specs",
     ROBOT_STATE.name: "robot_states",
     FACT.name: "facts",
-    UNDECODABLE.name: "rejects",
+    UNDECODABLE.name: "undecodable",
     SIM_TRUTH.name: "truths",
     SIM_SENSES.name: "senses",
 }
@@ -90,7 +90,7 @@ class FleetView:
     robot_specs: dict[str, RobotSpec] = field(default_factory=dict)
     robot_states: dict[str, RobotState] = field(default_factory=dict)
     facts: dict[FactKey, Fact] = field(default_factory=dict)
-    rejects: dict[tuple[str, str], UndecodableValue] = field(default_factory=dict)
+    undecodable: dict[tuple[str, str], UndecodableValue] = field(default_factory=dict)
     truths: dict[str, Truth] = field(default_factory=dict)
     senses: dict[str, Senses] = field(default_factory=dict)
     clock: SimClock | None = None

@@ -12,8 +12,10 @@ from itertools import product
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from fleet.core.model.skills import Action, skills_from_data
-from fleet.core.model.world import WorldModel, condition_holds, first_unmet, room_left
+from fleet.core.model.preconditions import first_unmet
+from fleet.core.model.skill_file import skills_from_data
+from fleet.core.model.skills import Action
+from fleet.core.model.world import WorldModel, condition_holds, room_left
 from fleet.planners.deordering import ActionSequence, deordered
 from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.ids import actor_arg

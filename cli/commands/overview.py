@@ -20,7 +20,7 @@ async def status(call: Call) -> None:
     from cli.client.fleet_view import FLEET_KEYS, snapshot
     from cli.client.planner import planner_status
     from cli.client.presence import planner_alive, robots_alive
-    from cli.client.rejects import current_rejects
+    from cli.client.undecodable import still_undecodable
     from cli.views.goals import goal_rows
     from cli.views.robots import robot_rows
     from cli.views.status import status_page
@@ -31,7 +31,7 @@ async def status(call: Call) -> None:
         planner = await planner_status(session)
         planning = await planner_alive(session)
         connected = await robots_alive(session)
-        rejects = await current_rejects(session, view.rejects.values())
+        undecodable = await still_undecodable(session, view.undecodable.values())
     robots = robot_rows(view.robot_specs, view.robot_states, connected)
     goals = goal_rows(view.goals, view.goal_status)
     settings = call.settings
@@ -43,10 +43,10 @@ async def status(call: Call) -> None:
             "robots": robots,
             "goals": goals,
             "plans": list(view.plan_status.values()),
-            "rejects": rejects,
+            "rejects": undecodable,
         },
         lambda: status_page(
-            settings.routers, settings.realm, planner, planning, robots, goals, view, rejects
+            settings.routers, settings.realm, planner, planning, robots, goals, view, undecodable
         ),
     )
 

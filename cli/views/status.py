@@ -30,11 +30,11 @@ def status_page(
     robots: Sequence[RobotRow],
     goals: Sequence[GoalRow],
     view: FleetView,
-    rejects: Sequence[UndecodableValue],
+    undecodable: Sequence[UndecodableValue],
 ) -> Group:
     """One page; a part with nothing in it is one short line."""
     plans = set(view.plans) | set(view.plan_status)
-    unreadable: list[RenderableType] = ["", rejects_table(rejects)] if rejects else []
+    unreadable: list[RenderableType] = ["", undecodable_table(undecodable)] if undecodable else []
     return Group(
         f"router   {', '.join(routers)}, realm {realm}",
         f"planner  {_planner(planner, planning)}",
@@ -63,11 +63,11 @@ def _planner(planner: PlannerStatus | None, planning: bool) -> str:
     return "\n".join([f"running, epoch {planner.epoch}", *lines])
 
 
-def rejects_table(rejects: Sequence[UndecodableValue]) -> Table:
+def undecodable_table(undecodable: Sequence[UndecodableValue]) -> Table:
     """One line a value that somebody could not read."""
     return table(
         ["key", "told by", "times", "reason"],
-        ((r.keyexpr, r.component, r.count, r.reason) for r in rejects),
+        ((r.keyexpr, r.component, r.count, r.reason) for r in undecodable),
         title="Unreadable values",
     )
 

@@ -11,9 +11,9 @@ from collections.abc import Callable, Sequence
 from math import inf, log
 from random import Random
 
-from fleet.jobshop.budget import Budget
 from fleet.jobshop.forward_pass import Solution, evaluate
 from fleet.jobshop.instance import Instance
+from fleet.jobshop.time_budget import TimeBudget
 
 HOT, COLD = 0.02, 0.0002
 """Temperatures at the beginning and the end, as shares of the makespan."""
@@ -33,7 +33,7 @@ NEAR = 1e-9
 def anneal(
     instance: Instance,
     begin: Solution,
-    budget: Budget,
+    budget: TimeBudget,
     bound_s: float = 0.0,
     seed: int = 0,
     move_price_s: float = 0.0,
@@ -82,7 +82,7 @@ class _Search:
         self._index(0, len(self.order))
         self._trace()
 
-    def run(self, budget: Budget, bound_s: float, stopped: Callable[[], bool]) -> bool:
+    def run(self, budget: TimeBudget, bound_s: float, stopped: Callable[[], bool]) -> bool:
         """One cooling; whether there is nothing more to look for."""
         random = self.random
         scale = self.makespan or 1.0

@@ -7,11 +7,11 @@ from itertools import permutations
 
 from fleet.jobshop.annealing import anneal
 from fleet.jobshop.branch_and_bound import branch_and_bound
-from fleet.jobshop.budget import Budget
 from fleet.jobshop.forward_pass import Solution, evaluate
 from fleet.jobshop.instance import Instance
 from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.problem import Shop
+from fleet.jobshop.time_budget import TimeBudget
 
 FEW = 5
 """Components of which every order is given (120), behind those that were searched for."""
@@ -21,7 +21,7 @@ MOST_NODES = 1000
 """Placements looked at for the best order of a small shop."""
 
 
-def sequences(shop: Shop, budget: Budget) -> Iterator[list[int]]:
+def sequences(shop: Shop, budget: TimeBudget) -> Iterator[list[int]]:
     """Orders of all blocks, the best first, each different on some machine.
 
     Every block has one machine. They are those of dispatching rules, and the best there is in a

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from itertools import islice, pairwise
 
 from fleet.core.checker.checked_plan import CheckedPlan, check_allocation
-from fleet.jobshop.budget import Budget, StepClock
 from fleet.jobshop.forward_pass import schedule_of
 from fleet.jobshop.sequencing import sequences
+from fleet.jobshop.time_budget import StepClock, TimeBudget
 from fleet.scheduling.plan_shop import AllocationContext, plan_shop
 from keyexpr_schema.payloads.plans import Violation
 
@@ -87,7 +87,7 @@ class AllocatedPlan:
         shops = [self._shop] if self._simple is self._shop else [self._shop, self._simple]
         for made in shops:
             # What must be first or last, or is named, may leave no order that the checker passes.
-            for blocks in sequences(made.shop, Budget(search_s, StepClock())):
+            for blocks in sequences(made.shop, TimeBudget(search_s, StepClock())):
                 actors = [made.actors[b] for b in blocks if b < len(made.actors)]
                 found = self.schedule(actors)
                 if found is not None:

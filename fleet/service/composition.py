@@ -16,7 +16,8 @@ from fleet.allocators.llm import LlmAllocator
 from fleet.allocators.makespan import MakespanAllocator
 from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.allocators.round_robin import RoundRobinAllocator
-from fleet.core.model.skills import SkillModel, skills_from_data
+from fleet.core.model.skill_file import skills_from_data
+from fleet.core.model.skills import SkillModel
 from fleet.errors import BadSkillFile
 from fleet.llm.configuration import load_llm_config
 from fleet.llm.conversation import LanguageModel

@@ -8,8 +8,9 @@ from itertools import combinations
 from hypothesis import given, settings
 
 from fleet.core.checker.checked_plan import check_allocation, check_plan
+from fleet.core.model.preconditions import first_unmet
 from fleet.core.model.task_graph import TaskGraph
-from fleet.core.model.world import WorldModel, condition_holds, first_unmet, room_left
+from fleet.core.model.world import WorldModel, condition_holds, room_left
 from keyexpr_schema.ids import bare_name
 from keyexpr_schema.payloads.plans import Plan
 from tests.random_plans import ALLOCATION, plans

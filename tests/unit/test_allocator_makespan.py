@@ -13,13 +13,13 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
-from fleet.jobshop.budget import Budget, StepClock
 from fleet.jobshop.cpsat import CpSat, installed
 from fleet.jobshop.instance import Instance
 from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.portfolio import solve
 from fleet.jobshop.problem import BadShop, Block, Machine, Operation, Shop
 from fleet.jobshop.rescheduling import reschedule, without_machines
+from fleet.jobshop.time_budget import StepClock, TimeBudget
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from fleet.scheduling.plan_shop import AllocationContext
@@ -33,9 +33,9 @@ NEVER_S = 600.0
 """A search that has not ended by itself by then never will: it takes seconds."""
 
 
-def steps(seconds: float) -> Budget:
+def steps(seconds: float) -> TimeBudget:
     """The same number of iterations on every machine."""
-    return Budget(seconds, StepClock())
+    return TimeBudget(seconds, StepClock())
 
 
 def planned(world: WorldModel, *goals: tuple[int, str]) -> Plan:
@@ -145,7 +145,7 @@ def test_too_few_robots_is_a_sentence() -> None:
 @pytest.mark.skipif(not installed(), reason="OR-Tools is an extra: cp-sat")
 @pytest.mark.parametrize("seed", range(3))
 def test_eight_tasks_with_meetings_are_proven_optimal(seed: int) -> None:
-    found = solve(random_shop(8, 3, travel=True, meetings=0.5, seed=seed), Budget(NEVER_S))
+    found = solve(random_shop(8, 3, travel=True, meetings=0.5, seed=seed), TimeBudget(NEVER_S))
     assert found is not None
     assert found.gap < 1e-4
 

@@ -21,9 +21,9 @@ from fleet.allocators.base import Allocated
 from fleet.allocators.makespan import MakespanAllocator
 from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.core.checker.checked_plan import check_plan
-from fleet.jobshop.budget import Budget, StepClock
 from fleet.jobshop.instance import Instance
 from fleet.jobshop.portfolio import solve
+from fleet.jobshop.time_budget import StepClock, TimeBudget
 from tests.household import checked
 
 
@@ -85,7 +85,7 @@ def test_idle_time_cannot_be_less_than_at_the_bound() -> None:
 def test_alternatives_are_schedules_and_none_is_below_the_bound(travel: bool) -> None:
     shop = random_shop(12, 3, travel, 0.3 if travel else 0.0)
     ready = Instance(shop)
-    best = solve(shop, Budget(0.5, StepClock()), exact=False)
+    best = solve(shop, TimeBudget(0.5, StepClock()), exact=False)
     assert best is not None
     for choose in (nearest, in_turn, papers_milp):
         machine_of = choose(ready)

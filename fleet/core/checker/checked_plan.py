@@ -21,7 +21,7 @@ from typing import ClassVar
 import msgspec
 
 from fleet.core.checker.actor_requirements import Candidates, Left, Requirement
-from fleet.core.checker.causality import PlanFlow
+from fleet.core.checker.causality import Causality
 from fleet.core.checker.form import PlanForm
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import Cycle, TaskGraph
@@ -75,17 +75,17 @@ def check_plan(plan: Plan, world: WorldModel) -> CheckedPlan | InvalidPlan:
     if isinstance(read, InvalidPlan):
         return read
     graph, actions = read
-    flow = PlanFlow(plan, world, graph, actions)
-    flow.check()
+    causality = Causality(plan, world, graph, actions)
+    causality.check()
     for pinned, robot in plan.pins.items():
-        flow.requirements[actor_arg(pinned)].pinned_to = robot
+        causality.requirements[actor_arg(pinned)].pinned_to = robot
     requirements = {
         actor: each
-        for name, each in flow.requirements.items()
+        for name, each in causality.requirements.items()
         if (actor := actor_in(name)) is not None
     }
     candidates = Candidates(requirements, _leaves(graph, actions), world)
-    violations = (*flow.violations, *_actors_without_robot(candidates))
+    violations = (*causality.violations, *_actors_without_robot(candidates))
     able = {actor: candidates.able[actor] for actor in plan.actors}
     if violations:
         return InvalidPlan(plan, world, violations, graph, actions, able)
@@ -106,9 +106,9 @@ def check_allocation(
     if isinstance(read, InvalidPlan):
         return read.violations
     graph, actions = read
-    flow = PlanFlow(plan, world, graph, actions)
-    flow.check()
-    return (*flow.violations, *_unable_robots(plan, allocation, actions, world))
+    causality = Causality(plan, world, graph, actions)
+    causality.check()
+    return (*causality.violations, *_unable_robots(plan, allocation, actions, world))
 
 
 def _read(

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from fleet.core.model.durations import pace, work_s
 from fleet.core.model.skills import Action, SkillModel
-from keyexpr_schema.facts import AT, HELD, HOLDING, LOCATED, NOTHING, FactKey, Literal, Value
+from keyexpr_schema.facts import AT, HELD, HOLDING, LOCATED, NOTHING, FactKey, Value
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -195,16 +195,6 @@ def known_value(variable: FactKey, facts: Mapping[FactKey, Value], world: WorldM
     if value is None and variable.relation == HOLDING and variable.subject in world.robots:
         return None if world.capability(variable.subject, "grip") else NOTHING
     return value
-
-
-def first_unmet(
-    action: Action, facts: Mapping[FactKey, Value], world: WorldModel
-) -> Literal | None:
-    """The first precondition of the action that does not hold in `facts`; baskets aside."""
-    for literal in action.before:
-        if known_value(literal.variable, facts, world) != literal.value:
-            return literal
-    return None
 
 
 def room_left(robot: str, facts: Mapping[FactKey, Value], world: WorldModel) -> int:

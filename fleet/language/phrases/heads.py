@@ -135,7 +135,7 @@ class Heads:
         found: list[int] = []
         while True:
             before = cursor.at
-            if found and not (cursor.take(",", "and") or cursor.take(",") or cursor.take("and")):
+            if found and not cursor.take_joint():
                 break
             if cursor.take_word(_NUMBER_SIGNS):
                 cursor.take(".")

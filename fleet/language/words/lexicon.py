@@ -81,7 +81,7 @@ class Lexicon:
         ]
 
     def names_in(self, types: Sequence[EntityType]) -> set[str]:
-        """Phrase of all names and kinds of those types, for those who mistyped one."""
+        """Words of all names and kinds of those types, for those who mistyped one."""
         return {
             " ".join(words)
             for e in self.entities

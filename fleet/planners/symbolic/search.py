@@ -10,14 +10,9 @@ from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count, product
 
+from fleet.core.model.preconditions import applicable
 from fleet.core.model.skills import Action
-from fleet.core.model.world import (
-    WorldModel,
-    condition_holds,
-    first_unmet,
-    known_value,
-    room_left,
-)
+from fleet.core.model.world import WorldModel, condition_holds, known_value
 from keyexpr_schema.facts import AT, HELD, HOLDING, LOCATED, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 
@@ -235,13 +230,6 @@ def uniform_cost_search(
                 came[reached] = state, action
                 heappush(queue, (total, next(ticket), reached))
     return None
-
-
-def applicable(action: Action, facts: Mapping[FactKey, Value], world: WorldModel) -> bool:
-    """Whether the action's preconditions hold in `facts`, room in baskets included."""
-    return first_unmet(action, facts, world) is None and all(
-        room_left(carrier, facts, world) > 0 for carrier in action.space_in
-    )
 
 
 def _path(

@@ -13,7 +13,7 @@ from fleet.core.checker.checked_plan import (
     CheckedPlan,
     check_allocation,
 )
-from fleet.core.model.skills import skills_from_data
+from fleet.core.model.skill_file import skills_from_data
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner

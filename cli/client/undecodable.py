@@ -15,26 +15,22 @@ if TYPE_CHECKING:
 ASK_S = 3.0
 
 
-async def current_rejects(
-    session: Session, rejects: Iterable[UndecodableValue]
+async def still_undecodable(
+    session: Session, values: Iterable[UndecodableValue]
 ) -> list[UndecodableValue]:
     """Those whose key still has a value that does not decode.
 
-    A reject stays on its key when the bad value is replaced or deleted. What is not stored, and
+    The report stays on its key when the bad value is replaced or deleted. What is not stored, and
     what was put on a key that nobody can have, cannot be looked at again and stays listed.
     """
     left = []
-    for reject in rejects:
+    for value in values:
         try:
-            key = key_of(reject.keyexpr)
-        except ForeignKey:
-            left.append(reject)
-            continue
-        if not key.stored:
-            left.append(reject)
-            continue
-        try:
-            await session.get(key, key.parse(reject.keyexpr), ASK_S)
-        except UndecodablePayload:
-            left.append(reject)
+            key = key_of(value.keyexpr)
+            if key.stored:
+                await session.get(key, key.parse(value.keyexpr), ASK_S)
+                continue
+        except (ForeignKey, UndecodablePayload):
+            pass
+        left.append(value)
     return left

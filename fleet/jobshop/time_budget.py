@@ -29,7 +29,7 @@ class StepClock:
         return self._now_s
 
 
-class Budget:
+class TimeBudget:
     """So many seconds by `clock`, from now on."""
 
     def __init__(self, seconds: float, clock: Clock = time.perf_counter) -> None:
@@ -54,13 +54,13 @@ class Budget:
         """What is left, s."""
         return max(0.0, self._seconds * (1.0 - self.spent))
 
-    def until(self, share: float) -> Budget:
+    def until(self, share: float) -> TimeBudget:
         """The same budget, over as soon as `share` of it is spent."""
-        part = Budget(share * self._seconds, self._clock)
+        part = TimeBudget(share * self._seconds, self._clock)
         part._began_s = self._began_s
         return part
 
-    def part(self, share: float, least_s: float = 0.0) -> Budget:
+    def part(self, share: float, least_s: float = 0.0) -> TimeBudget:
         """From now on, `share` of what is left, and no less than `least_s` where so much is."""
         left_s = self.left_s
-        return Budget(min(max(share * left_s, least_s), left_s), self._clock)
+        return TimeBudget(min(max(share * left_s, least_s), left_s), self._clock)

@@ -32,7 +32,7 @@ from keyexpr_schema.transport.samples import (
     timestamp_of_stamp,
 )
 from keyexpr_schema.transport.storage import Store, Write
-from keyexpr_schema.transport.trace import Operation, Trace
+from keyexpr_schema.transport.trace import Trace
 
 _log = logging.getLogger(__name__)
 CHANNEL = 10_000
@@ -63,7 +63,7 @@ class _Storage:
         # serve a key.
         self._queryable = session.declare_queryable("**", handlers.FifoChannel(CHANNEL))
         journal = STORE_JOURNAL.build(StoreAddress())
-        Trace("store").note(Operation.SERVE, STORE_JOURNAL, journal)
+        Trace("store").note("serve", STORE_JOURNAL, journal)
         self._threads = [
             threading.Thread(target=self._write, name="store-write"),
             threading.Thread(target=self._answer, name="store-answer"),

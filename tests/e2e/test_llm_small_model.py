@@ -65,11 +65,11 @@ class SmallModel:
                 text += choice["delta"].get("content", "")
                 finish = choice["finish_reason"] or finish
                 count += 1
-            told = sum(
+            prompt_tokens = sum(
                 len(self._model.tokenize(message["content"].encode()))
                 for message in request["messages"]
             )
-        return Reply(text, finish_reason=finish, tokens=(told, count))
+        return Reply(text, finish_reason=finish, tokens=(prompt_tokens, count))
 
     def close(self) -> None:
         """Give its memory back, once it has stopped."""

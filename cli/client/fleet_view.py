@@ -122,6 +122,10 @@ class FleetView:
         times += [status.time_s for status in self.plan_status.values()]
         return max(times, default=None)
 
+    def records(self, plan: str) -> dict[str, TaskRecord]:
+        """The records of a plan's tasks, by task."""
+        return {task: record for (of, task), record in self.tasks.items() if of == plan}
+
     def changed_s(self, plan: str) -> float:
         """When a plan last changed, as far as its status says (0: no status)."""
         status = self.plan_status.get(plan)

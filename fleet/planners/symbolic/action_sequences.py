@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from msgspec.structs import replace
 
 from fleet.core.model.skills import Action
-from fleet.core.model.world import WorldModel
+from fleet.core.model.world import WorldModel, condition_holds
 from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import ActionSequence
 from fleet.planners.symbolic.search import (
@@ -64,17 +64,16 @@ class Exploration:
     seeks: tuple[str, ...]
 
 
-def subgoals_in_order(problem: PlanningProblem) -> list[Subgoal]:
-    """Conditions still to be reached: first those whose object a hand holds already, last those
-    that leave an object in a hand.
+def subgoals_in_order(problem: PlanningProblem, facts: Mapping[FactKey, Value]) -> list[Subgoal]:
+    """Conditions that do not hold in `facts`: first those whose object a hand holds already, last
+    those that leave an object in a hand.
     """
-    world = problem.world
-    held = {world.value(HOLDING, robot) for robot in world.team}
+    held = {facts.get(FactKey(HOLDING, robot)) for robot in problem.world.team}
     subgoals = [
         Subgoal(goal.goal, condition)
         for goal in sorted(problem.goals, key=lambda g: (-g.priority, g.ordinal, g.goal))
         for condition in goal.conditions
-        if not world.holds(condition)
+        if not condition_holds(facts, condition)
     ]
     return sorted(
         subgoals,

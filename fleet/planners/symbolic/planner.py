@@ -14,7 +14,7 @@ all robots that can, in parallel. What is found leads to the next revision.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from heapq import heapify, heappop, heappush
 from itertools import product
 from math import inf, prod
@@ -41,6 +41,8 @@ from keyexpr_schema.payloads.plans import Plan
 BIG_DAG, PER_GOAL, MONOLITHIC = "big-dag", "per-goal", "monolithic"
 MAX_COMBINATIONS = 64
 """Up to this many combinations are all compared; beyond, one sequence is changed at a time."""
+MAX_RESTORATIONS = 2
+"""How often what the sequences for later subgoals undid is reached again, where no plan does."""
 
 Choice = Sequence[ActionSequence]
 Cost = tuple[float, float]
@@ -55,26 +57,51 @@ class SymbolicPlanner(Planner):
 
     def _solve(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
         world = problem.world
-        facts: Facts = dict(world.facts)
-        options: list[Choice] = []
+        reached = _Reached(problem, dict(world.facts))
         unlocated: list[Subgoal] = []
-        settled: set[str] = set()
-        for subgoal in subgoals_in_order(problem):
-            found = alternatives_for(subgoal, facts, world, frozenset(settled))
-            if found is not None:
-                options.append(found.sequences)
-                facts = found.facts
-                if problem.strategy == MONOLITHIC:
-                    for action in found.sequences[0].actions:
-                        settled.update(action.participants)
-            elif _needs_locating(subgoal, facts, world):
-                unlocated.append(subgoal)
-            else:
+        for subgoal in subgoals_in_order(problem, world.facts):
+            if reached.add(subgoal):
+                continue
+            if not _needs_locating(subgoal, reached.facts, world):
                 return NoPlan(_no_way(subgoal, world))
+            unlocated.append(subgoal)
         explored = exploration_for(unlocated, problem) if unlocated else None
         if unlocated and explored is None:
             return NoPlan(_not_found(unlocated[0], problem))
-        return _choose(problem, options, explored)
+        made = _choose(problem, reached.options, explored)
+        for _ in range(MAX_RESTORATIONS):
+            undone = [s for s in subgoals_in_order(problem, reached.facts) if s not in unlocated]
+            if isinstance(made, CheckedPlan) or not (undone and all(map(reached.add, undone))):
+                break
+            restored = _choose(problem, reached.options, explored)
+            made = restored if isinstance(restored, CheckedPlan) else made
+        return made
+
+
+@dataclass
+class _Reached:
+    """Action sequences for one subgoal after the other, and the facts after the cheapest of each.
+
+    Robots of a flat list are `settled`: they start from where the sequence before left them.
+    """
+
+    problem: PlanningProblem
+    facts: Facts
+    options: list[Choice] = field(default_factory=list)
+    settled: set[str] = field(default_factory=set)
+
+    def add(self, subgoal: Subgoal) -> bool:
+        """Find sequences that reach one more subgoal; whether there are any."""
+        settled = frozenset(self.settled)
+        found = alternatives_for(subgoal, self.facts, self.problem.world, settled)
+        if found is None:
+            return False
+        self.options.append(found.sequences)
+        self.facts = found.facts
+        if self.problem.strategy == MONOLITHIC:
+            for action in found.sequences[0].actions:
+                self.settled.update(action.participants)
+        return True
 
 
 def _needs_locating(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:

@@ -19,7 +19,7 @@ from fleet.timeline.drawing.trails import CORNERS, Trail
 from fleet.timeline.drawing.utilisation import Utilisation
 from fleet.timeline.reader import rows
 from keyexpr_schema.payloads.tasks import TaskState
-from tests.timeline_mission import STEPS, record
+from tests.support.timeline_mission import STEPS, record
 
 
 def test_a_zenoh_timestamp_gives_its_wall_time() -> None:

@@ -12,7 +12,7 @@ from fleet.planners.base import PlanningProblem
 from fleet.service.composition import compose
 from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.payloads.goals import Goal
-from tests.household import bring, carrier, home, manipulator
+from tests.support.household import bring, carrier, home, manipulator
 
 PARTS = compose()
 PLACES = ("kitchen", "hallway", "living_room")

@@ -35,8 +35,9 @@ __all__ = [
 class SessionConfig:
     """Where the routers are, in which realm we act, and who we are.
 
-    `component` signs reports of undecodable values. `connect_timeout_s` None: wait for a router
-    for ever. `lease_s`: after this long without a sign of life the other side is gone.
+    `component` is `planner`, `worker-ROBOT`, `sim`, `recorder` or `robotctl`, anything else for a
+    program of one's own; it signs reports of undecodable values. `connect_timeout_s` None: wait for
+    a router for ever. `lease_s`: after this long without a sign of life the other side is gone.
     """
 
     endpoints: tuple[str, ...]
@@ -75,7 +76,7 @@ class Session:
 
     @property
     def component(self) -> str:
-        """Who we are."""
+        """The name that signs reports and refusals."""
         return self.config.component
 
     @property
@@ -167,7 +168,7 @@ class Session:
     async def list(self, key: Key[A, P], timeout_s: float = 3.0, **fixed: str | int) -> dict[A, P]:
         """Every stored value whose named address fields have these values, in order of address.
 
-        Values that do not decode are reported on the reject key and left out.
+        Values that do not decode are reported and left out.
 
         Raises:
             Unreachable: no router and store could be asked within `timeout_s`.

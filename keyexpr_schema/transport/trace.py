@@ -13,8 +13,6 @@ from typing import Any, Literal
 from keyexpr_schema.key import Key
 
 TRACE_VARIABLE = "ROBOTFLEET_TRACE"
-
-
 Operation = Literal["put", "delete", "read", "watch", "token", "watch-tokens", "query", "serve"]
 
 

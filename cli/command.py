@@ -61,9 +61,7 @@ class Call:
         """Whether data goes to stdout as JSON."""
         return self.settings.json
 
-    def session(
-        self, connect_timeout_s: float = CONNECT_TIMEOUT_S
-    ) -> AbstractAsyncContextManager[Session]:
+    def session(self) -> AbstractAsyncContextManager[Session]:
         """A session on the configured router; entering raises `Unreachable` if there is none."""
         from keyexpr_schema.transport.session import SessionConfig, open_session
 
@@ -72,7 +70,7 @@ class Call:
                 endpoints=self.settings.routers,
                 realm=self.settings.realm,
                 component="robotctl",
-                connect_timeout_s=connect_timeout_s,
+                connect_timeout_s=CONNECT_TIMEOUT_S,
             )
         )
 

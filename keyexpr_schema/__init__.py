@@ -42,7 +42,7 @@ else:
                 "AT HELD HOLDING LOCATED NOTHING ON SEARCHED FactKey Literal Value parse_literal "
                 "parse_value render_value"
             ),
-            "ids": "Id check_id slug",
+            "ids": "Id actor_arg check_id slug",
             "key": "Address Component Delivery Key Payload",
             "keyspace": (
                 "GOAL_SPEC GOAL_STATUS FACT STATEMENT STATEMENT_STATUS PLACE OBJECT ROBOT_SPEC "

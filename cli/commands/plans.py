@@ -171,7 +171,7 @@ async def show(
         plan = max(names, key=lambda n: (view.changed_s(n), n))
     check_known("plan", plan, names)
     name = plan
-    records = {task: record for (of, task), record in view.tasks.items() if of == name}
+    records = view.records(name)
     spec, status = view.plans.get(name), view.plan_status.get(name)
     idle = idle_report(spec, status, records.values(), view.robot_specs.values()) if spec else None
 

@@ -15,7 +15,7 @@ from rich.text import Text
 
 from cli.views.console import console, table
 from cli.views.plan_tree import plan_tree
-from cli.views.text import call, carried, doing, seconds
+from cli.views.text import carried, doing, seconds, skill_call
 from keyexpr_schema.payloads.goals import GoalStatus
 from keyexpr_schema.payloads.plans import PlanStatus
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -74,7 +74,7 @@ def change_line(what: object) -> tuple[float | None, str] | None:
         }.get(what.state, what.ended_s)
         attempt = f" (attempt {what.attempt})" if what.attempt > 1 else ""
         return time_s, (
-            f"{what.plan}/{what.task} {call(what.skill, what.args, what.robot)} "
+            f"{what.plan}/{what.task} {skill_call(what.skill, what.args, what.robot)} "
             f"{what.robot or what.actor}: {what.state.value}{attempt}{_because(what.reason)}"
         )
     if isinstance(what, GoalStatus):
@@ -101,16 +101,9 @@ def picture(view: FleetView, only: str | None = None) -> RenderableType:
     for name in sorted(view.plans):
         if only not in (None, name):
             continue
-        records = {task: record for (of, task), record in view.tasks.items() if of == name}
+        plan, status = view.plans[name], view.plan_status.get(name)
         parts.append(
-            plan_tree(
-                view.plans[name],
-                view.plan_status.get(name),
-                records,
-                view.goals,
-                view.goal_status,
-                clock,
-            )
+            plan_tree(plan, status, view.records(name), view.goals, view.goal_status, clock)
         )
     if not view.plans:
         waiting = ", ".join(view.goals) or "none"

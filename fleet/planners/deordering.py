@@ -38,9 +38,10 @@ def deordered(
     pins: dict[str, str] = {}
     actor_count = 0
     actors: dict[str, str] = {}
+    named = frozenset[str]().union(*(sequence.named for sequence in sequences))
     for sequence in sequences:
         if not one_actor_each:
-            actors = {}
+            actors, named = {}, sequence.named
         for action in sequence.actions:
             args = dict(action.args)
             for parameter in action.skill.robot_parameters:
@@ -50,7 +51,7 @@ def deordered(
                     # Names stay unique over the revisions of a plan, as the task numbers do.
                     revision = f"{first_task}-" if first_task > 1 else ""
                     actors[robot] = f"a{revision}{actor_count}"
-                    if robot in sequence.named:
+                    if robot in named:
                         pins[actors[robot]] = robot
                 args[parameter] = actor_arg(actors[robot])
             lifted = action.skill.ground(args)

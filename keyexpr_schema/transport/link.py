@@ -12,7 +12,7 @@ import contextlib
 import logging
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -37,12 +37,16 @@ class Replies:
     errors: list[str] = field(default_factory=list)
     timed_out: bool = False
 
-    def note_error(self, data: bytes) -> None:
-        """Take in the payload of an error reply."""
-        if data == _TIMED_OUT:
-            self.timed_out = True
-        else:
-            self.errors.append(data.decode(errors="replace"))
+    def add(self, reply: zenoh.Reply) -> None:
+        """Take in one reply, from any thread: a list takes appends from there."""
+        if reply.ok is not None:
+            self.values.append(read_sample(reply.ok))
+        elif reply.err is not None:
+            data = reply.err.payload.to_bytes()
+            if data == _TIMED_OUT:
+                self.timed_out = True
+            else:
+                self.errors.append(data.decode(errors="replace"))
 
 
 @dataclass(frozen=True)
@@ -54,20 +58,20 @@ class IncomingQuery(Encoded):
 
     async def reply(self, data: bytes, encoding: str) -> None:
         """Send the reply and end the query."""
-        await self.link.call(self._reply, data, encoding)
-
-    def _reply(self, data: bytes, encoding: str) -> None:
-        # A client whom the reply cannot reach any more sees that by its own timeout.
-        with contextlib.suppress(zenoh.ZError), self.query as query:
-            query.reply(self.keyexpr, data, encoding=encoding)
+        await self.link.call(
+            self._end, lambda: self.query.reply(self.keyexpr, data, encoding=encoding)
+        )
 
     async def refuse(self, reason: str) -> None:
         """Send an error reply and end the query."""
-        await self.link.call(self._refuse, reason)
+        await self.link.call(
+            self._end, lambda: self.query.reply_err(reason.encode(), encoding="text/plain")
+        )
 
-    def _refuse(self, reason: str) -> None:
-        with contextlib.suppress(zenoh.ZError), self.query as query:
-            query.reply_err(reason.encode(), encoding="text/plain")
+    def _end(self, send: Callable[[], object]) -> None:
+        # A client whom the reply cannot reach any more sees that by its own timeout.
+        with contextlib.suppress(zenoh.ZError), self.query:
+            send()
 
 
 class Link:
@@ -156,14 +160,9 @@ class Link:
                 done.set_result(None)
 
         def on_reply(reply: zenoh.Reply) -> None:
-            # On a network thread: a list takes appends from there, and one wake-up is enough.
-            sample = reply.ok
-            if sample is not None:
-                replies.values.append(read_sample(sample))
-                if first:
-                    self._call_soon(finish)
-            elif reply.err is not None:
-                replies.note_error(reply.err.payload.to_bytes())
+            replies.add(reply)
+            if first and reply.ok is not None:
+                self._call_soon(finish)
 
         def get() -> None:
             self._session.get(
@@ -185,27 +184,16 @@ class Link:
             replies.timed_out = True
         return replies
 
-    @asynccontextmanager
-    async def subscribed(
+    def subscribed(
         self, keyexpr: str, receive: Callable[[Sample], None]
-    ) -> AsyncIterator[None]:
+    ) -> AbstractAsyncContextManager[None]:
         """Call `receive` on the loop with every value and deletion that passes."""
+        callback = self._callback(receive)
+        return self._declared(lambda: self._session.declare_subscriber(keyexpr, callback))
 
-        def declare() -> zenoh.Subscriber[None]:
-            return self._session.declare_subscriber(
-                keyexpr,
-                handlers.Callback(  # type: ignore[arg-type]
-                    lambda sample: self._call_soon(receive, read_sample(sample)), indirect=False
-                ),
-            )
-
-        async with self._declared(declare):
-            yield
-
-    @asynccontextmanager
-    async def queryable(
+    def queryable(
         self, keyexpr: str, receive: Callable[[IncomingQuery], None]
-    ) -> AsyncIterator[None]:
+    ) -> AbstractAsyncContextManager[None]:
         """Call `receive` on the loop with every query for `keyexpr`."""
 
         def on_query(query: zenoh.Query) -> None:
@@ -215,57 +203,42 @@ class Link:
             if not self._call_soon(receive, incoming):
                 query.drop()  # type: ignore[no-untyped-call]
 
-        def declare() -> zenoh.Queryable[None]:
-            return self._session.declare_queryable(
-                keyexpr,
-                handlers.Callback(on_query, indirect=False),
-            )
-
-        async with self._declared(declare):
-            yield
+        callback = handlers.Callback(on_query, indirect=False)
+        return self._declared(lambda: self._session.declare_queryable(keyexpr, callback))
 
     # --- liveliness ------------------------------------------------------------------------------
 
-    @asynccontextmanager
-    async def token(self, keyexpr: str) -> AsyncIterator[None]:
+    def token(self, keyexpr: str) -> AbstractAsyncContextManager[None]:
         """Hold a liveliness token; Zenoh declares it again after every reconnection."""
-        async with self._declared(lambda: self._session.liveliness().declare_token(keyexpr)):
-            yield
+        return self._declared(lambda: self._session.liveliness().declare_token(keyexpr))
 
     async def tokens(self, keyexpr: str, timeout_s: float) -> Replies:
         """The liveliness tokens there are now."""
 
-        def get() -> list[zenoh.Reply]:
+        def get() -> Replies:
             # A channel of the default size deadlocks past 256 tokens when the session also has
             # a liveliness subscriber.
             channel: handlers.FifoChannel[zenoh.Reply] = handlers.FifoChannel(100_000)
-            return list(self._session.liveliness().get(keyexpr, channel, timeout=timeout_s))
+            replies = Replies()
+            for reply in self._session.liveliness().get(keyexpr, channel, timeout=timeout_s):
+                replies.add(reply)
+            return replies
 
-        replies = Replies()
-        for reply in await asyncio.to_thread(get):
-            if reply.ok is not None:
-                replies.values.append(read_sample(reply.ok))
-            elif reply.err is not None:
-                replies.note_error(reply.err.payload.to_bytes())
-        return replies
+        return await asyncio.to_thread(get)
 
-    @asynccontextmanager
-    async def tokens_watched(
+    def tokens_watched(
         self, keyexpr: str, receive: Callable[[Sample], None]
-    ) -> AsyncIterator[None]:
+    ) -> AbstractAsyncContextManager[None]:
         """Call `receive` on the loop with tokens that come (those there already, too) and go."""
+        callback = self._callback(receive)
+        return self._declared(
+            lambda: self._session.liveliness().declare_subscriber(keyexpr, callback, history=True)
+        )
 
-        def declare() -> zenoh.Subscriber[None]:
-            return self._session.liveliness().declare_subscriber(
-                keyexpr,
-                handlers.Callback(  # type: ignore[arg-type]
-                    lambda sample: self._call_soon(receive, read_sample(sample)), indirect=False
-                ),
-                history=True,
-            )
-
-        async with self._declared(declare):
-            yield
+    def _callback(self, receive: Callable[[Sample], None]) -> Any:
+        return handlers.Callback(
+            lambda sample: self._call_soon(receive, read_sample(sample)), indirect=False
+        )
 
     @asynccontextmanager
     async def _declared(self, declare: Callable[[], Any]) -> AsyncIterator[None]:

@@ -32,7 +32,7 @@ from keyexpr_schema.transport.samples import (
     timestamp_of_stamp,
 )
 from keyexpr_schema.transport.storage import Store, Write
-from keyexpr_schema.transport.trace import Operation, Trace
+from keyexpr_schema.transport.trace import Trace
 
 _log = logging.getLogger(__name__)
 CHANNEL = 10_000
@@ -52,7 +52,7 @@ def is_stored(keyexpr: str) -> bool:
 
 
 class _Storage:
-    """Subscribes for a `Store` and answers queries from it, on two threads."""
+    """Subscribes for a `Store` and replies to queries from it, on two threads."""
 
     def __init__(self, session: zenoh.Session, store: Store) -> None:
         self._session = session
@@ -62,11 +62,10 @@ class _Storage:
         # Not complete: a complete queryable on `**` would take queries away from those that
         # serve a key.
         self._queryable = session.declare_queryable("**", handlers.FifoChannel(CHANNEL))
-        journal = STORE_JOURNAL.build(StoreAddress())
-        Trace("store").note(Operation.SERVE, STORE_JOURNAL, journal)
+        Trace("store").note("serve", STORE_JOURNAL, STORE_JOURNAL.build(StoreAddress()))
         self._threads = [
-            threading.Thread(target=self._write, name="store-write"),
-            threading.Thread(target=self._answer, name="store-answer"),
+            threading.Thread(target=self._write_for_ever, name="store-write"),
+            threading.Thread(target=self._reply_for_ever, name="store-answer"),
         ]
         for thread in self._threads:
             thread.start()
@@ -78,7 +77,7 @@ class _Storage:
         for thread in self._threads:
             thread.join()
 
-    def _write(self) -> None:
+    def _write_for_ever(self) -> None:
         while True:
             try:
                 sample = self._subscriber.handler.recv()
@@ -121,7 +120,7 @@ class _Storage:
             )
         )
 
-    def _answer(self) -> None:
+    def _reply_for_ever(self) -> None:
         while True:
             try:
                 query = self._queryable.handler.recv()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ from keyexpr_schema.transport.queries import QueryServer, send_query
 from keyexpr_schema.transport.samples import decode_value, encoding_of
 from keyexpr_schema.transport.store_client import StoreClient
 from keyexpr_schema.transport.tokens import TokenChange, TokenWatch
-from keyexpr_schema.transport.trace import Operation, Trace
+from keyexpr_schema.transport.trace import Trace
 from keyexpr_schema.transport.undecodable import UndecodableReports
 from keyexpr_schema.transport.watch import Change, Watch
 
@@ -35,8 +35,9 @@ __all__ = [
 class SessionConfig:
     """Where the routers are, in which realm we act, and who we are.
 
-    `component` signs reports of undecodable values. `connect_timeout_s` None: wait for a router
-    for ever. `lease_s`: after this long without a sign of life the other side is gone.
+    `component` is `planner`, `worker-ROBOT`, `sim`, `recorder` or `robotctl`, anything else for a
+    program of one's own; it signs reports of undecodable values. `connect_timeout_s` None: wait for
+    a router for ever. `lease_s`: after this long without a sign of life the other side is gone.
     """
 
     endpoints: tuple[str, ...]
@@ -75,7 +76,7 @@ class Session:
 
     @property
     def component(self) -> str:
-        """Who we are."""
+        """The name that signs reports and refusals."""
         return self.config.component
 
     @property
@@ -111,7 +112,7 @@ class Session:
         A stream is dropped when the link is full, anything else waits its turn.
         """
         keyexpr = key.build(address)
-        self._trace.note(Operation.PUT, key, keyexpr)
+        self._trace.note("put", key, keyexpr)
         self.link.send_soon(
             keyexpr,
             key.encode(payload),
@@ -146,7 +147,7 @@ class Session:
         if not key.stored:
             raise TypeError(f"{key.name} is {key.delivery.value}: it cannot be confirmed")
         keyexpr = key.build(address)
-        self._trace.note(Operation.DELETE if data is None else Operation.PUT, key, keyexpr)
+        self._trace.note("delete" if data is None else "put", key, keyexpr)
         await self._store.write(key, keyexpr, data, timeout_s)
 
     # --- reading ---------------------------------------------------------------------------------
@@ -160,21 +161,21 @@ class Session:
         """
         self._check_stored(key)
         keyexpr = key.build(address)
-        self._trace.note(Operation.READ, key, keyexpr)
+        self._trace.note("read", key, keyexpr)
         samples = await self._store.list(keyexpr, timeout_s)
         return decode_value(key, samples[0]) if samples else None
 
     async def list(self, key: Key[A, P], timeout_s: float = 3.0, **fixed: str | int) -> dict[A, P]:
         """Every stored value whose named address fields have these values, in order of address.
 
-        Values that do not decode are reported on the reject key and left out.
+        Values that do not decode are reported and left out.
 
         Raises:
             Unreachable: no router and store could be asked within `timeout_s`.
         """
         self._check_stored(key)
         pattern = key.pattern(**fixed)
-        self._trace.note(Operation.READ, key, pattern)
+        self._trace.note("read", key, pattern)
         found: dict[A, P] = {}
         for sample in await self._store.list(pattern, timeout_s):
             try:
@@ -191,60 +192,52 @@ class Session:
         """Report a value that means nothing to us, once for each distinct one of a key."""
         self._undecodable.report(keyexpr, data, reason)
 
-    @asynccontextmanager
-    async def watch(
+    def watch(
         self, *selections: Key[Any, Any] | tuple[Key[Any, Any], dict[str, str | int]]
-    ) -> AsyncIterator[Watch]:
+    ) -> AbstractAsyncContextManager[Watch]:
         """Watch keys, or `(key, {field: value})`: first all that is stored, then what changes."""
         patterns = []
         for selection in selections:
             key, fixed = selection if isinstance(selection, tuple) else (selection, {})
             if key.delivery in (Delivery.TOKEN, Delivery.QUERY):
                 raise TypeError(f"{key.name} is a {key.delivery.value}: it cannot be watched")
-            pattern = key.pattern(**fixed)
-            self._trace.note(Operation.WATCH, key, pattern)
-            patterns.append((key, pattern))
-        async with Watch(self.link, self._store, self._undecodable, patterns).running() as watch:
-            yield watch
+            patterns.append((key, key.pattern(**fixed)))
+            self._trace.note("watch", *patterns[-1])
+        return Watch(self.link, self._store, self._undecodable, patterns).running()
 
     # --- tokens ----------------------------------------------------------------------------------
 
-    @asynccontextmanager
-    async def token(self, key: Key[A, Any], address: A) -> AsyncIterator[None]:
+    def token(self, key: Key[A, Any], address: A) -> AbstractAsyncContextManager[None]:
         """Be seen as alive at `address` until the block ends or the link is gone."""
         keyexpr = key.build(address)
-        self._trace.note(Operation.TOKEN, key, keyexpr)
-        async with self.link.token(keyexpr):
-            yield
+        self._trace.note("token", key, keyexpr)
+        return self.link.token(keyexpr)
 
-    @asynccontextmanager
-    async def watch_tokens(
+    def watch_tokens(
         self, key: Key[A, Any], debounce_s: float = 0.5, **fixed: str | int
-    ) -> AsyncIterator[TokenWatch[A]]:
+    ) -> AbstractAsyncContextManager[TokenWatch[A]]:
         """Watch who is alive; a token counts as lost when it stays away for `debounce_s`."""
         pattern = key.pattern(**fixed)
-        self._trace.note(Operation.WATCH_TOKENS, key, pattern)
-        async with TokenWatch(self.link, key, pattern, debounce_s).running() as watch:
-            yield watch
+        self._trace.note("watch-tokens", key, pattern)
+        return TokenWatch(self.link, key, pattern, debounce_s).running()
 
     # --- queries ---------------------------------------------------------------------------------
 
-    @asynccontextmanager
-    async def serve(
+    def serve(
         self,
         key: Key[A, P],
         handler: Callable[[A, P], Awaitable[Payload]],
         **fixed: str | int,
-    ) -> AsyncIterator[None]:
+    ) -> AbstractAsyncContextManager[None]:
         """Reply to queries until the block ends, several at a time.
 
         What `handler` raises becomes an error reply; the client sees its text.
         """
-        server = QueryServer(self.link, self.component, self._undecodable, key, handler)
         pattern = key.pattern(**fixed)
-        self._trace.note(Operation.SERVE, key, pattern)
-        async with server.running(pattern):
-            yield
+        self._trace.note("serve", key, pattern)
+        return QueryServer(self.link, self.component, self._undecodable, key, handler).running(
+            pattern
+        )
 
     async def query(self, key: Key[A, P], address: A, payload: P, timeout_s: float = 5.0) -> Any:
         """Query whoever serves `key` at `address`; the reply has the type `key.reply`.
@@ -252,5 +245,5 @@ class Session:
         Raises:
             NoReply: nobody serves it, it failed, or it took longer than `timeout_s`.
         """
-        self._trace.note(Operation.QUERY, key, key.build(address))
+        self._trace.note("query", key, key.build(address))
         return await send_query(self.link, key, address, payload, timeout_s)

@@ -19,7 +19,7 @@ from keyexpr_schema.keyspace import STORE_JOURNAL
 from keyexpr_schema.payloads.service import StoreAddress, StoreQuery
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.samples import Sample, encoding_of, stamp_of_text
-from keyexpr_schema.transport.trace import Operation, Trace
+from keyexpr_schema.transport.trace import Trace
 
 SETTLE_S = 0.5
 _RESEND_S = 0.25
@@ -124,7 +124,7 @@ class StoreClient:
     async def answers(self, timeout_s: float) -> bool:
         """Whether a store that keeps a journal answers now; a zenohd storage never does."""
         keyexpr = STORE_JOURNAL.build(StoreAddress())
-        self._trace.note(Operation.QUERY, STORE_JOURNAL, keyexpr)
+        self._trace.note("query", STORE_JOURNAL, keyexpr)
         replies = await self._link.query(
             keyexpr,
             timeout_s,

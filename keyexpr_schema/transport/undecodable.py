@@ -8,7 +8,7 @@ from keyexpr_schema.keyspace import UNDECODABLE
 from keyexpr_schema.payloads.service import UndecodableAddress, UndecodableValue
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.samples import encoding_of
-from keyexpr_schema.transport.trace import Operation, Trace
+from keyexpr_schema.transport.trace import Trace
 
 
 class UndecodableReports:
@@ -32,5 +32,5 @@ class UndecodableReports:
                 component=self._component, keyexpr=keyexpr, reason=reason, count=count + 1
             )
         )
-        self._trace.note(Operation.PUT, UNDECODABLE, where)
+        self._trace.note("put", UNDECODABLE, where)
         self._link.send_soon(where, payload, encoding_of(UNDECODABLE), block=True)

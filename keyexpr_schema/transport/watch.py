@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import asyncio
 from collections import OrderedDict
-from collections.abc import AsyncIterator
-from contextlib import AsyncExitStack, asynccontextmanager
+from collections.abc import AsyncIterator, Coroutine
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass
-from typing import Any, Generic
+from typing import Any, Generic, Self, TypeVar
 
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload, Unreachable
 from keyexpr_schema.key import A, Delivery, Key, P
@@ -23,6 +23,7 @@ from keyexpr_schema.transport.samples import Sample, decode_value, text_of_stamp
 from keyexpr_schema.transport.store_client import StoreClient
 from keyexpr_schema.transport.undecodable import UndecodableReports
 
+T = TypeVar("T")
 RELIST_S = 5.0
 """Period of re-listing while nothing seems wrong."""
 _RETRY_S = 0.2
@@ -99,7 +100,63 @@ class _Selection:
         return bool(self.missing)
 
 
-class Watch:
+class ChangeStream(Generic[T]):
+    """An async iterator that is filled in the background."""
+
+    def __init__(self) -> None:
+        self._ready: OrderedDict[object, T] = OrderedDict()
+        self._filled = asyncio.Event()
+        self._synced = asyncio.Event()
+        self._wake = asyncio.Event()
+        self._failure: BaseException | None = None
+
+    def __aiter__(self) -> Self:
+        return self
+
+    async def __anext__(self) -> T:
+        while not self._ready:
+            if self._failure is not None:
+                raise self._failure
+            self._filled.clear()
+            await self._filled.wait()
+        return self._ready.popitem(last=False)[1]
+
+    async def synced(self) -> None:
+        """Wait until everything that was there at the start was handed to the iterator once."""
+        await self._synced.wait()
+
+    def _add(self, change: T, instead_of: str | None = None) -> None:
+        """Queue `change`, in place of one that waits under the same name."""
+        slot = object() if instead_of is None else instead_of
+        self._ready.pop(slot, None)
+        self._ready[slot] = change
+        self._filled.set()
+
+    @asynccontextmanager
+    async def _in_background(self, work: Coroutine[Any, Any, None]) -> AsyncIterator[Self]:
+        task = asyncio.create_task(work)
+        task.add_done_callback(self._end)
+        try:
+            yield self
+        finally:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+    def _end(self, task: asyncio.Task[None]) -> None:
+        """A fault in the background must reach the reader, who would wait for ever."""
+        if not task.cancelled():
+            self._failure = task.exception()
+            self._filled.set()
+            self._synced.set()
+
+    async def _woken(self, timeout_s: float | None) -> None:
+        """Return when woken up, or after `timeout_s`."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(timeout_s):
+                await self._wake.wait()
+
+
+class Watch(ChangeStream[Change[Any, Any]]):
     """An async iterator of `Change`; made by `Session.watch`.
 
     Values of `STREAM` and `LATEST` keys that were not taken yet are replaced by newer ones of the
@@ -113,31 +170,11 @@ class Watch:
         undecodable: UndecodableReports,
         selections: list[tuple[Key[Any, Any], str]],
     ) -> None:
+        super().__init__()
         self.link, self.store, self.undecodable = link, store, undecodable
         self._selections = [_Selection(self, key, pattern) for key, pattern in selections]
-        self._ready: OrderedDict[object, Change[Any, Any]] = OrderedDict()
-        self._number = 0
         self.listings = 0
         """How often all that is stored was listed."""
-        self._filled = asyncio.Event()
-        self._synced = asyncio.Event()
-        self._wake = asyncio.Event()
-        self._failure: BaseException | None = None
-
-    def __aiter__(self) -> Watch:
-        return self
-
-    async def __anext__(self) -> Change[Any, Any]:
-        while not self._ready:
-            if self._failure is not None:
-                raise self._failure
-            self._filled.clear()
-            await self._filled.wait()
-        return self._ready.popitem(last=False)[1]
-
-    async def synced(self) -> None:
-        """Wait until everything that is stored was handed to the iterator once."""
-        await self._synced.wait()
 
     def relist(self) -> None:
         """List soon."""
@@ -145,12 +182,8 @@ class Watch:
 
     def deliver(self, keyexpr: str, change: Change[Any, Any]) -> None:
         """Queue `change` for the iterator."""
-        self._number += 1
         latest = change.key.delivery in (Delivery.STREAM, Delivery.LATEST)
-        slot: object = keyexpr if latest else self._number
-        self._ready.pop(slot, None)
-        self._ready[slot] = change
-        self._filled.set()
+        self._add(change, keyexpr if latest else None)
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[Watch]:
@@ -161,20 +194,7 @@ class Watch:
                     self.link.subscribed(selection.pattern, selection.offer)
                 )
             stack.enter_context(self.link.router.listening(self.relist))
-            task = asyncio.create_task(self._list_for_ever())
-            task.add_done_callback(self._end)
-            try:
-                yield self
-            finally:
-                task.cancel()
-                await asyncio.gather(task, return_exceptions=True)
-
-    def _end(self, task: asyncio.Task[None]) -> None:
-        """A fault of the listing must reach the reader, who would wait for ever."""
-        if not task.cancelled():
-            self._failure = task.exception()
-            self._filled.set()
-            self._synced.set()
+            yield await stack.enter_async_context(self._in_background(self._list_for_ever()))
 
     async def _list_for_ever(self) -> None:
         stored = [selection for selection in self._selections if selection.key.stored]
@@ -191,12 +211,4 @@ class Watch:
                 self._synced.set()
             except Unreachable:
                 again = True
-            await _wait(self._wake, _RETRY_S if again else RELIST_S)
-
-
-async def _wait(event: asyncio.Event, timeout_s: float) -> None:
-    try:
-        async with asyncio.timeout(timeout_s):
-            await event.wait()
-    except TimeoutError:
-        return
+            await self._woken(_RETRY_S if again else RELIST_S)

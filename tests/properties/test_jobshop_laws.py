@@ -22,7 +22,7 @@ from fleet.jobshop.rescheduling import WITHIN, reschedule, without_machines
 from fleet.jobshop.sequencing import sequences
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.jobshop.warm_start import warm_start
-from tests.searches import NEVER_S, steps
+from tests.support.searches import NEVER_S, steps
 
 NEAR = 1e-6
 TWO_THAT_MUST_BE_FIRST = Shop(

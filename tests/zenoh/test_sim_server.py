@@ -22,6 +22,7 @@ from sim.embodiment import SimEmbodiment
 from sim.files.mission_file import load_mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
 from sim.server.sim_server import SimServer
+from tests.support.router_process import RouterProcess
 from workers.embodiment import Embodiment
 from workers.errors import RobotUnreachable
 
@@ -208,7 +209,7 @@ async def test_an_unknown_robot_is_named_together_with_those_there_are(
 
 
 async def test_a_router_that_goes_away_ends_neither_world_nor_motion(
-    session_config: Make, router: Any
+    session_config: Make, router: RouterProcess
 ) -> None:
     async with served(session_config, speed=1.0, step_s=0.05, watchdog_s=1.0) as (backend, asker):
         body = SimEmbodiment(asker, "hsr", "i1", patience_s=20.0)
@@ -231,7 +232,7 @@ async def test_without_a_simulation_the_body_is_unreachable(session_config: Make
             await body.perform(LOOK)
 
 
-async def test_the_process_says_when_it_is_ready_and_ends_on_sigterm(router: Any) -> None:
+async def test_the_process_says_when_it_is_ready_and_ends_on_sigterm(router: RouterProcess) -> None:
     code = (
         "from sim.server.process import run_simulation; "
         f"run_simulation('two-cups', ({router.endpoint!r},), backend='kinematic', speed=None)"

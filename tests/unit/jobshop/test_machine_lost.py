@@ -7,7 +7,7 @@ from fleet.jobshop.instance import Instance
 from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.portfolio import solve
 from fleet.jobshop.rescheduling import WITHIN, reschedule, without_machines
-from tests.searches import steps
+from tests.support.searches import steps
 
 
 def test_a_lost_machine_moves_little() -> None:

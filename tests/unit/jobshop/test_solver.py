@@ -14,7 +14,7 @@ from fleet.jobshop.portfolio import solve
 from fleet.jobshop.problem import BadShop, Block, Machine, Operation, Shop
 from fleet.jobshop.rescheduling import without_machines
 from fleet.jobshop.time_budget import TimeBudget
-from tests.searches import NEVER_S, steps
+from tests.support.searches import NEVER_S, steps
 
 
 @pytest.mark.skipif(not installed(), reason="OR-Tools is an extra: cp-sat")

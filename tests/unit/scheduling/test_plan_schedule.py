@@ -12,7 +12,7 @@ from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
 from fleet.scheduling.plan_shop import AllocationContext
 from keyexpr_schema.ids import actor_arg, bound
 from keyexpr_schema.payloads.plans import Plan, Task
-from tests.household import bring, carrier, checked, fact, home, manipulator
+from tests.support.household import bring, carrier, checked, fact, home, manipulator
 
 CUP = {"object": "cup_1", "place": "kitchen"}
 

@@ -16,7 +16,7 @@ from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.session import open_session
 from keyexpr_schema.transport.storage import Write
-from tests.session_values import (
+from tests.support.session_values import (
     AT,
     fact,
     goal,

@@ -14,7 +14,7 @@ from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.world import Surface
-from tests.household import PLACES, SKILLS, at, carrier, cup, fact, home, manipulator
+from tests.support.household import PLACES, SKILLS, at, carrier, cup, fact, home, manipulator
 
 A1, A2 = "?a1", "?a2"
 

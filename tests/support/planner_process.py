@@ -34,7 +34,7 @@ from keyexpr_schema.payloads.robots import AliveAddress, RobotAddress
 from keyexpr_schema.payloads.tasks import Order, Report, ReportAddress, ReportState
 from keyexpr_schema.payloads.world import FactAddress, ObjectAddress, PlaceAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
-from tests.household import PLACES, SKILLS, cup, fact, manipulator
+from tests.support.household import PLACES, SKILLS, cup, fact, manipulator
 
 DEADLINE_S = 30.0
 

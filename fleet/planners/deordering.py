@@ -79,22 +79,15 @@ def _dependencies(rows: Sequence[tuple[str, Action]]) -> dict[str, set[str]]:
     readers: dict[FactKey, set[str]] = defaultdict(set)
     last: dict[str, str] = {}
     for name, action in rows:
-        befores: set[str] = set()
-        for literal in action.before:
-            if literal.variable in writer:
-                befores.add(writer[literal.variable])
-        for literal in action.after:
-            befores |= readers[literal.variable]
-            if literal.variable in writer:
-                befores.add(writer[literal.variable])
-        for robot in action.participants:
-            if robot in last:
-                befores.add(last[robot])
-            last[robot] = name
-        for literal in action.before:
-            readers[literal.variable].add(name)
-        for literal in action.after:
-            writer[literal.variable] = name
-            readers[literal.variable] = set()
-        after[name] = befores - {name}
+        reads = {literal.variable for literal in action.before}
+        writes = {literal.variable for literal in action.after}
+        befores = {writer[variable] for variable in reads | writes if variable in writer}
+        befores.update(*(readers[variable] for variable in writes))
+        befores |= {last[robot] for robot in action.participants if robot in last}
+        last.update(dict.fromkeys(action.participants, name))
+        for variable in reads:
+            readers[variable].add(name)
+        for variable in writes:
+            writer[variable], readers[variable] = name, set()
+        after[name] = befores
     return after

@@ -33,6 +33,7 @@ from fleet.allocators.llm import LlmAllocator
 from fleet.allocators.makespan import DEADLINE_S, MakespanAllocator
 from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.allocators.round_robin import RoundRobinAllocator
+from fleet.core.checker.checked_plan import CheckedPlan, check_plan
 from fleet.core.schedule.idle_time import predicted_unit, union_s
 from fleet.llm import LanguageModel, load_llm_config
 
@@ -97,10 +98,11 @@ def compare(
 ) -> list[Run]:
     """All allocators on one task graph."""
     home = household(scenario, seed)
-    plan, world = plan_of(home, strategy), world_of(home, clock)
+    checked = check_plan(plan_of(home, strategy), world_of(home, clock))
+    assert isinstance(checked, CheckedPlan), checked
     answers: dict[str, Allocated] = {}
     for allocator in compared:
-        answer = allocator.allocate(plan, world)
+        answer = allocator.allocate(checked)
         assert isinstance(answer, Allocated), (allocator.name, answer)
         answers[allocator.name] = answer
     bound_s = max(answer.lower_bound_s or 0.0 for answer in answers.values())
@@ -113,7 +115,7 @@ def compare(
             name,
             answer.schedule.makespan_s,
             bound_s,
-            predicted_unit(plan, answer.allocation).mean,
+            predicted_unit(checked.plan, answer.allocation).mean,
             1 - _work_s(answer) / (len(home.robots) * answer.schedule.makespan_s),
             max(0.0, 1 - _work_s(answer) / (len(home.robots) * bound_s)),
         )

@@ -55,7 +55,7 @@ def main() -> None:
         for size in given.sizes:
             for kind in given.kinds:
                 rows = [_row(kind, size, step, solver, given.limit_s) for solver in solvers]
-                table.add_row(step, size, kind, rows[0]["start"], *(row["told"] for row in rows))
+                table.add_row(step, size, kind, rows[0]["start"], *(row["result"] for row in rows))
     Console(width=150).print(table)
 
 
@@ -66,7 +66,7 @@ def _row(kind: str, size: str, step: str, solver: str, limit_s: float) -> dict[s
         command, capture_output=True, text=True, check=False, timeout=GIVEN_UP * limit_s
     )
     if ran.returncode:
-        return {"start": "", "told": f"ended with {ran.returncode}"}
+        return {"start": "", "result": f"ended with {ran.returncode}"}
     row: dict[str, str] = json.loads(ran.stdout.splitlines()[-1])
     return row
 
@@ -117,7 +117,7 @@ def measured(
     outcome = value(program.robots(values)) if values else "nothing"
     return {
         "start": value(start),
-        "told": f"{outcome} ({took_s:.1f} s{'' if proven else ', not proven'})",
+        "result": f"{outcome} ({took_s:.1f} s{'' if proven else ', not proven'})",
     }
 
 

@@ -3,52 +3,33 @@
 A plug-in derives from `Allocator`, or builds one of those here with options of its own.
 """
 
-from __future__ import annotations
+from typing import TYPE_CHECKING
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from keyexpr_schema.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from fleet.allocators.base import (
-        Allocated,
-        AllocationProblem,
-        Allocator,
-        Assignment,
-        Circumstances,
-        NotAllocated,
+    from fleet.allocators.base import Allocated as Allocated
+    from fleet.allocators.base import AllocationProblem as AllocationProblem
+    from fleet.allocators.base import Allocator as Allocator
+    from fleet.allocators.base import Assignment as Assignment
+    from fleet.allocators.base import NotAllocated as NotAllocated
+    from fleet.allocators.cost_based import CostBasedAllocator as CostBasedAllocator
+    from fleet.allocators.llm import LlmAllocator as LlmAllocator
+    from fleet.allocators.makespan import MakespanAllocator as MakespanAllocator
+    from fleet.allocators.min_max_load import MinMaxLoadAllocator as MinMaxLoadAllocator
+    from fleet.allocators.min_max_load import TieBreak as TieBreak
+    from fleet.allocators.round_robin import RoundRobinAllocator as RoundRobinAllocator
+    from fleet.scheduling.plan_shop import AllocationContext as AllocationContext
+else:
+    __all__, __getattr__ = lazy_names(
+        __name__,
+        {
+            "base": "Allocated AllocationProblem Allocator Assignment NotAllocated",
+            "cost_based": "CostBasedAllocator",
+            "llm": "LlmAllocator",
+            "makespan": "MakespanAllocator",
+            "min_max_load": "MinMaxLoadAllocator TieBreak",
+            "round_robin": "RoundRobinAllocator",
+            ".scheduling.plan_shop": "AllocationContext",
+        },
     )
-    from fleet.allocators.cost_based import CostBasedAllocator
-    from fleet.allocators.llm import LlmAllocator
-    from fleet.allocators.makespan import MakespanAllocator
-    from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
-    from fleet.allocators.round_robin import RoundRobinAllocator
-
-__all__ = [
-    "Allocated",
-    "AllocationProblem",
-    "Allocator",
-    "Assignment",
-    "Circumstances",
-    "CostBasedAllocator",
-    "LlmAllocator",
-    "MakespanAllocator",
-    "MinMaxLoadAllocator",
-    "NotAllocated",
-    "RoundRobinAllocator",
-    "TieBreak",
-]
-
-_MODULES = {
-    "CostBasedAllocator": "cost_based",
-    "LlmAllocator": "llm",
-    "MakespanAllocator": "makespan",
-    "MinMaxLoadAllocator": "min_max_load",
-    "RoundRobinAllocator": "round_robin",
-    "TieBreak": "min_max_load",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_MODULES.get(name, 'base')}"), name)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 
 from fleet.allocators.approach import first_destinations
 from fleet.allocators.balancing_problem import balancing_problem, named
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
-from fleet.allocators.infeasibility import explained
-from fleet.allocators.load_balancing.balance import balance
-from fleet.allocators.load_balancing.problem import NoAssignment
+from fleet.allocators.load_balancing.local_search import PartialAssignment
+from fleet.allocators.min_max_load import assign_balanced
 from keyexpr_schema.facts import AT, Value
 from keyexpr_schema.ids import actor_arg
 
@@ -35,50 +34,42 @@ def assign_in_rounds(problem: AllocationProblem) -> Assignment | NotAllocated:
     robot that is near all the time does more than its share. Where actors that must be apart leave
     no robot, loads decide instead, and a note says so.
     """
-    world = problem.world
-    conflicts = balancing_problem(problem).conflicts
-    names = tuple(problem.able)
-    conflicting = {names[a]: {names[other] for other in near} for a, near in enumerate(conflicts)}
-    destination, last_place = first_destinations(problem), _last_places(problem)
-    predecessors = _predecessors(problem)
-    where = {robot: world.value(AT, robot) for robot in world.team}
-    chosen: dict[str, str] = {}
-
-    def costs(actor: str) -> list[float]:
-        """For every robot of the team: its way to where the actor starts, s."""
-        able = set(problem.able[actor]) - {chosen.get(other) for other in conflicting[actor]}
-        to = destination.get(actor)
-        return [
-            UNABLE_S
-            if robot not in able
-            else 0.0
-            if to is None
-            else world.travel_s(robot, where[robot], to)
-            for robot in world.team
-        ]
-
-    while left := [actor for actor in problem.able if actor not in chosen]:
-        ready = [actor for actor in left if predecessors[actor] <= chosen.keys()] or left
-        bound = _cheapest(ready, world.team, [costs(actor) for actor in ready])
-        if not bound:
-            return _balanced_instead(problem, ready[0])
-        chosen.update(bound)
-        where.update({bound[actor]: last_place[actor] for actor in bound.keys() & last_place})
-    return Assignment(chosen)
-
-
-def _cheapest(
-    ready: Sequence[str], team: Sequence[str], costs: Sequence[Sequence[float]]
-) -> dict[str, str]:
-    """The cheapest choice of a different robot for as many of the actors as can have one."""
     from scipy.optimize import linear_sum_assignment
 
-    rows, columns = linear_sum_assignment(costs)
-    return {
-        ready[i]: team[j]
-        for i, j in zip(rows.tolist(), columns.tolist(), strict=True)
-        if costs[i][j] < UNABLE_S
-    }
+    world, names = problem.world, tuple(problem.able)
+    made = PartialAssignment(balancing_problem(problem))
+    destination, last_place = first_destinations(problem), _last_places(problem)
+    predecessors = _predecessors(problem)
+    bound: set[str] = set()
+    where = [world.value(AT, robot) for robot in world.team]
+
+    def costs(actor: int) -> list[float]:
+        """For every robot of the team: its way to where the actor starts, s."""
+        free, to = made.free(actor), destination.get(names[actor])
+        return [
+            UNABLE_S
+            if not free >> r & 1
+            else 0.0
+            if to is None
+            else world.travel_s(robot, where[r], to)
+            for r, robot in enumerate(world.team)
+        ]
+
+    while left := [actor for actor, robot in enumerate(made.robot) if robot < 0]:
+        ready = [actor for actor in left if predecessors[names[actor]] <= bound] or left
+        way_s = [costs(actor) for actor in ready]
+        rows, columns = linear_sum_assignment(way_s)
+        pairs = list(zip(rows.tolist(), columns.tolist(), strict=True))
+        if all(way_s[i][robot] >= UNABLE_S for i, robot in pairs):
+            return _balanced_instead(problem, names[ready[0]])
+        for i, robot in pairs:
+            if way_s[i][robot] < UNABLE_S:
+                actor = names[ready[i]]
+                made.assign(ready[i], robot)
+                bound.add(actor)
+                last = last_place.get(actor)
+                where[robot] = where[robot] if last is None else last
+    return Assignment(named(problem, made.robot))
 
 
 def _last_places(problem: AllocationProblem) -> dict[str, Value]:
@@ -109,11 +100,11 @@ def _predecessors(problem: AllocationProblem) -> dict[str, set[str]]:
 
 def _balanced_instead(problem: AllocationProblem, actor: str) -> Assignment | NotAllocated:
     """By load, where the rounds have left an actor without a robot; or why there is no way."""
-    found = balance(balancing_problem(problem))
-    if isinstance(found, NoAssignment):
-        return explained(problem, found)
+    found = assign_balanced(problem)
+    if isinstance(found, NotAllocated):
+        return found
     note = (
         "allocated by load and not by travel: after some rounds, every robot that can be actor "
         f"{actor} was one that it must be apart from"
     )
-    return Assignment(named(problem, found.robot), notes=(note,))
+    return replace(found, notes=(note, *found.notes))

@@ -13,7 +13,7 @@ NAMED = 6
 """So many names are listed; the rest are counted."""
 
 
-def explained(problem: AllocationProblem, found: NoAssignment) -> NotAllocated:
+def explanation(problem: AllocationProblem, found: NoAssignment) -> NotAllocated:
     """What load balancing came to, for people."""
     names = tuple(problem.able)
     clique = sorted(names[actor] for actor in found.clique)

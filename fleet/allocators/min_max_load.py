@@ -9,7 +9,7 @@ from enum import Enum
 from fleet.allocators.approach import approach_s
 from fleet.allocators.balancing_problem import balancing_problem, named
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
-from fleet.allocators.infeasibility import explained
+from fleet.allocators.infeasibility import explanation
 from fleet.allocators.load_balancing.balance import balance
 from fleet.allocators.load_balancing.problem import BalancedAssignment, NoAssignment
 from fleet.allocators.min_max_load_program import MinMaxLoadProgram, Status, max_load, solve
@@ -77,7 +77,7 @@ def assign_balanced(problem: AllocationProblem) -> Assignment | NotAllocated:
     small problems, and wherever the lower bound is met."""
     found = balance(balancing_problem(problem))
     if isinstance(found, NoAssignment):
-        return explained(problem, found)
+        return explanation(problem, found)
     robots = named(problem, found.robot)
     if found.optimal:
         return Assignment(robots)
@@ -106,18 +106,16 @@ def assign_with_least_travel(
             )
             return Assignment(named(problem, balanced.robot), notes=(note,))
     elif balanced.proven:
-        return explained(problem, balanced)
+        return explanation(problem, balanced)
     robots, proven = _least_max_load(problem, balanced, time_limit_s)
     if robots is None:
-        return explained(problem, NoAssignment(proven))
-    most = max_load(robots, problem.load)
-    left_s = min(TRAVEL_LIMIT_S, end_s - time.monotonic())
-    robots = _least_travel(problem, most, left_s) or robots
+        return explanation(problem, NoAssignment(proven))
+    robots = _least_travel(problem, robots, min(TRAVEL_LIMIT_S, end_s - time.monotonic()))
     if proven:
         return Assignment(robots)
     note = (
-        f"the busiest robot has {most} tasks, and the solver has not proven in its time that it "
-        "cannot have fewer"
+        f"the busiest robot has {max_load(robots, problem.load)} tasks, and the solver has not "
+        "proven in its time that it cannot have fewer"
     )
     return Assignment(robots, notes=(note,))
 
@@ -155,14 +153,21 @@ def _least_max_load(
     return robots, proven or max_load(robots, problem.load) == lower
 
 
-def _least_travel(problem: AllocationProblem, most: int, limit_s: float) -> dict[str, str] | None:
-    """Robots with the least travel of those with at most so many tasks; `None` if nothing hangs on
-    the choice, or none were found in time."""
+def _least_travel(
+    problem: AllocationProblem, known: dict[str, str], limit_s: float
+) -> dict[str, str]:
+    """Of the robots of which none has more tasks than in `known`, those with the least travel, if
+    the solver finds them in time; else the known ones."""
     travel_s = approach_s(problem)
     free = any(len({travel_s[a, r] for r in robots}) > 1 for a, robots in problem.able.items())
     if not free or limit_s <= 0:
-        return None
+        return known
     program = MinMaxLoadProgram(problem.able, problem.load, problem.apart)
-    program.minimise_travel(travel_s, most)
+    program.minimise_travel(travel_s, max_load(known, problem.load))
     found = solve(program.model, limit_s, TRAVEL_GAP)
-    return program.robots(found.values) if found.values else None
+    if not found.values:
+        return known
+    return min(
+        (program.robots(found.values), known),
+        key=lambda robots: sum(travel_s[pair] for pair in robots.items()),
+    )

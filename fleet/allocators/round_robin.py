@@ -6,7 +6,7 @@ from bisect import bisect_left
 
 from fleet.allocators.balancing_problem import balancing_problem, named
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
-from fleet.allocators.infeasibility import explained
+from fleet.allocators.infeasibility import explanation
 from fleet.allocators.load_balancing.local_search import PartialAssignment
 from fleet.allocators.load_balancing.problem import NoAssignment, overfull_clique
 from fleet.allocators.load_balancing.robot_sets import bits
@@ -52,7 +52,7 @@ def assign_in_turn(problem: AllocationProblem) -> Assignment | NotAllocated:
             continue
         untried.pop()
         if not actor or steps > MAX_STEPS:
-            return explained(problem, NoAssignment(not actor, overfull_clique(numbers)))
+            return explanation(problem, NoAssignment(not actor, overfull_clique(numbers)))
         actor -= 1
         made.assign(actor, -1)
     return Assignment(named(problem, made.robot))

@@ -92,7 +92,7 @@ def improve(made: PartialAssignment, relaxed: Sequence[int]) -> PartialAssignmen
     loads `relaxed`, below which there are none. `None` if an actor that has no robot finds none.
     """
     for actor in [a for a, robot in enumerate(made.robot) if robot < 0]:
-        if not _placed(made, actor):
+        if not _place(made, actor):
             return None
     left = LOCAL_STEPS
     moved = True
@@ -100,7 +100,7 @@ def improve(made: PartialAssignment, relaxed: Sequence[int]) -> PartialAssignmen
         moved = False
         for robot in sorted(range(len(made.loads)), key=lambda r: -made.loads[r]):
             while left > 0:
-                done, steps = _relieved(made, robot)
+                done, steps = _relieve(made, robot)
                 left -= steps
                 if not done:
                     break
@@ -108,7 +108,7 @@ def improve(made: PartialAssignment, relaxed: Sequence[int]) -> PartialAssignmen
     return made
 
 
-def _placed(made: PartialAssignment, actor: int) -> bool:
+def _place(made: PartialAssignment, actor: int) -> bool:
     """Find a robot for an actor without one, if need be by sending one other actor elsewhere."""
 
     def ranked(actor: int) -> list[int]:
@@ -131,7 +131,7 @@ def _placed(made: PartialAssignment, actor: int) -> bool:
     return False
 
 
-def _relieved(made: PartialAssignment, robot: int) -> tuple[bool, int]:
+def _relieve(made: PartialAssignment, robot: int) -> tuple[bool, int]:
     """Take load off a robot by the first change that evens out; whether, and the steps it took."""
     loads, load, able = made.loads, made.problem.load, made.problem.able
     steps = 0

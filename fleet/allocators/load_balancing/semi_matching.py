@@ -46,8 +46,8 @@ def semi_matching(counts: Sequence[int], able: Sequence[int], members: Sequence[
 def loads_of(flow: Flow, members: Sequence[int]) -> list[int]:
     """The loads of all robots, the greatest first."""
     loads: list[int] = []
-    for taken, size in zip(flow, members, strict=True):
-        even, more = divmod(sum(taken.values()), size)
+    for tasks, size in zip(flow, members, strict=True):
+        even, more = divmod(sum(tasks.values()), size)
         loads += [even + 1] * more + [even] * (size - more)
     return sorted(loads, reverse=True)
 
@@ -56,9 +56,9 @@ def robots_of(classes: Classes, flow: Flow) -> list[int]:
     """A robot for every actor of one task; a class deals its actors to its robots in turn."""
     robot = [0] * sum(map(len, classes.actors))
     queues = [iter(actors) for actors in classes.actors]
-    for taken, members in zip(flow, classes.robots, strict=True):
+    for tasks, members in zip(flow, classes.robots, strict=True):
         turn = cycle(members)
-        for i, count in taken.items():
+        for i, count in tasks.items():
             for actor in islice(queues[i], count):
                 robot[actor] = next(turn)
     return robot
@@ -70,7 +70,7 @@ class _ClassLoads:
     def __init__(self, members: Sequence[int]) -> None:
         self.members = members
         self.total = [0] * len(members)
-        self.tops = [0] * len(members)
+        self.busiest = [0] * len(members)
         """The loads of the busiest robots of the classes."""
         self.flow: Flow = [{} for _ in members]
         self._at: dict[int, int] = {0: (1 << len(members)) - 1}
@@ -104,13 +104,13 @@ class _ClassLoads:
 
     def add(self, i: int, j: int, some: int) -> None:
         """Give `some` more tasks of class `i` (or less, if negative) to robot class `j`."""
-        taken = self.flow[j]
-        taken[i] = taken.get(i, 0) + some
-        if not taken[i]:
-            del taken[i]
+        tasks = self.flow[j]
+        tasks[i] = tasks.get(i, 0) + some
+        if not tasks[i]:
+            del tasks[i]
         before = self.floor(j)
         self.total[j] += some
-        self.tops[j] = -(-self.total[j] // self.members[j])
+        self.busiest[j] = -(-self.total[j] // self.members[j])
         after = self.floor(j)
         if before == after:
             return
@@ -131,12 +131,12 @@ def _cancel_paths(loads: _ClassLoads, able: Sequence[int]) -> None:
     have loads of at most one less, their tasks cannot go elsewhere, and no path that comes in from
     outside can end there. They are settled, and the rest goes on without them.
     """
-    successors = [_able_classes(taken, able) for taken in loads.flow]
+    successors = [_able_classes(tasks, able) for tasks in loads.flow]
     open_classes = set(range(len(loads.members)))
     settled = 0
     while open_classes:
-        source = max(open_classes, key=loads.tops.__getitem__)
-        top = loads.tops[source]
+        source = max(open_classes, key=loads.busiest.__getitem__)
+        top = loads.busiest[source]
         if top <= 1:
             return
         path, seen = _path(source, successors, loads.up_to(top - 2), settled)
@@ -149,10 +149,10 @@ def _cancel_paths(loads: _ClassLoads, able: Sequence[int]) -> None:
             successors[j] = _able_classes(loads.flow[j], able)
 
 
-def _able_classes(taken: dict[int, int], able: Sequence[int]) -> int:
+def _able_classes(tasks: dict[int, int], able: Sequence[int]) -> int:
     """The robot classes that could do some of these tasks."""
     mask = 0
-    for i in taken:
+    for i in tasks:
         mask |= able[i]
     return mask
 
@@ -190,9 +190,9 @@ def _augment(path: Sequence[int], loads: _ClassLoads, able: Sequence[int]) -> No
     """
     steps = []
     for here, there in pairwise(path):
-        taken = loads.flow[here]
-        i = max((i for i in taken if able[i] >> there & 1), key=taken.__getitem__)
-        steps.append((here, there, i, taken[i]))
+        tasks = loads.flow[here]
+        i = max((i for i in tasks if able[i] >> there & 1), key=tasks.__getitem__)
+        steps.append((here, there, i, tasks[i]))
     first, last = path[0], path[-1]
     m, n = loads.members[first], loads.members[last]
     even = (loads.total[first] * n - loads.total[last] * m) // (m + n)

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 from fleet.allocators.base import Allocated, AllocationProblem, Assignment
 from fleet.allocators.cost_based import CostBasedAllocator, assign_in_rounds
-from fleet.core.checker.plan_checker import check_plan
-from tests.household import drives, fact, home, manipulator
+from tests.support.household import checked, drives, fact, home, manipulator
 
 TEAM = (manipulator("r1"), manipulator("r2"), manipulator("r3"))
 
@@ -22,11 +21,11 @@ def test_cost_based_sends_the_robot_that_is_there() -> None:
         ),
     )
     # The second drive waits for the first, so it is of the next round: r2 is still the nearest.
-    made = CostBasedAllocator().allocate(drives("", "", after={1: ("t0",)}), world)
+    made = CostBasedAllocator().allocate(checked(drives("", "", after={1: ("t0",)}), world))
     assert isinstance(made, Allocated)
     assert made.allocation == {"a0": "r2", "a1": "r2"}
     # In one round every robot takes one at most.
-    made = CostBasedAllocator().allocate(drives("", ""), world)
+    made = CostBasedAllocator().allocate(checked(drives("", ""), world))
     assert isinstance(made, Allocated)
     assert set(made.allocation.values()) == {"r2", "r3"}
 
@@ -36,9 +35,7 @@ def test_cost_based_says_so_where_its_rounds_leave_no_robot() -> None:
     world = home(TEAM[:2], facts=(fact("r1", "at", "kitchen"), fact("r2", "at", "hallway")))
     plan = drives("", "r1", after={1: ("t0",)})
     problem = AllocationProblem(
-        plan=plan,
-        world=world,
-        checked=check_plan(plan, world),
+        checked=checked(plan, world),
         able={"a0": ("r1", "r2"), "a1": ("r1",)},
         load={"a0": 1, "a1": 1},
         apart=frozenset({("a0", "a1")}),

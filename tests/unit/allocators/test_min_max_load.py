@@ -18,11 +18,10 @@ from fleet.allocators.min_max_load import (
     in_turn_instead,
 )
 from fleet.allocators.min_max_load_program import MinMaxLoadProgram, Status, max_load, solve
-from fleet.core.checker.plan_checker import check_plan
 from fleet.core.model.world import WorldModel
 from fleet.service.composition import compose
 from keyexpr_schema.payloads.plans import Violation
-from tests.household import drives, fact, home, manipulator
+from tests.support.household import checked, drives, fact, home, manipulator
 
 PLACES = ("kitchen", "hallway", "living_room")
 
@@ -38,9 +37,7 @@ def problem_of(world: WorldModel, *load: int) -> AllocationProblem:
     """An actor with so many tasks for each load; any robot can be any actor."""
     plan = drives(*[""] * len(load))
     return AllocationProblem(
-        plan=plan,
-        world=world,
-        checked=check_plan(plan, world),
+        checked=checked(plan, world),
         able={f"a{n}": tuple(world.team) for n in range(len(load))},
         load={f"a{n}": tasks for n, tasks in enumerate(load)},
         apart=frozenset(),
@@ -52,7 +49,7 @@ def test_the_milp_breaks_ties_by_travel() -> None:
         (manipulator("r1"), manipulator("r2")),
         facts=(fact("r1", "at", "living_room"), fact("r2", "at", "kitchen")),
     )
-    made = MinMaxLoadAllocator(TieBreak.TRAVEL).allocate(drives(""), world)
+    made = MinMaxLoadAllocator(TieBreak.TRAVEL).allocate(checked(drives(""), world))
     assert isinstance(made, Allocated)
     assert made.allocation == {"a0": "r2"}
 
@@ -76,7 +73,7 @@ def test_many_robots_that_are_alike_do_not_keep_the_solver_busy(
     monkeypatch.setattr(min_max_load, "TRAVEL_LIMIT_S", 600.0)
     problem = problem_of(team_of(20), *[1] * 202)
     travel_s = approach_s(problem)
-    balanced, near = assign_balanced(problem), assign_with_least_travel(problem)
+    balanced, near = assign_balanced(problem), assign_with_least_travel(problem, 600.0)
     assert isinstance(balanced, Assignment) and isinstance(near, Assignment)
     assert near.notes == ()
     assert max_load(balanced.allocation, problem.load) == 11

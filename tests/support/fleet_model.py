@@ -1,0 +1,247 @@
+"""A model of everything outside the planner's core, for tests of its laws: robots that carry out
+orders, fail, crash and come back, and a desk that plans. No key, no clock, no process.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from fleet.allocators.makespan import MakespanAllocator
+from fleet.core import events
+from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
+from fleet.core.events import Event, decode_event, encode_event
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.state import Policy, State
+from fleet.core.step import step
+from fleet.service.composition import Composition, compose
+from fleet.service.planning_job import run_planning_job
+from keyexpr_schema.facts import Value
+from keyexpr_schema.keyspace import ORDER
+from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.requests import PlanRequest
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskState
+from keyexpr_schema.payloads.world import Fact
+from tests.support.household import PLACES, SKILLS, cup
+
+_ALL = compose()
+PARTS: Composition = replace(
+    _ALL,
+    # What is searched for as long as there is time would differ from run to run.
+    allocators={**_ALL.allocators, "makespan": MakespanAllocator(deadline_s=0.0, exact=False)},
+)
+
+
+class FleetModel:
+    """Feeds events to the core and keeps what it publishes; checks the laws on the way."""
+
+    def __init__(self, robots: tuple[RobotSpec, ...], cups: int) -> None:
+        self.state = State()
+        self.journal: list[bytes] = []
+        self.documents: dict[str, Any] = {}
+        self.effects: list[Effect] = []
+        self.time_s = 0.0
+        self.wall_s = 1000.0
+        self.given: dict[tuple[str, str, int], str] = {}
+        """Robot of every attempt ever ordered."""
+        self.started: dict[tuple[str, str, int], float] = {}
+        """When each attempt was started."""
+        self.told: list[Report] = []
+        self._truth: dict[tuple[str, str], Value] = {}
+        self.tell(events.PlannerStarted, epoch=1, incarnation="one")
+        for place in PLACES:
+            self.tell(events.PlacePut, place=place)
+        for number in range(1, cups + 1):
+            self.tell(events.ObjectPut, object=cup(number))
+            self.learn(f"cup_{number}", "at", "kitchen")
+        for spec in robots:
+            self.tell(events.RobotRegistered, spec=spec)
+            self.tell(events.WorkerConnected, robot=spec.robot, incarnation="i1")
+            self.learn(spec.robot, "holding", "nothing")
+
+    # --- what happens to the planner -------------------------------------------------------------
+
+    def tell(self, kind: type[Event], **fields: Any) -> None:
+        """One event into the core; its effects are carried out, planning jobs at once."""
+        self.time_s += 1.0
+        self.wall_s += 0.01
+        self._apply(kind(time_s=self.time_s, wall_time_s=self.wall_s, **fields))
+
+    def _apply(self, event: Event) -> None:
+        before = self.state
+        self.state, effects = step(before, event, SKILLS)
+        if self.state is before:
+            assert effects == ()
+            return
+        self.journal.append(encode_event(event))
+        for plan, entry in self.state.plans.items():
+            old = before.plans.get(plan)
+            if old is not None and entry.plan.revision > old.plan.revision:
+                check_revision(old, entry)
+        self._take(effects)
+
+    def _take(self, effects: tuple[Effect, ...]) -> None:
+        self.effects.extend(effects)
+        # All of a step's effects are meant to hold together: what ends makes room for what begins.
+        for effect in sorted(effects, key=lambda e: not isinstance(e, Retract)):
+            if isinstance(effect, Publish):
+                keyexpr = effect.key.build(effect.address)
+                if effect.key is ORDER:
+                    self._check_order(effect.payload)
+                self.documents[keyexpr] = effect.payload
+            elif isinstance(effect, Retract):
+                self.documents.pop(effect.key.build(effect.address), None)
+        for effect in effects:
+            if isinstance(effect, MakePlan):
+                at = {"time_s": self.time_s, "wall_time_s": self.wall_s}
+                self._apply(run_planning_job(effect.job, self.state, PARTS, at))
+
+    def _check_order(self, order: Any) -> None:
+        assert isinstance(order, Order)
+        attempt = (order.plan, order.task, order.attempt)
+        assert self.given.setdefault(attempt, order.robot) == order.robot, (
+            "an attempt changed hands"
+        )
+        entry = self.state.plans[order.plan]
+        record = entry.records[order.task]
+        for before in (*record.after, *record.behind):
+            if before in entry.records:
+                assert entry.records[before].state.value == "succeeded", "ordered before its time"
+        busy = [
+            other
+            for other in self.orders()
+            if {other.robot, *other.args.values()} & {order.robot, *_robots(order, self.state)}
+            and _robots(other, self.state) & _robots(order, self.state)
+            and (other.plan, other.task) != (order.plan, order.task)
+        ]
+        assert not busy, f"{order.robot} is in two places"
+
+    def learn(self, subject: str, relation: str, value: Value) -> None:
+        """Something becomes true, and everybody hears of it."""
+        self._truth[relation, subject] = value
+        fact = Fact(
+            subject=subject, relation=relation, value=value, source="test", time_s=self.time_s
+        )
+        self.tell(events.FactPut, fact=fact)
+
+    def plan(self, *goals: Goal, **more: Any) -> None:
+        """Put goals and ask for a plan for all that wait."""
+        for goal in goals:
+            self.tell(events.GoalPut, goal=goal)
+        number = sum(b"PlanRequested" in line for line in self.journal)
+        self.tell(events.PlanRequested, request=PlanRequest(request=f"r{number}", **more))
+
+    # --- what robots do --------------------------------------------------------------------------
+
+    def orders(self) -> list[Order]:
+        """Orders that stand, in a fixed order."""
+        return [d for _, d in sorted(self.documents.items()) if isinstance(d, Order)]
+
+    def report(self, order: Order, state: ReportState, **more: Any) -> None:
+        """A worker reports on an order."""
+        report = Report(
+            robot=order.robot,
+            plan=order.plan,
+            revision=order.revision,
+            task=order.task,
+            attempt=order.attempt,
+            epoch=order.epoch,
+            incarnation="i1",
+            state=state,
+            **more,
+        )
+        self.told.append(report)
+        self.tell(events.ReportReceived, report=report)
+
+    def start(self, order: Order) -> None:
+        """A worker starts an attempt; nobody may ever start it again."""
+        attempt = (order.plan, order.task, order.attempt)
+        if attempt not in self.started:
+            self.started[attempt] = self.time_s
+            self.report(order, ReportState.STARTED, started_s=self.time_s)
+
+    def facts_after(self, order: Order) -> tuple[Fact, ...]:
+        """The facts that hold once the order has been carried out."""
+        action = SKILLS[order.skill].ground(order.args)
+        return tuple(
+            Fact(
+                subject=literal.variable.subject,
+                relation=literal.variable.relation,
+                value=literal.value,
+                source=order.robot,
+                time_s=self.time_s,
+            )
+            for literal in action.after
+        )
+
+    def succeed(self, order: Order) -> None:
+        """A robot carries an order out."""
+        self.start(order)
+        facts = self.facts_after(order)
+        for fact in facts:
+            self._truth[fact.relation, fact.subject] = fact.value
+        begun_s = self.started[order.plan, order.task, order.attempt]
+        self.report(
+            order, ReportState.SUCCEEDED, facts=facts, started_s=begun_s, ended_s=self.time_s
+        )
+
+    def fail(self, order: Order, reason: str = "it slipped") -> None:
+        """A robot has tried, and failed for good."""
+        self.start(order)
+        self.report(order, ReportState.FAILED, reason=reason, ended_s=self.time_s)
+
+    def interrupt(self, order: Order, done: bool) -> None:
+        """A worker crashed in the middle and is back; the work was done, or it was not."""
+        self.start(order)
+        facts = self.facts_after(order) if done else ()
+        self.report(order, ReportState.INTERRUPTED, facts=facts, ended_s=self.time_s)
+
+    def lose(self, robot: str) -> None:
+        """A robot goes away for so long that it counts as lost."""
+        self.tell(events.WorkerDisconnected, robot=robot, incarnation="i1")
+        self.wall_s += Policy().lost_after_s + 1.0
+        self.tell(events.TimerFired)
+
+    def return_(self, robot: str) -> None:
+        """A robot comes back."""
+        self.tell(events.WorkerConnected, robot=robot, incarnation="i1")
+
+    def finish(self, limit: int = 500) -> None:
+        """Robots carry out everything they are told, until there is no order left."""
+        for _ in range(limit):
+            orders = self.orders()
+            if not orders:
+                return
+            self.succeed(orders[0])
+        raise AssertionError("the plan does not come to an end")
+
+    # --- the planner crashes ---------------------------------------------------------------------
+
+    def crash(self) -> None:
+        """The planner is killed; its journal is replayed by a new run."""
+        state = State()
+        for line in self.journal:
+            state, _ = step(state, decode_event(line), SKILLS)
+        assert state == self.state, "the journal replays to another state"
+        self.state = state
+        self.tell(events.PlannerStarted, epoch=state.epoch + 1, incarnation="again")
+        self._take(effects_of(self.state))
+
+
+def check_revision(old: PlanEntry, new: PlanEntry) -> None:
+    """What a revision says of itself is so, and what it keeps of running work is left alone."""
+    assert new.change is not None
+    names = {task.task for task in new.plan.tasks}
+    unfinished = {n for n, r in old.records.items() if r.state in {TaskState.WAITING, *OUTSTANDING}}
+    done_already = {n for n in names if new.records[n].reason == "it is so already"}
+    assert new.change.dropped == len(unfinished - names), "dropped"
+    assert new.change.added == len(names - old.records.keys() - done_already), "added"
+    for name in names & old.records.keys():
+        was, now = old.records[name], new.records[name]
+        if was.state in OUTSTANDING and now.state in OUTSTANDING:
+            assert (was.robot, was.attempt) == (now.robot, now.attempt), "running work disturbed"
+
+
+def _robots(order: Order, state: State) -> set[str]:
+    return {order.robot} | {value for value in order.args.values() if value in state.robots}

@@ -1,0 +1,168 @@
+"""A planner process on a real router, and a person who plays the robots' part on their keys."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from keyexpr_schema.key import Address, Key
+from keyexpr_schema.keyspace import (
+    ANSWER,
+    FACT,
+    GOAL_SPEC,
+    GOAL_STATUS,
+    OBJECT,
+    ORDER,
+    PLACE,
+    PLAN_REQUEST,
+    PLAN_STATUS,
+    REPORT,
+    ROBOT_ALIVE,
+    ROBOT_SPEC,
+)
+from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState
+from keyexpr_schema.payloads.plans import PlanAddress, PlanState
+from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
+from keyexpr_schema.payloads.robots import AliveAddress, RobotAddress
+from keyexpr_schema.payloads.tasks import Order, Report, ReportAddress, ReportState
+from keyexpr_schema.payloads.world import FactAddress, ObjectAddress, PlaceAddress
+from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from tests.support.household import PLACES, SKILLS, cup, fact, manipulator
+
+DEADLINE_S = 30.0
+
+
+class PlannerProcess:
+    """`robotctl planner` as a process of its own."""
+
+    def __init__(self, endpoint: str, data: Path, *options: str) -> None:
+        self._command = [
+            sys.executable, "-m", "cli.main", "planner",
+            "--data", str(data), "--router", endpoint, "--realm", "test", *options,
+        ]  # fmt: skip
+        self.process: subprocess.Popen[str] | None = None
+
+    async def start(self) -> None:
+        self.process = subprocess.Popen(
+            self._command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        assert self.process.stdout is not None
+        line = await asyncio.to_thread(self.process.stdout.readline)
+        assert line.startswith("planner ready"), line
+
+    def kill(self) -> None:
+        assert self.process is not None
+        self.process.kill()
+        self.end()
+
+    def end(self) -> str:
+        """Wait for its end; what it said on stderr."""
+        assert self.process is not None
+        if self.process.poll() is None:
+            self.process.terminate()
+        _, said = self.process.communicate(timeout=10)
+        return said
+
+
+@asynccontextmanager
+async def planner(endpoint: str, data: Path, *options: str) -> AsyncIterator[PlannerProcess]:
+    process = PlannerProcess(endpoint, data, *options)
+    try:
+        await process.start()
+        yield process
+    finally:
+        if process.process is not None and process.process.poll() is None:
+            process.end()
+
+
+@asynccontextmanager
+async def person(endpoint: str) -> AsyncIterator[Session]:
+    """A session of somebody who has set up a household with one manipulator that is connected."""
+    config = SessionConfig(endpoints=(endpoint,), realm="test", component="person")
+    async with (
+        open_session(config) as session,
+        session.token(ROBOT_ALIVE, AliveAddress("hsr", "i1")),
+    ):
+        await session.confirm(ROBOT_SPEC, RobotAddress("hsr"), manipulator())
+        for place in PLACES:
+            await session.confirm(PLACE, PlaceAddress(place.place), place)
+        await session.confirm(OBJECT, ObjectAddress("cup_1"), cup(1))
+        for known in (fact("cup_1", "at", "kitchen"), fact("hsr", "holding", "nothing")):
+            await session.confirm(FACT, FactAddress.of(known.key), known)
+        yield session
+
+
+async def until(look: Callable[[], Awaitable[Any]], what: str) -> Any:
+    """The first true answer of `look`."""
+    try:
+        async with asyncio.timeout(DEADLINE_S):
+            while not (found := await look()):
+                await asyncio.sleep(0.02)
+            return found
+    except TimeoutError:
+        pytest.fail(f"{what} did not come within {DEADLINE_S:g} s")
+
+
+async def value(session: Session, key: Key[Any, Any], address: Address, **fields: Any) -> Any:
+    """Wait until the value at a key has these fields."""
+
+    async def look() -> Any:
+        found = await session.get(key, address)
+        if found is not None and all(getattr(found, k) == v for k, v in fields.items()):
+            return found
+        return None
+
+    return await until(look, f"{key.build(address)} with {fields}")
+
+
+async def ask_for_plan(
+    session: Session, text: str = "Bring cup 1 to the hallway", by: str = "symbolic"
+) -> None:
+    await session.confirm(GOAL_SPEC, GoalAddress("g"), Goal(goal="g", text=text))
+    await value(session, GOAL_STATUS, GoalAddress("g"), state=GoalState.WAITING)
+    request = PlanRequest(request="r", plan="p", planner=by)
+    await session.confirm(PLAN_REQUEST, RequestAddress("r"), request)
+    await value(session, ANSWER, RequestAddress("r"), accepted=True)
+
+
+async def next_order(session: Session, done: set[str]) -> Order:
+    async def look() -> Order | None:
+        orders = await session.list(ORDER, robot="hsr")
+        return next((o for o in orders.values() if o.task not in done), None)
+
+    order = await until(look, "an order")
+    assert isinstance(order, Order)
+    return order
+
+
+async def carry_out(session: Session, order: Order, took_s: float | None = None) -> None:
+    """Report an order as done, with the facts that follow, and perhaps how long it took."""
+    facts = tuple(
+        fact(literal.variable.subject, literal.variable.relation, str(literal.value), order.robot)
+        for literal in SKILLS[order.skill].ground(order.args).after
+    )
+    report = Report(
+        robot=order.robot, plan=order.plan, revision=order.revision, task=order.task,
+        attempt=order.attempt, epoch=order.epoch, incarnation="i1",
+        state=ReportState.SUCCEEDED, facts=facts,
+        started_s=None if took_s is None else 100.0, ended_s=100.0 + (took_s or 0.0),
+    )  # fmt: skip
+    await session.confirm(
+        REPORT, ReportAddress(order.robot, order.plan, order.task, order.attempt), report
+    )
+
+
+async def finish(session: Session, done: set[str], took_s: float | None = None) -> None:
+    while len(done) < 4:
+        order = await next_order(session, done)
+        done.add(order.task)
+        await carry_out(session, order, took_s)
+    await value(session, PLAN_STATUS, PlanAddress("p"), state=PlanState.SUCCEEDED)
+    await value(session, GOAL_STATUS, GoalAddress("g"), state=GoalState.REACHED)

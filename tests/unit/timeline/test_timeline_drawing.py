@@ -19,6 +19,7 @@ from fleet.timeline.drawing.trails import CORNERS, Trail
 from fleet.timeline.drawing.utilisation import Utilisation
 from fleet.timeline.reader import rows
 from keyexpr_schema.payloads.tasks import TaskState
+from tests.support.reached import Reached, reaches
 from tests.support.timeline_mission import STEPS, record
 
 
@@ -68,16 +69,27 @@ def nodes() -> st.SearchStrategy[list[Node]]:
         st.lists(st.sampled_from([*names, "unknown"]), max_size=4),
         st.text(max_size=20),
     )
-    return st.lists(node, max_size=12).map(
-        lambda many: [
-            Node(task=name, label=f"{text}\nx", state=TaskState.WAITING, lane=lane, after=tuple(a))
-            for name, (lane, a, text) in zip(names, many, strict=False)
-        ]
+    return st.builds(
+        lambda many, ordered: [
+            Node(
+                task=name,
+                label=f"{text}\nx",
+                state=TaskState.WAITING,
+                lane=lane,
+                after=tuple(a for a in after if not ordered or a in (*names[:number], "unknown")),
+            )
+            for number, (name, (lane, after, text)) in enumerate(zip(names, many, strict=False))
+        ],
+        st.lists(node, max_size=12),
+        st.booleans(),
     )
 
 
+@reaches("dependencies", "a circle")
 @given(nodes())
-def test_no_two_nodes_overlap_and_dependencies_point_down(drawn: list[Node]) -> None:
+def test_no_two_nodes_overlap_and_dependencies_point_down(
+    reached: Reached, drawn: list[Node]
+) -> None:
     places = layout(drawn)
     assert set(places) == {node.task for node in drawn}
     width = {n.task: 7.0 * max(map(len, n.label.split("\n"))) for n in drawn}
@@ -92,7 +104,10 @@ def test_no_two_nodes_overlap_and_dependencies_point_down(drawn: list[Node]) -> 
         for node in drawn:
             for first in node.after:
                 if first in places:
+                    reached["dependencies"] += 1
                     assert places[first][1] < places[node.task][1]
+    else:
+        reached["a circle"] += 1
 
 
 @settings(deadline=None)

@@ -68,7 +68,7 @@ def main() -> None:
         table.add_row(
             (happens.__doc__ or "").split(".")[0],
             f"{made.planning_time_s:.2f} s",
-            f"{made.makespan_s:.0f} s",
+            f"{made.predicted_makespan_s:.0f} s",
             least,
             str(moved) if made.repaired else "",
             *changes,

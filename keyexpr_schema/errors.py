@@ -11,6 +11,10 @@ class InvalidId(SchemaError):
     """A name cannot be a chunk of a key expression."""
 
 
+class BrokenPlugIn(SchemaError):
+    """An installed package offers something that cannot be used; the message names both."""
+
+
 class ForeignKey(SchemaError):
     """A key expression does not belong to the key that was asked to parse it."""
 

@@ -8,17 +8,22 @@ action client, or a vendor's API.
 To put a real robot behind it, map each `MotionKind` to what the robot offers (`GO_TO` and
 `APPROACH` to its navigation, `LOOK` to its detector, `GRASP`, `RELEASE`, `RELEASE_IN_BASKET` and
 `STOW` to its arm), and answer a kind that the robot does not have with a `FAILED` outcome whose
-`reason` says so. Then pass a factory of it to `workers.process.run`.
+`reason` says so. Then offer a factory of it as an entry point in the group
+`robotfleet.embodiments` (`robotctl worker --embodiment NAME`), or pass it to `run_worker`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from keyexpr_schema.payloads.motions import Motion, MotionOutcome, Senses
 from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.plug_ins import load_plug_in
 from keyexpr_schema.transport.session import Session
+
+EMBODIMENTS = "robotfleet.embodiments"
+"""Entry-point group: each entry is an `EmbodimentFactory`."""
 
 
 @runtime_checkable
@@ -74,3 +79,18 @@ class Embodiment(Protocol):
 EmbodimentFactory = Callable[[Session, RobotSpec, str], Embodiment]
 """`(session, spec, incarnation) -> Embodiment`. `incarnation` names this run of the worker: a
 driver that is told of a new one stops what an older one had begun."""
+
+
+def installed_embodiment(name: str) -> EmbodimentFactory:
+    """The factory that an installed package offers by that name.
+
+    Raises:
+        BrokenPlugIn: there is none, or it is not callable.
+    """
+
+    def accept(offered: Any) -> EmbodimentFactory:
+        if not callable(offered):
+            raise TypeError(f"{offered!r} is no EmbodimentFactory: it cannot be called")
+        return offered  # type: ignore[no-any-return]
+
+    return load_plug_in(EMBODIMENTS, name, accept)

@@ -37,14 +37,15 @@ def run(
     """Be the worker of `robot` until SIGTERM or SIGINT; then stop the robot and return.
 
     Waits for a router, and for the robot's spec to be registered. Skills are `skills` and those
-    that installed packages offer. The order journal is `data_dir/{robot}.journal`. Logs go to
-    stderr; the line `worker {robot} ready (incarnation …)` to stdout.
+    that installed packages offer (see `SkillRegistry.installed`). The order journal is
+    `data_dir/{robot}.journal`. Logs go to stderr; the line `worker {robot} ready (incarnation …)`
+    to stdout.
 
     Raises:
         InvalidId: `robot` or `realm` cannot stand in a key.
         JournalBusy: another worker runs for this robot on the same `data_dir`.
         JournalUnreadable: the journal's file is something else.
-        BadSkill: an installed package offers something as a skill that is none.
+        BadSkill: two of `skills` share a name.
     """
     check_id(robot, "robot")
     config = SessionConfig(
@@ -53,10 +54,10 @@ def run(
         component=f"worker-{robot}",
         connect_timeout_s=None,
     )
-    registry = SkillRegistry.installed(skills)
     logging.basicConfig(
         stream=sys.stderr, level=logging.INFO, format=f"{robot}: %(levelname)s: %(message)s"
     )
+    registry = SkillRegistry.installed(skills)
     with Journal(data_dir / f"{robot}.journal") as journal:
         asyncio.run(_main(robot, config, journal, registry, embodiment_factory))
 

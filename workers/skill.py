@@ -7,16 +7,16 @@ import math
 from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.ids import check_id
+from keyexpr_schema.plug_ins import load_plug_ins
 from workers.context import SkillContext
 from workers.errors import BadArguments, BadSkill, UnknownSkill
 from workers.world_cache import WorldCache
 
-ENTRY_POINTS = "robotfleet.skills"
+SKILLS = "robotfleet.skills"
 """Entry-point group: each entry is a `Skill`, or a tuple or list of them."""
 
 ROBOT_ARGUMENT = "robot"
@@ -149,27 +149,26 @@ class SkillRegistry:
 
     @classmethod
     def installed(cls, builtin: Iterable[Skill]) -> SkillRegistry:
-        """`builtin` skills, and those that installed packages offer as entry points.
+        """`builtin` skills, and those of installed packages; broken ones are logged and left out.
 
         Raises:
-            BadSkill: an entry point does not load, or is not a skill.
+            BadSkill: two of `builtin` share a name.
         """
-        found = list(builtin)
-        for entry in entry_points(group=ENTRY_POINTS):
-            found.extend(_load(entry))
-        return cls(found)
+        registry = cls(builtin)
+        load_plug_ins(SKILLS, registry._add_offered)
+        return registry
 
+    def _add_offered(self, offered: Any) -> None:
+        """Add the skill or skills that a plug-in offers: all, or none.
 
-def _load(entry: EntryPoint) -> tuple[Skill, ...]:
-    try:
-        offered = entry.load()
-    except Exception as error:  # a stranger's package: whatever its import raises
-        raise BadSkill(f"skill entry point {entry.name!r} does not load: {error!r}") from error
-    skills = tuple(offered) if isinstance(offered, (tuple, list)) else (offered,)
-    for one in skills:
-        if not isinstance(one, Skill):
-            raise BadSkill(f"skill entry point {entry.name!r} offers {one!r}, which is no @skill")
-    return skills
+        Raises:
+            BadSkill: it offers something else, or a skill of a name that is there already.
+        """
+        skills = tuple(offered) if isinstance(offered, (tuple, list)) else (offered,)
+        for one in skills:
+            if not isinstance(one, Skill):
+                raise BadSkill(f"it offers {one!r}, which is no @skill")
+        self._skills = {one.name: one for one in SkillRegistry([*self, *skills])}
 
 
 def _argument(what: str, kind: ParameterKind, text: str, world: WorldCache) -> str | float:

@@ -20,6 +20,8 @@ sim_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 record_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 
 T = TypeVar("T")
+SIM = "sim"
+"""The embodiment that is not a plug-in."""
 BACKENDS = ("mujoco", "kinematic")
 
 DataOption = Annotated[
@@ -124,20 +126,26 @@ def worker(
     data: DataOption = None,
     embodiment: Annotated[
         str, typer.Option("--embodiment", help="What drives the robot; `sim` or a plug-in's name.")
-    ] = "sim",
+    ] = SIM,
 ) -> None:
     """Run one robot's worker: it takes orders and carries them out."""
     from cli.demo.child_processes import end_with_parent
-    from cli.embodiments import embodiment_factory
+    from cli.errors import check_known
+    from keyexpr_schema.plug_ins import plug_in_names
+    from sim.embodiment import sim_embodiment
+    from workers.embodiment import EMBODIMENTS, installed_embodiment
     from workers.process import run
 
+    check_known("embodiment", embodiment, [SIM, *plug_in_names(EMBODIMENTS)])
     end_with_parent()
     run(
         robot=robot,
         endpoints=call.settings.routers,
         realm=call.settings.realm,
         data_dir=data_folder(data, f"worker-{robot}", call.settings.realm),
-        embodiment_factory=embodiment_factory(embodiment),
+        embodiment_factory=(
+            sim_embodiment if embodiment == SIM else installed_embodiment(embodiment)
+        ),
     )
 
 

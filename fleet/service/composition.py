@@ -1,14 +1,12 @@
 """The one place where concrete planners, allocators and skill files are named.
 
-A user's package adds its own by the entry point groups `robotfleet.planners` and
-`robotfleet.allocators` (classes without constructor arguments).
+An installed package adds its own as plug-ins; one that is broken is logged and left out.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +20,7 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.allocators.milp import MilpAllocator
 from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.core.model.skills import SkillModel, skills_from_data
-from fleet.errors import BadSkillFile, FleetError
+from fleet.errors import BadSkillFile
 from fleet.llm.configuration import load_llm_config
 from fleet.llm.conversation import LanguageModel
 from fleet.planners.base import Planner
@@ -30,9 +28,13 @@ from fleet.planners.llm.interpreter import LlmInterpreter
 from fleet.planners.llm.planner import LlmPlanner
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from keyexpr_schema.config_files import config_file
+from keyexpr_schema.plug_ins import load_plug_ins
 
 SKILL_MODELS = "robotfleet.skill_models"
-"""Entry points to mappings such as the YAML of a skill file holds: `{"skills": {name: model}}`."""
+"""Entry-point group: paths of skill files, or mappings such as one holds, `{"skills": {…}}`."""
+PLANNERS = "robotfleet.planners"
+ALLOCATORS = "robotfleet.allocators"
+"""Entry-point groups: each entry is a class (of a `Planner`, an `Allocator`) without arguments."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,6 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
     Raises:
         BadSkillFile: a file cannot be read, or two files model the same skill.
         BadLlmConfig: the language model's configuration or prompts cannot be used.
-        FleetError: an installed package offers something that is not a planner or an allocator.
     """
     symbolic = SymbolicPlanner()
     model = LanguageModel(load_llm_config(llm_file))
@@ -76,14 +77,10 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
         LlmAllocator(model, MakespanAllocator()),
     )
     allocators = {allocator.name: allocator for allocator in own}
-    for found in _from_packages("robotfleet.planners"):
-        if not isinstance(found, Planner):
-            raise FleetError(f"{type(found).__name__}, installed as a planner, is not a Planner")
-        planners[found.name] = found
-    for found in _from_packages("robotfleet.allocators"):
-        if not isinstance(found, Allocator):
-            raise FleetError(f"{type(found).__name__}, installed as an allocator, is not one")
-        allocators[found.name] = found
+    for planner in load_plug_ins(PLANNERS, _planner):
+        planners[planner.name] = planner
+    for allocator in load_plug_ins(ALLOCATORS, _allocator):
+        allocators[allocator.name] = allocator
     skills = load_all_skills(skill_files)
     interpreter = LlmInterpreter(model, skills)
     return Composition(skills, planners, allocators, model, interpreter, symbolic)
@@ -95,20 +92,25 @@ def load_all_skills(skill_files: tuple[Path, ...] = ()) -> dict[str, SkillModel]
     A file or a package may model a skill of the household anew; two of them not the same one.
 
     Raises:
-        BadSkillFile: a file or a package offers something that is no skill model, or two model the
-            same skill.
+        BadSkillFile: a file cannot be read, or models a skill that another or a package does.
     """
-    sources = [
-        (f"entry point {entry.name}", skills_from_data(entry.load(), f"entry point {entry.name}"))
-        for entry in entry_points(group=SKILL_MODELS)
-    ]
-    sources += [(str(path), load_skills(path)) for path in skill_files]
     added: dict[str, SkillModel] = {}
-    for where, models in sources:
-        for name, skill in models.items():
-            if name in added:
-                raise BadSkillFile(f"{where}: skill {name} is already modelled elsewhere")
-            added[name] = skill
+
+    def add(where: str, models: Mapping[str, SkillModel]) -> None:
+        if twice := sorted(added.keys() & models):
+            raise BadSkillFile(f"{where}: skill {twice[0]} is already modelled elsewhere")
+        added.update(models)
+
+    def offered(models: Any) -> None:
+        where = "its skill models"
+        if isinstance(models, Path):
+            add(where, load_skills(models))
+        else:
+            add(where, skills_from_data(models, where))
+
+    load_plug_ins(SKILL_MODELS, offered)
+    for path in skill_files:
+        add(str(path), load_skills(path))
     return {**load_skills(config_file("skills", "household")), **added}
 
 
@@ -127,5 +129,13 @@ def load_skills(path: Path) -> dict[str, SkillModel]:
     return skills_from_data(data, str(path))
 
 
-def _from_packages(group: str) -> list[Any]:
-    return [entry.load()() for entry in entry_points(group=group)]
+def _planner(offered: Any) -> Planner:
+    if not isinstance(made := offered(), Planner):
+        raise TypeError(f"it makes {made!r}, which is no Planner")
+    return made
+
+
+def _allocator(offered: Any) -> Allocator:
+    if not isinstance(made := offered(), Allocator):
+        raise TypeError(f"it makes {made!r}, which is no Allocator")
+    return made

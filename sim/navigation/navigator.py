@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from operator import itemgetter
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.errors import NoPath, NoStance
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation.clearance import Clearance, segment_gap
-from sim.navigation.lattice import Lattice
+from sim.navigation.lattice import TRACKING_M, Lattice
 from sim.navigation.spots import Dock, Spots
 from sim.navigation.steering import Leg, passed, steer
 from sim.navigation.traffic import Traffic, Traveller
@@ -204,20 +205,21 @@ class Navigator:
         if alone:
             return alone[0]
 
-        def room(dock: Dock) -> float:
-            node = self._lattice.points_m[dock.node]
-            return min(
-                segment_gap(
-                    (dock.point_m, (float(node[0]), float(node[1]))),
-                    (other.parked.point_m, self._lattice.points_m[other.track[0]]),
-                )
-                - radius_m
-                - other.radius_m
-                for other in others
-                if other.parked is not None
-            )
+        return max(
+            docks, key=lambda dock: min(self._gap_m(dock, radius_m, other) for other in others)
+        )
 
-        return max(docks, key=room)
+    def _gap_m(self, dock: Dock, radius_m: float, other: Traveller) -> float:
+        """Least distance between a robot on its way into a stance and one at, or on its way, m.
+
+        Nodes do not tell: beside the lattice there may be none between two stances.
+        """
+        stance = other.parked or other.dock
+        if stance is None:
+            return math.inf
+        points = self._lattice.points_m
+        ways = ((dock.point_m, points[dock.node]), (stance.point_m, points[stance.node]))
+        return segment_gap(*ways) - radius_m - other.radius_m
 
     def _resolve(self, name: str) -> None:
         """Choose the spot or stance to go to, or another one if somebody stands there now."""
@@ -283,8 +285,9 @@ class Navigator:
         traveller = self._robots[name]
         here = self._poses[name]
         parked = traveller.parked
-        best: tuple[float, Dock] | None = None
-        idle = [o for o in self._robots.values() if o is not traveller and o.goal is None]
+        others = [other for other in self._robots.values() if other is not traveller]
+        idle = [other for other in others if other.goal is None]
+        choices: list[tuple[float, Dock]] = []
         for dock in task.docks:
             if (
                 parked is not None
@@ -301,13 +304,15 @@ class Navigator:
                 for other in idle
             ):
                 continue
-            cost = around[dock.node] + dock.cost_m
-            if math.isfinite(cost) and (best is None or cost < best[0]):
-                best = (cost, dock)
-        if best is not None:
-            traveller.goal, traveller.dock = best[1].node, best[1]
-            traveller.since_s = self._time_s
-            self._yaws[name] = best[1].yaw_rad
+            if math.isfinite(cost := around[dock.node] + dock.cost_m):
+                choices.append((cost, dock))
+        for _, dock in sorted(choices, key=itemgetter(0)):
+            gaps = (self._gap_m(dock, traveller.radius_m, other) for other in others)
+            if all(gap >= 2 * TRACKING_M for gap in gaps):
+                traveller.goal, traveller.dock = dock.node, dock
+                traveller.since_s = self._time_s
+                self._yaws[name] = dock.yaw_rad
+                return
 
     def _give_up_late(self, name: str, task: _Task, others: list[Traveller]) -> None:
         if task.moved_s is None or self._time_s - task.moved_s < PATIENCE_S:

@@ -8,9 +8,10 @@ import time
 
 import pytest
 
-from keyexpr_schema.errors import Unreachable
-from keyexpr_schema.keyspace import GOAL_SPEC, STORE_JOURNAL
+from keyexpr_schema.errors import UndecodablePayload, Unreachable
+from keyexpr_schema.keyspace import GOAL_SPEC, PLAN_REQUEST, STORE_JOURNAL
 from keyexpr_schema.payloads.goals import Goal, GoalAddress
+from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
 from keyexpr_schema.payloads.service import StoreAddress, StoreQuery
 from keyexpr_schema.transport.session import SessionConfig, open_session
 
@@ -68,3 +69,13 @@ async def test_realms_do_not_see_each_other(session_config):
             assert change.address == GoalAddress("g2")
         journal = await south.ask(STORE_JOURNAL, StoreAddress(), StoreQuery())
         assert [e.keyexpr for e in journal.entries] == [GOAL_SPEC.build(GoalAddress("g2"))]
+
+
+async def test_what_no_reader_could_read_is_not_put(session_config):
+    async with open_session(session_config()) as session:
+        asked = PlanRequest(request="r1", plan="a/b", goals=())
+        with pytest.raises(
+            UndecodablePayload, match=r"is not a PlanRequest: Expected a name \(1 to"
+        ):
+            await session.confirm(PLAN_REQUEST, RequestAddress("r1"), asked)
+        assert await session.get(PLAN_REQUEST, RequestAddress("r1")) is None

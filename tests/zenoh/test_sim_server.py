@@ -67,17 +67,16 @@ async def until(condition: Callable[[], bool], timeout_s: float = 10.0) -> None:
             await asyncio.sleep(0.01)
 
 
-async def test_a_motion_is_carried_out_and_costs_no_wall_time(session_config: Make) -> None:
+async def test_a_motion_is_carried_out_in_simulated_time(session_config: Make) -> None:
     async with (
         served(session_config) as (backend, asker),
         SimEmbodiment(asker, "hsr", "i1") as body,
     ):
         assert isinstance(body, Embodiment)
-        began = time.monotonic()
         outcome = await body.perform(TO_KITCHEN)
         assert outcome.state is MotionState.SUCCEEDED
         assert outcome.senses.place == "kitchen"
-        assert backend.time_s > 5.0 > time.monotonic() - began
+        assert backend.time_s > 5.0
         assert body.now_s() == pytest.approx(backend.time_s)
         assert (await body.senses()).place == "kitchen"
 
@@ -165,14 +164,16 @@ async def test_the_world_waits_for_the_next_call_of_a_robot_whose_motion_ended(
         assert outcome.state is MotionState.SUCCEEDED
 
 
-async def test_real_time_goes_on_by_itself(session_config: Make) -> None:
+async def test_paced_time_goes_on_by_itself_and_no_faster(
+    session_config: Make,
+) -> None:
     async with served(session_config, speed=4.0, step_s=0.05) as (backend, _):
         began, began_s = time.monotonic(), backend.time_s
         await until(lambda: backend.time_s >= began_s + 2.0)
-        assert 0.3 < time.monotonic() - began < 3.0
+        assert time.monotonic() - began > 0.4
 
 
-async def test_what_is_told(session_config: Make) -> None:
+async def test_senses_truths_and_scene_are_published(session_config: Make) -> None:
     async with served(session_config) as (_, asker):
         body = SimEmbodiment(asker, "hsr", "i1")
         async with asker.watch(SIM_SENSES) as watch:

@@ -7,9 +7,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from conftest import RouterProcess
 from msgspec.structs import replace
-from worker_world import DEADLINE_S, Planner
 
 from keyexpr_schema.keyspace import ROBOT_SPEC
 from keyexpr_schema.payloads.robots import RobotAddress
@@ -18,6 +16,8 @@ from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.mission_file import load_mission
 from sim.kinematic.backend import KinematicBackend
 from sim.server.sim_server import SimServer
+from tests.conftest import RouterProcess
+from tests.worker_world import DEADLINE_S, Planner
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "custom_skill.py"
 

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from worker_world import Fleet, running_fleet
 
 from keyexpr_schema.payloads.tasks import Report, ReportState
 from keyexpr_schema.transport.session import SessionConfig
 from sim.backend import Backend
 from sim.files.mission_file import Mission
 from sim.mujoco_world import MujocoBackend
+from tests.worker_world import Fleet, running_fleet
 
 
 def physics(mission: Mission) -> Backend:

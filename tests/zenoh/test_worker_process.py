@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import RouterProcess
-from worker_world import DEADLINE_S, Planner
 
 from keyexpr_schema.facts import NOTHING
 from keyexpr_schema.keyspace import ROBOT_STATE
@@ -20,6 +18,8 @@ from keyexpr_schema.payloads.robots import RobotActivity
 from keyexpr_schema.payloads.tasks import ReportState
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.mission_file import load_mission
+from tests.conftest import RouterProcess
+from tests.worker_world import DEADLINE_S, Planner
 
 SIM = """
 import sys

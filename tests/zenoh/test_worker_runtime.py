@@ -9,9 +9,7 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
 
 import pytest
-from conftest import RouterProcess
 from msgspec.structs import replace
-from worker_world import DEADLINE_S, Fleet, running_fleet
 
 from keyexpr_schema.facts import NOTHING
 from keyexpr_schema.keyspace import FACT, ORDER, REJECT, REPORT, ROBOT_ALIVE, ROBOT_STATE
@@ -23,6 +21,8 @@ from keyexpr_schema.transport.session import SessionConfig
 from sim.backend import Backend
 from sim.files.mission_file import Mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
+from tests.conftest import RouterProcess
+from tests.worker_world import DEADLINE_S, Fleet, running_fleet
 from workers.context import SkillContext
 from workers.skill import skill
 

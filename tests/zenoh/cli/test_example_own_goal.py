@@ -13,7 +13,7 @@ from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.world_file import load_world
 from sim.files.world_payloads import object_payloads, place_payloads
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 async def example(*words: str) -> tuple[int, str, str]:

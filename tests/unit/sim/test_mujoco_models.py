@@ -8,11 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from sim.errors import BadFile
 from sim.files.mission_file import load_mission, load_robot
 from sim.files.world_file import load_world
 from sim.mujoco_world import MODELS, MujocoBackend, load_description
+from sim.mujoco_world.arm import Arm
+from sim.mujoco_world.assemble import compile_world
+from sim.mujoco_world.robot_body import RobotBody
 from sim.server.process import make_backend
 
 HOME = load_world("home")
@@ -23,6 +26,19 @@ LOCOBOT = load_robot("locobot")
 def alone(spec: RobotSpec, folder: Path | None = None) -> MujocoBackend:
     folders = {spec.robot: folder} if folder else {}
     return MujocoBackend(HOME, [(spec, (2.5, 3.0, 0.0))], model_folders=folders)
+
+
+def arm_of_hsr() -> tuple[Arm, PoseMRad]:
+    """The arm of a robot that stands still at the pose."""
+    import mujoco
+
+    found = load_description(HSR.model)
+    model = compile_world(HOME, [("hsr", found)])
+    data = mujoco.MjData(model)
+    body = RobotBody(model, data, HSR, found, (2.5, 3.0, 0.0))
+    mujoco.mj_forward(model, data)
+    assert body.arm is not None
+    return body.arm, body.pose()
 
 
 def reach_of_shapes(backend: MujocoBackend, robot: str) -> tuple[float, float]:
@@ -66,20 +82,14 @@ def test_models_have_the_mass_and_size_of_what_they_are_named_after(
 @pytest.mark.parametrize("height_m", [0.0, 0.345, 0.45, 0.60, 0.75])
 @pytest.mark.parametrize("distance_m", [0.43, 0.50, 0.55])
 def test_the_arm_reaches_floor_baskets_and_tables(height_m: float, distance_m: float) -> None:
-    backend = alone(HSR)
-    body = backend._bodies["hsr"]
-    assert body.arm is not None
-    x, y, yaw = body.pose()
+    arm, (x, y, yaw) = arm_of_hsr()
     target = (x + distance_m * math.cos(yaw), y + distance_m * math.sin(yaw), height_m + 0.06)
-    solved = [body.arm.solve(target, seed) for seed in body.arm.entry.seeds]
+    solved = [arm.solve(target, seed) for seed in arm.entry.seeds]
     assert any(values is not None for values in solved)
 
 
 def test_the_arm_does_not_pretend_to_reach_what_it_cannot() -> None:
-    backend = alone(HSR)
-    arm = backend._bodies["hsr"].arm
-    assert arm is not None
-    x, y, _ = backend.senses("hsr").pose_m_rad
+    arm, (x, y, _) = arm_of_hsr()
     for target in ((x + 0.9, y, 0.6), (x + 0.5, y + 0.3, 0.6), (x + 0.5, y, 1.6)):
         assert all(arm.solve(target, seed) is None for seed in arm.entry.seeds)
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import msgspec
 import pytest
-from timeline_mission import END_S, STEPS, WALL_S, Put, mission, plan, put, record, script
 
 from fleet.timeline.drawing.sink import open_stream
 from fleet.timeline.errors import UnreadableRecording, UnwritableRecording
@@ -20,6 +19,7 @@ from keyexpr_schema.payloads.service import Reject, RejectAddress
 from keyexpr_schema.payloads.simulation import Frame, Frames, SimAddress, SimClock
 from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState, TaskAddress, TaskState
 from keyexpr_schema.payloads.world import Fact, FactAddress
+from tests.timeline_mission import END_S, STEPS, WALL_S, Put, mission, plan, put, record, script
 
 
 def written(path: Path, changes: list[Put], backlog: bool = False) -> Path:

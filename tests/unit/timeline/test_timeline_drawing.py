@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from timeline_mission import STEPS, record
 
 from fleet.timeline.clock import Clock, wall_of
 from fleet.timeline.drawing.graph import Node, layout
@@ -20,6 +19,7 @@ from fleet.timeline.drawing.trails import CORNERS, Trail
 from fleet.timeline.drawing.utilisation import Utilisation
 from fleet.timeline.read import rows
 from keyexpr_schema.payloads.tasks import TaskState
+from tests.timeline_mission import STEPS, record
 
 
 def test_a_zenoh_timestamp_gives_its_wall_time() -> None:

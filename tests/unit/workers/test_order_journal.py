@@ -58,7 +58,7 @@ def test_a_killed_process_leaves_started_attempts_and_unsent_words(tmp_path: Pat
 import os, signal, sys
 sys.path.insert(0, {str(Path(__file__).parent)!r})
 from pathlib import Path
-from test_worker_journal import fact, order
+from test_order_journal import fact, order
 from keyexpr_schema.payloads.tasks import ReportState
 from workers.orders.journal import Journal
 from workers.orders.reports import make_report

@@ -18,7 +18,7 @@ from sim.files.world_file import load_world
 from sim.files.world_payloads import object_payloads, place_payloads
 from sim.reach import out_of_reach
 
-CONFIGS = Path(__file__).parents[2] / "configs"
+CONFIGS = Path(__file__).parents[3] / "configs"
 HOME = CONFIGS / "worlds" / "home.yaml"
 # `on` is a boolean to PyYAML's own loader, and a word to ours.
 RAW: dict[str, Any] = yaml.load(HOME.read_text(), yaml.BaseLoader)

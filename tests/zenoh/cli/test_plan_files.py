@@ -1,8 +1,7 @@
-"""Plans by robotctl with a real planner: seen before they are made, checked, proposed, compared."""
+"""Plans in files, by robotctl with a real planner: seen, edited, checked, proposed, compared."""
 
 from __future__ import annotations
 
-import asyncio
 import json
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -16,23 +15,19 @@ import yaml
 from cli.plans.files import read_plan, write_plan
 from keyexpr_schema.keyspace import (
     ANSWER,
-    FACT,
     GOAL_STATUS,
     PLAN_PROPOSAL,
     PLAN_SPEC,
     PLAN_STATUS,
-    SIM_CLOCK,
     TASK_RECORD,
 )
 from keyexpr_schema.payloads.goals import GoalAddress, GoalState
-from keyexpr_schema.payloads.plans import Plan, PlanAddress, PlanState, Task
-from keyexpr_schema.payloads.simulation import SimAddress, SimClock
-from keyexpr_schema.payloads.world import FactAddress
+from keyexpr_schema.payloads.plans import Plan, PlanAddress, Task
 from keyexpr_schema.transport.session import Session
 from tests.planner_process import carry_out, next_order, person, planner, value
 from tests.robotctl import Robotctl
 
-CONFIGS = Path(__file__).parents[2] / "configs"
+CONFIGS = Path(__file__).parents[3] / "configs"
 WORLD = str(CONFIGS / "worlds" / "home.yaml")
 HSR = str(CONFIGS / "robots" / "hsr.yaml")
 LOCOBOT = str(CONFIGS / "robots" / "locobot.yaml")
@@ -197,108 +192,6 @@ async def test_plans_and_their_revisions_are_compared(
     assert f"plan {plan} has no revision 7; known are: 1, 2" in missing.err
     assert "there is no plan 'nothing'" in unknown.err
     assert "change      revision 2 kept " in page
-
-
-async def test_a_plan_waits_for_approval_if_the_planner_was_told_so(
-    router: Router, robotctl: Robotctl, tmp_path: Path
-) -> None:
-    async with fleet(router, tmp_path / "planner", "--approval") as session:
-        await robotctl.soon("goal", "add", TEXT, "--id", "g")
-        await robotctl.soon("plan", "create", "big-dag", "milp", "--id", "p")
-        page = (await robotctl.soon("plan", "show", "p")).out
-        status = await session.get(PLAN_STATUS, PlanAddress("p"))
-        early = await robotctl.soon("plan", "start", "p")
-        said = await robotctl.soon("plan", "approve", "p")
-        order = await next_order(session, set())
-        twice = await robotctl.soon("plan", "approve", "p")
-    assert status is not None
-    assert status.state is PlanState.PROPOSED
-    assert "proposed" in page
-    assert early.code == 1
-    assert said.out.strip() == "plan p is running"
-    assert order.skill == "navigate"
-    assert "only a proposed plan is approved" in twice.err
-
-
-async def test_waiting_goals_are_planned_unasked_if_the_file_says_so(
-    router: Router, robotctl: Robotctl, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    settings = tmp_path / "auto.yaml"
-    settings.write_text("planner: {auto_plan: true}")
-    monkeypatch.setenv("ROBOTFLEET_CONFIG", str(settings))
-    async with fleet(router, tmp_path / "planner") as session:
-        await robotctl.soon("goal", "add", TEXT, "--id", "g")
-        assert (await next_order(session, set())).skill == "navigate"
-
-
-async def test_a_goal_is_planned_and_waited_for_in_one_command(
-    router: Router, robotctl: Robotctl, tmp_path: Path
-) -> None:
-    async with fleet(router, tmp_path / "planner") as session:
-        waiting = asyncio.create_task(
-            robotctl.soon("goal", "add", TEXT, "--id", "g", "--plan", "--wait")
-        )
-        done: set[str] = set()
-        while len(done) < 4:
-            order = await next_order(session, done)
-            done.add(order.task)
-            await carry_out(session, order)
-        said = await waiting
-        page = (await robotctl.soon("goal", "show", "g")).out
-        idle = (await robotctl.soon("plan", "show", "--analyze-idle")).out
-        data = (await robotctl.soon("plan", "show", "--analyze-idle", "--json")).data
-    assert said.code == 0, said.err
-    first, second, last = said.out.strip().splitlines()
-    assert first == "goal g is waiting, understood as at(cup_1) = hallway"
-    assert second == "plan plan-1 has 4 tasks for 1 goal"
-    assert last == "goal g is reached, understood as at(cup_1) = hallway"
-    assert "understood  at(cup_1) = hallway" in page
-    assert "Idle time" in idle and "hsr" in idle.partition("Idle time")[2]
-    assert data["idle"]["fleet"] == ["hsr"]
-    assert data["idle"]["unit_predicted"] == {"makespan": 4.0, "idle": {"hsr": 0.0}, "mean": 0.0}
-    assert data["idle"]["measured"] is None  # the hsr of this test tells no times
-    assert data["idle"]["predicted"]["makespan"] == data["status"]["predicted_makespan_s"]
-
-
-async def test_the_page_of_a_plan_and_its_graph(
-    router: Router, robotctl: Robotctl, tmp_path: Path
-) -> None:
-    async with fleet(router, tmp_path / "planner"):
-        await robotctl.soon("goal", "add", TEXT, "--id", "g", "--plan")
-        page = (await robotctl.soon("plan", "show")).out
-        dot = (await robotctl.soon("plan", "show", "plan-1", "--dot")).out
-        both = await robotctl.soon("plan", "show", "plan-1", "--dot", "--json")
-        llm = await robotctl.soon("plan", "create", "big-dag", "milp", "g", "--planner", "llm")
-    assert "made by     symbolic" in page
-    assert "predicted" in page
-    assert "· t2 pick(object=cup_1, place=kitchen) hsr" in " ".join(page.split())
-    assert dot.startswith('digraph "plan-1" {')
-    assert '"t1" -> "t2";' in dot
-    assert "choose one" in both.err
-    assert "already in plan plan-1" in llm.err
-
-
-async def test_facts_of_people_carry_the_fleets_time(router: Router, robotctl: Robotctl) -> None:
-    async with person(router.endpoint) as session:
-        address = FactAddress("cup_1", "at")
-        await robotctl.soon("world", "add", "--fact", "at", "cup_1", "hallway")
-        by_the_wall = await session.get(FACT, address)
-
-        async def tick() -> None:
-            while True:
-                session.put(
-                    SIM_CLOCK, SimAddress(), SimClock(time_s=12.5, wall_time_s=1.0, speed=1.0)
-                )
-                await asyncio.sleep(0.05)
-
-        ticking = asyncio.create_task(tick())
-        await robotctl.soon("world", "add", "--fact", "at", "cup_1", "kitchen")
-        ticking.cancel()
-        simulated = await session.get(FACT, address)
-    assert by_the_wall is not None
-    assert by_the_wall.time_s > 1.7e9
-    assert simulated is not None
-    assert simulated.time_s == 12.5
 
 
 def test_a_plan_is_checked_against_files_without_any_fleet(

@@ -10,7 +10,7 @@ import pytest
 from tests.planner_process import person, planner
 from tests.robotctl import Robotctl
 
-WORLD = str(Path(__file__).parents[2] / "configs" / "worlds" / "home.yaml")
+WORLD = str(Path(__file__).parents[3] / "configs" / "worlds" / "home.yaml")
 
 
 class Router(Protocol):
@@ -20,6 +20,38 @@ class Router(Protocol):
 @pytest.fixture
 def robotctl(router: Router, tmp_path: Path) -> Robotctl:
     return Robotctl(router.endpoint, tmp_path, "test")
+
+
+def test_the_world_is_loaded_said_listed_and_forgotten(robotctl: Robotctl) -> None:
+    unknown = robotctl("world", "add", "--fact", "at", "cup_1", "kitchen")
+    assert unknown.code == 1
+    assert "load a world with `robotctl world load FILE`" in unknown.err
+
+    assert robotctl("world", "load", WORLD).code == 0
+    assert robotctl("world", "add", "The first cup is in the kitchen.").code == 0
+    assert robotctl("world", "add", "The first cup is in the kitchen.").code == 0
+    said = robotctl("world", "add", "--fact", "at", "cup_1", "kitchen")
+    assert said.out.strip() == "stored at(cup_1) = kitchen"
+    wrong = robotctl("world", "add", "--fact", "at", "cup_1", "kitchn")
+    assert "(did you mean 'kitchen'?)" in wrong.err
+    assert "got 2 words" in robotctl("world", "add", "--fact", "at", "cup_1").err
+
+    world = robotctl("world", "list", "--json").data
+    assert [place["place"] for place in world["places"]] == ["hallway", "kitchen", "living_room"]
+    assert [thing["object"] for thing in world["objects"]] == ["cup_1", "cup_2"]
+    assert [fact["value"] for fact in world["facts"]] == ["kitchen"]
+    assert [s["text"] for s in world["statements"]] == ["The first cup is in the kitchen."]
+    page = robotctl("world", "list").out
+    assert "at(cup_1) = kitchen" in page
+    assert "The first cup is in the kitchen." in page
+
+    assert robotctl("world", "delete", "at", "cup_1").out.strip() == "deleted at(cup_1)"
+    statement = world["statements"][0]["statement"]
+    assert robotctl("world", "delete", statement).code == 0
+    assert robotctl("world", "delete", "cup_2").out.strip() == "deleted object cup_2"
+    assert "known are: cup_1," in robotctl("world", "delete", "cup_2").err
+    left = robotctl("world", "list", "--json").data
+    assert left["facts"] == left["statements"] == []
 
 
 def test_objects_are_told_one_by_one(robotctl: Robotctl) -> None:

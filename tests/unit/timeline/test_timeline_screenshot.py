@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from timeline_mission import mission, put
 
 from fleet.timeline.drawing.sink import open_stream
 from fleet.timeline.drawing.text import DRAWN
@@ -15,6 +14,7 @@ from fleet.timeline.recorder import Recorder
 from fleet.timeline.screenshot import DRIVER, main
 from keyexpr_schema.keyspace import GOAL_SPEC
 from keyexpr_schema.payloads.goals import Goal, GoalAddress
+from tests.timeline_mission import mission, put
 
 
 def driver_is_installed() -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import msgspec
@@ -149,14 +148,14 @@ def test_frames_hold_every_body_that_the_scene_does_not_fix() -> None:
     assert {body.body for body in scene.bodies} == set(scene.fixed) | set(frame.poses)
 
 
-def test_a_hundred_robots_make_ten_thousand_motions_in_seconds() -> None:
+def test_a_hundred_robots_make_ten_thousand_motions_in_as_many_steps() -> None:
     robots = [
         (msgspec.structs.replace(ROBOTS[k % 2][0], robot=f"r{k}"), ROBOTS[k % 2][1])
         for k in range(100)
     ]
     backend = KinematicBackend(MISSION.world, robots, MotionModel(spread=0.3))
     places = list(MISSION.world.place_entries)
-    began, motions = time.process_time(), 0
+    steps = motions = 0
     while motions < 10_000:
         for name in backend.robots:
             outcome = backend.outcome(name)
@@ -166,5 +165,6 @@ def test_a_hundred_robots_make_ten_thousand_motions_in_seconds() -> None:
                 backend.begin(name, Motion(kind=kind, place=place))
                 motions += 1
         backend.advance()
-    assert time.process_time() - began < 30.0
+        steps += 1
+    assert steps <= motions, "it goes from event to event"
     assert backend.time_s > 100.0

@@ -111,8 +111,10 @@ def test_what_is_no_skill_is_refused_where_it_is_written() -> None:
         async def fine(ctx: SkillContext) -> None: ...
 
 
-def test_installed_skills_come_from_entry_points(
-    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+def test_installed_skills_come_from_entry_points_and_broken_ones_are_left_out(
+    tmp_path_factory: pytest.TempPathFactory,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     site = tmp_path_factory.mktemp("site")
     (site / "their_skills.py").write_text(
@@ -128,9 +130,17 @@ def test_installed_skills_come_from_entry_points(
     (info / "entry_points.txt").write_text("[robotfleet.skills]\nwave = their_skills:wave\n")
     monkeypatch.syspath_prepend(site)
     assert "wave" in SkillRegistry.installed(HOUSEHOLD).names
-    (info / "entry_points.txt").write_text("[robotfleet.skills]\nbad = their_skills:nothere\n")
-    with pytest.raises(BadSkill, match="'bad' does not load"):
-        SkillRegistry.installed(HOUSEHOLD)
-    (info / "entry_points.txt").write_text("[robotfleet.skills]\nbad = their_skills:nothing\n")
-    with pytest.raises(BadSkill, match="'bad' offers 5"):
-        SkillRegistry.installed(HOUSEHOLD)
+    (info / "entry_points.txt").write_text(
+        "[robotfleet.skills]\n"
+        "nothere = their_skills:nothere\n"
+        "five = their_skills:nothing\n"
+        "again = workers.skills.navigate:navigate\n"
+        "wave = their_skills:wave\n"
+    )
+    names = SkillRegistry.installed(HOUSEHOLD).names
+    assert set(names) == {"wave", *(one.name for one in HOUSEHOLD)}
+    assert [record.getMessage().partition("cannot be used: ")[2] for record in caplog.records] == [
+        "AttributeError: module 'their_skills' has no attribute 'nothere'",
+        "BadSkill: it offers 5, which is no @skill",
+        "BadSkill: two skills are called 'navigate': rename or remove one",
+    ]

@@ -1,0 +1,71 @@
+"""What cannot be, as robotctl says it: one sentence, and an exit code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cli.command import CONNECT_TIMEOUT_S
+from tests.robotctl import Robotctl
+
+CONFIGS = Path(__file__).parents[3] / "configs"
+ROBOTS = sorted(str(file) for file in (CONFIGS / "robots").glob("*.yaml"))
+WORLD = str(CONFIGS / "worlds" / "home.yaml")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["plan", "create", "big-dag", "milp"], "no planner is running; start one with"),
+        (["plan", "create", "big-dag", "milp", "g"], "there is no goal 'g': none is known yet"),
+        (["plan", "show"], "there is no plan yet; make one with `robotctl plan create`"),
+        (["plan", "start", "p"], "there is no plan 'p'"),
+        (["replan", "p"], "there is no plan 'p'"),
+        (["task", "list", "p"], "there is no plan 'p'"),
+        (["task", "add", "p", "navigate", "place"], "'place' is not NAME=VALUE"),
+        (["register", "nowhere.yaml"], "nowhere.yaml"),
+        (["register", WORLD], "home.yaml"),
+        (["world", "load", ROBOTS[0]], "hsr.yaml"),
+        (["goal", "add", " "], "say what you want, such as “Bring the first cup"),
+        (["goal", "add", "x", "--id", ""], "goal '' is not valid: use 1 to 63 ASCII letters"),
+        (["goal", "add", "x", "--id", "a/**"], "goal 'a/**' is not valid: use 1 to 63 ASCII"),
+        (["world", "add", ""], "say something, such as “The first cup is in the kitchen.”"),
+        (["plan", "create", "big-dag", "milp", "--id", "a/b"], "plan 'a/b' is not valid: use 1"),
+        (["demo", "three-cups"], "there is no mission 'three-cups'; there are"),
+        (["demo", "two-cups", "--backend", "bullet"], "known are: kinematic, mujoco"),
+        (["sim", "two-cups", "--speed", "fast"], "neither 'max' nor a number above 0"),
+        (["worker", "hsr", "--embodiment", "ghost"], "there is no embodiment 'ghost'"),
+        (["--realm", "a b", "robots"], "'a b' is not a realm"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence_and_exit_code_1(
+    robotctl: Robotctl, arguments: list[str], words: str
+) -> None:
+    said = robotctl(*arguments)
+    assert said.code == 1
+    assert said.out == ""
+    assert words in said.err
+    assert said.err.startswith("Error: ")
+    assert said.err.count("\n") == 1
+
+
+def test_usage_errors_exit_with_2_and_suggest(robotctl: Robotctl) -> None:
+    typo = robotctl("robtos")
+    assert typo.code == 2
+    assert "Did you mean 'robots'?" in typo.err
+    nested = robotctl("goal", "lits")
+    assert nested.code == 2
+    assert "Did you mean 'list'?" in nested.err
+    assert robotctl("goal", "add").code == 2
+
+
+def test_without_a_router_it_says_one_sentence_soon(tmp_path: Path) -> None:
+    """Within 3 s; benchmarks/bench_startup.py measures that, as a busy machine takes any time."""
+    robotctl = Robotctl("tcp/127.0.0.1:1", tmp_path)
+    said = robotctl("robots", "--json")
+    assert said.code == 1
+    assert said.out == ""
+    assert said.err.startswith("Error: no router answers at tcp/127.0.0.1:1")
+    assert said.err.count("\n") == 1
+    assert CONNECT_TIMEOUT_S <= 1.5  # the rest is for Python to start

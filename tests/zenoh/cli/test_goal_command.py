@@ -1,0 +1,79 @@
+"""Goals by robotctl: stored, listed, answered by the planner."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+import pytest
+
+from keyexpr_schema.keyspace import (
+    GOAL_SPEC,
+    GOAL_STATUS,
+    PLANNER_ALIVE,
+)
+from keyexpr_schema.payloads.goals import GoalAddress, GoalState, GoalStatus
+from keyexpr_schema.payloads.service import PlannerAliveAddress
+from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from tests.robotctl import Robotctl
+
+MakeConfig = Callable[..., SessionConfig]
+
+
+def test_a_goal_without_a_planner_is_stored_and_said_so(robotctl: Robotctl) -> None:
+    text = "Bring the first cup to the hallway."
+    said = robotctl("goal", "add", text, "--priority", "2")
+    assert said.code == 0
+    assert "No planner is running" in said.out
+    again = robotctl("goal", "add", text, "--json").data
+    assert again["goal"] == "bring-the-first-cup-to-the-hallway-2"
+    rows = robotctl("goal", "list", "--json").data
+    assert [row["spec"]["ordinal"] for row in rows] == [1, 2]
+    assert [row["spec"]["priority"] for row in rows] == [2, 0]
+    assert rows[0]["status"] is None
+    assert "waiting" in robotctl("goal", "show", rows[0]["goal"]).out
+    assert "use another --id" in robotctl("goal", "add", "x", "--id", rows[0]["goal"]).err
+    assert robotctl("goal", "delete", rows[0]["goal"]).code == 0
+    assert "known are: bring-the-first-cup-to-the-hallway-2" in robotctl("goal", "show", "x").err
+    # Nothing of it can stand in a key; a planner with a language model may understand it.
+    assert robotctl("goal", "add", "把杯子拿到走廊", "--json").data["goal"] == "goal"
+    assert robotctl("goal", "add", "把杯子拿到走廊", "--json").data["goal"] == "goal-2"
+
+
+async def _answer_goals(session: Session, state: GoalState, reason: str | None) -> None:
+    """What a planner says of every goal, and no more."""
+    async with session.watch(GOAL_SPEC) as watch:
+        async for change in watch:
+            if change.value is not None:
+                status = GoalStatus(goal=change.address.goal, state=state, reason=reason)
+                await session.confirm(GOAL_STATUS, GoalAddress(change.address.goal), status)
+
+
+@pytest.mark.parametrize(
+    ("state", "reason", "code"),
+    [
+        (GoalState.REJECTED, "nobody knows what a unicorn is", 1),
+        (GoalState.WAITING, None, 0),
+    ],
+)
+async def test_a_goal_is_answered_by_the_planner(
+    robotctl: Robotctl,
+    session_config: MakeConfig,
+    state: GoalState,
+    reason: str | None,
+    code: int,
+) -> None:
+    async with (
+        open_session(session_config(component="planner")) as session,
+        session.token(PLANNER_ALIVE, PlannerAliveAddress("run1")),
+    ):
+        answering = asyncio.create_task(_answer_goals(session, state, reason))
+        try:
+            said = await robotctl.soon("goal", "add", "Bring the unicorn here.", "--id", "g1")
+        finally:
+            answering.cancel()
+    assert said.code == code
+    if reason:
+        assert said.err.strip() == f"Error: goal g1 rejected: {reason}"
+    else:
+        assert "goal g1 is waiting" in said.out

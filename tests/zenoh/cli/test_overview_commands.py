@@ -1,0 +1,126 @@
+"""The whole fleet by robotctl: status, watch, journal; one realm and no other."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+import pytest
+import zenoh
+
+from keyexpr_schema.keyspace import (
+    GOAL_SPEC,
+    GOAL_STATUS,
+    REJECT,
+)
+from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState, GoalStatus
+from keyexpr_schema.transport.session import SessionConfig, open_session
+from keyexpr_schema.transport.wire import zenoh_config
+from tests.robotctl import Robotctl
+
+CONFIGS = Path(__file__).parents[3] / "configs"
+ROBOTS = sorted(str(file) for file in (CONFIGS / "robots").glob("*.yaml"))
+MakeConfig = Callable[..., SessionConfig]
+
+
+class Router(Protocol):
+    endpoint: str
+
+
+def test_empty_lists_are_lists(robotctl: Robotctl) -> None:
+    for arguments in (["robots"], ["goal", "list"], ["plan", "list"], ["task", "list"]):
+        assert robotctl(*arguments, "--json").data == []
+        assert robotctl(*arguments).code == 0
+    status = robotctl("status", "--json").data
+    assert status["planner"] == {"running": False, "status": None}
+    assert "not running" in robotctl("status").out
+
+
+def test_the_journal_tells_what_was_stored_in_order(robotctl: Robotctl) -> None:
+    robotctl("register", *ROBOTS)
+    robotctl("unregister", "hsr")
+    told = robotctl("journal", "--json").data
+    specs = [(e["keyexpr"], e["deleted"]) for e in told["entries"] if "/spec" in e["keyexpr"]]
+    assert specs == [
+        ("robots/hsr/spec", False),
+        ("robots/locobot/spec", False),
+        ("robots/hsr/spec", True),
+    ]
+    last = told["entries"][-1]["number"]
+    assert robotctl("journal", "--after", str(last), "--json").data["entries"] == []
+    assert len(robotctl("journal", "--limit", "1", "--json").data["entries"]) == 1
+
+
+async def test_status_tells_what_is_unreadable_as_long_as_it_is(
+    robotctl: Robotctl, router: Router, session_config: MakeConfig
+) -> None:
+    async with open_session(session_config(component="planner")) as session:
+        bad = zenoh_config("client", connect=[router.endpoint], namespace="robotfleet")
+        with await asyncio.to_thread(zenoh.open, bad) as foreign:
+            foreign.put("goals/g1/spec", b"{}")
+            foreign.put("goals/g2/spec", b"{}")
+            foreign.put("planner/status", b"nonsense")
+        async with session.watch(GOAL_SPEC, REJECT) as watch:
+            seen: set[str] = set()
+            async for change in watch:
+                if change.key is REJECT and change.value is not None:
+                    seen.add(change.value.keyexpr)
+                if {"goals/g1/spec", "goals/g2/spec"} <= seen:
+                    break
+        status = (await robotctl.soon("status", "--json")).data
+        assert {"goals/g1/spec", "goals/g2/spec"} <= {r["keyexpr"] for r in status["rejects"]}
+        await session.confirm(GOAL_SPEC, GoalAddress("g1"), Goal(goal="g1", text="Bring the cup."))
+        await session.delete(GOAL_SPEC, GoalAddress("g2"))
+        status = (await robotctl.soon("status", "--json")).data
+        assert {r["keyexpr"] for r in status["rejects"]} <= {"planner/status"}
+
+
+@pytest.mark.parametrize("flags", [[], ["--json"]])
+async def test_watch_tells_each_change_until_it_is_interrupted(
+    robotctl: Robotctl, session_config: MakeConfig, flags: list[str]
+) -> None:
+    async with open_session(session_config(component="planner")) as session:
+        await session.confirm(
+            GOAL_STATUS, GoalAddress("g1"), GoalStatus(goal="g1", state=GoalState.WAITING)
+        )
+        child = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "cli.main", "watch", *flags),
+            env={**robotctl.env, "PYTHONUNBUFFERED": "1"},
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+        )
+        assert child.stdout is not None
+        assert child.stderr is not None
+        try:
+            async with asyncio.timeout(20):
+                stored = (await child.stdout.readline()).decode()
+                await session.confirm(
+                    GOAL_STATUS, GoalAddress("g1"), GoalStatus(goal="g1", state=GoalState.REACHED)
+                )
+                changed = (await child.stdout.readline()).decode()
+            child.send_signal(signal.SIGINT)
+            code = await child.wait()
+            complaints = (await child.stderr.read()).decode()
+        finally:
+            if child.returncode is None:
+                child.kill()
+                await child.wait()
+    if flags:
+        assert json.loads(stored)["value"]["state"] == "waiting"
+        assert json.loads(changed)["key"] == "goals/g1/status"
+    else:
+        assert "goal g1 is waiting" in stored
+        assert "goal g1 is reached" in changed
+    assert code == 130
+    assert complaints == ""
+
+
+def test_fleets_of_different_realms_do_not_see_each_other(robotctl: Robotctl) -> None:
+    assert robotctl("goal", "add", "Here.", "--realm", "one").code == 0
+    assert robotctl("--realm", "two", "goal", "list", "--json").data == []
+    assert len(robotctl("goal", "list", "--realm", "one", "--json").data) == 1

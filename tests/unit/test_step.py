@@ -118,9 +118,9 @@ def test_a_worker_that_comes_back_in_time_keeps_its_work() -> None:
     model = fleet()
     model.plan(bring(1, "hallway"))
     (order,) = model.orders()
-    model.tell(events.WorkerDisconnected, robot="hsr", incarnation="i1")
-    model.tell(events.TimerFired)
-    model.tell(events.WorkerConnected, robot="hsr", incarnation="i2")
+    model.receive(events.WorkerDisconnected, robot="hsr", incarnation="i1")
+    model.receive(events.TimerFired)
+    model.receive(events.WorkerConnected, robot="hsr", incarnation="i2")
     assert model.orders() == [order]
     assert model.state.plans["plan-1"].plan.revision == 1
 
@@ -149,8 +149,8 @@ def test_what_nobody_can_look_for_is_told() -> None:
     blind = manipulator().__class__(
         robot="hsr", model="hsr", skills=("navigate",), capabilities={"drive": 1.0}
     )
-    model.tell(events.RobotRegistered, spec=blind)
-    model.tell(events.FactDeleted, subject="cup_1", relation="at")
+    model.receive(events.RobotRegistered, spec=blind)
+    model.receive(events.FactDeleted, subject="cup_1", relation="at")
     model.plan(bring(1, "hallway"))
     assert not model.state.answers["r0"].accepted
     assert "where cup_1 is" in model.state.answers["r0"].sentence
@@ -189,7 +189,7 @@ def test_what_is_found_nowhere_ends_the_goal_with_where_it_was_looked_for() -> N
 
 def test_sentences_wait_for_the_names_they_use() -> None:
     model = FleetModel((manipulator(),), cups=1)
-    model.tell(events.GoalPut, goal=Goal(goal="g", text="bring the vase to the hallway"))
+    model.receive(events.GoalPut, goal=Goal(goal="g", text="bring the vase to the hallway"))
     assert goal_state(model, "g") is GoalState.REJECTED
     assert "known are cup_1" in (model.state.goal_states["g"].reason or "")
     vase = events.ObjectPut(
@@ -197,7 +197,7 @@ def test_sentences_wait_for_the_names_they_use() -> None:
         time_s=1.0,
         wall_time_s=1.0,
     )
-    model.tell(events.ObjectPut, object=vase.object)
+    model.receive(events.ObjectPut, object=vase.object)
     assert goal_state(model, "g") is GoalState.WAITING
 
 
@@ -209,7 +209,7 @@ def test_a_ready_plan_waits_for_start_and_can_be_cancelled_and_deleted() -> None
 
     def control(name: str, what: Control) -> bool:
         request = ControlRequest(request=name, control=what, plan="plan-1")
-        model.tell(events.ControlRequested, request=request)
+        model.receive(events.ControlRequested, request=request)
         return model.state.answers[name].accepted
 
     assert control("c1", Control.START)
@@ -229,10 +229,10 @@ def test_a_robot_that_is_unregistered_loses_its_work_and_gets_new_once_it_is_bac
     model.plan(bring(1, "hallway"))
     (order,) = model.orders()
     other = {"r1": "r2", "r2": "r1"}[order.robot]
-    model.tell(events.RobotUnregistered, robot=order.robot)
+    model.receive(events.RobotUnregistered, robot=order.robot)
     assert {o.robot for o in model.orders()} == {other}
     model.finish()
-    model.tell(events.RobotRegistered, spec=manipulator(order.robot))
+    model.receive(events.RobotRegistered, spec=manipulator(order.robot))
     assert model.state.ready(order.robot)
     model.plan(bring(2, "hallway"))
     model.finish()
@@ -246,7 +246,7 @@ def test_a_task_can_be_added_to_a_running_plan() -> None:
         request="c", control=Control.ADD_TASK, plan="plan-1", skill="navigate",
         args={"to": "living_room"}, robot="locobot",
     )  # fmt: skip
-    model.tell(events.ControlRequested, request=request)
+    model.receive(events.ControlRequested, request=request)
     model.finish()
     entry = model.state.plans["plan-1"]
     assert entry.state is PlanState.SUCCEEDED
@@ -260,7 +260,7 @@ def test_a_task_that_cannot_be_added_leaves_the_plan_as_it_was() -> None:
     request = ControlRequest(
         request="c", control=Control.ADD_TASK, plan="plan-1", skill="fly", args={}
     )
-    model.tell(events.ControlRequested, request=request)
+    model.receive(events.ControlRequested, request=request)
     model.finish()
     entry = model.state.plans["plan-1"]
     assert entry.state is PlanState.SUCCEEDED
@@ -272,12 +272,12 @@ def test_a_plan_that_someone_proposes_is_checked_like_any_other() -> None:
     model = fleet()
     go = Task(task="t1", skill="navigate", args={"robot": "?a1", "to": "kitchen"}, actor="a1")
     good = Plan(plan="mine", goals=(), conditions=(), tasks=(go,))
-    model.tell(events.PlanProposed, plan=good)
+    model.receive(events.PlanProposed, plan=good)
     model.finish()
     assert model.state.plans["mine"].state is PlanState.SUCCEEDED
     grab = Task(task="t1", skill="grab", args={"robot": "?a1"}, actor="a1")
     bad = Plan(plan="yours", goals=(), conditions=(), tasks=(grab,))
-    model.tell(events.PlanProposed, plan=bad)
+    model.receive(events.PlanProposed, plan=bad)
     status = model.state.plans["yours"]
     assert status.state is PlanState.REJECTED
     assert status.violations[0].code == "unknown-skill"
@@ -293,10 +293,10 @@ def test_requests_are_answered_once_and_wrong_ones_with_the_reason() -> None:
     model.plan(goals=("g1",))
     assert "already in plan plan-1" in model.state.answers["r3"].sentence
     replan = ReplanRequest(request="x", plan="nope", reason="because")
-    model.tell(events.ReplanRequested, request=replan)
+    model.receive(events.ReplanRequested, request=replan)
     assert "known are plan-1" in model.state.answers["x"].sentence
     before = model.state
-    model.tell(events.ReplanRequested, request=replan)
+    model.receive(events.ReplanRequested, request=replan)
     assert model.state is before
 
 
@@ -305,7 +305,7 @@ def test_a_replan_that_changes_nothing_disturbs_nobody() -> None:
     model.plan(*BOTH)
     before = model.orders()
     model.start(before[0])
-    model.tell(
+    model.receive(
         events.ReplanRequested, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
     )
     entry = model.state.plans["plan-1"]
@@ -322,7 +322,7 @@ def test_a_replan_in_the_middle_of_a_pick_goes_on_with_it() -> None:
     model.succeed(model.orders()[0])
     (pick,) = model.orders()
     model.start(pick)
-    model.tell(
+    model.receive(
         events.ReplanRequested, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
     )
     assert model.orders() == [pick]
@@ -352,8 +352,8 @@ def test_work_that_is_no_longer_wanted_is_cancelled_before_what_conflicts_starts
 def test_a_goal_that_comes_up_joins_the_running_plan_when_asked() -> None:
     model = fleet()
     model.plan(BOTH[0])
-    model.tell(events.GoalPut, goal=BOTH[1])
-    model.tell(
+    model.receive(events.GoalPut, goal=BOTH[1])
+    model.receive(
         events.ReplanRequested,
         request=ReplanRequest(request="x", plan="plan-1", reason="more", goals=("g2",)),
     )
@@ -364,9 +364,9 @@ def test_a_goal_that_comes_up_joins_the_running_plan_when_asked() -> None:
 
 def test_goals_are_planned_unasked_where_the_policy_says_so() -> None:
     model = fleet()
-    model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(auto_plan=True))
+    model.receive(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(auto_plan=True))
     for goal in BOTH:
-        model.tell(events.GoalPut, goal=goal)
+        model.receive(events.GoalPut, goal=goal)
     assert list(model.state.plans) == ["plan-1"]
     model.finish()
     assert [goal_state(model, g) for g in ("g1", "g2")] == [GoalState.REACHED] * 2
@@ -375,8 +375,8 @@ def test_goals_are_planned_unasked_where_the_policy_says_so() -> None:
 def test_a_new_robot_is_given_a_share() -> None:
     model = FleetModel((manipulator("r1"),), cups=2)
     model.plan(*BOTH)
-    model.tell(events.RobotRegistered, spec=manipulator("r2"))
-    model.tell(events.WorkerConnected, robot="r2", incarnation="i1")
+    model.receive(events.RobotRegistered, spec=manipulator("r2"))
+    model.receive(events.WorkerConnected, robot="r2", incarnation="i1")
     model.learn("r2", "holding", "nothing")
     entry = model.state.plans["plan-1"]
     assert entry.plan.revision == 2
@@ -388,12 +388,12 @@ def test_a_new_robot_is_given_a_share() -> None:
 
 def test_a_plan_waits_for_approval_where_the_policy_says_so() -> None:
     model = fleet()
-    model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(approval=True))
+    model.receive(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(approval=True))
     model.plan(bring(1, "hallway"))
     assert model.state.plans["plan-1"].state is PlanState.PROPOSED
     assert model.orders() == []
     approve = ControlRequest(request="a", control=Control.APPROVE, plan="plan-1")
-    model.tell(events.ControlRequested, request=approve)
+    model.receive(events.ControlRequested, request=approve)
     model.finish()
     assert goal_state(model, "g1") is GoalState.REACHED
 
@@ -413,14 +413,14 @@ def test_a_dry_run_shows_the_plan_and_leaves_nothing_behind() -> None:
 
 def test_a_goal_in_steps_takes_one_after_the_other() -> None:
     model = fleet()
-    model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(interpreter=True))
-    model.tell(events.GoalPut, goal=Goal(goal="g", text="kindly do the usual with cup one"))
+    model.receive(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(interpreter=True))
+    model.receive(events.GoalPut, goal=Goal(goal="g", text="kindly do the usual with cup one"))
     assert goal_state(model, "g") is GoalState.READING
     model.plan(goals=("g",))
     assert "still being worked out" in model.state.answers["r0"].sentence
     assert any(isinstance(effect, Interpret) for effect in model.effects)
     stages = ((at("cup_1", "hallway"),), (at("cup_1", "living_room"),))
-    model.tell(events.GoalInterpreted, goal="g", stages=stages)
+    model.receive(events.GoalInterpreted, goal="g", stages=stages)
     model.plan()
     model.finish()
     assert goal_state(model, "g") is GoalState.REACHED
@@ -448,9 +448,9 @@ def test_what_an_earlier_step_brought_somewhere_stays_there() -> None:
 
 def test_a_sentence_that_no_model_understands_is_refused() -> None:
     model = fleet()
-    model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(interpreter=True))
-    model.tell(events.GoalPut, goal=Goal(goal="g", text="hum a tune"))
-    model.tell(events.GoalInterpreted, goal="g", reason="it is no task for robots")
+    model.receive(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(interpreter=True))
+    model.receive(events.GoalPut, goal=Goal(goal="g", text="hum a tune"))
+    model.receive(events.GoalInterpreted, goal="g", reason="it is no task for robots")
     assert goal_state(model, "g") is GoalState.REJECTED
     assert "no task for robots" in (model.state.goal_states["g"].reason or "")
 
@@ -458,7 +458,7 @@ def test_a_sentence_that_no_model_understands_is_refused() -> None:
 def test_a_deleted_goal_leaves_the_plan() -> None:
     model = fleet()
     model.plan(*BOTH)
-    model.tell(events.GoalDeleted, goal="g2")
+    model.receive(events.GoalDeleted, goal="g2")
     model.finish()
     entry = model.state.plans["plan-1"]
     assert entry.state is PlanState.SUCCEEDED

@@ -10,7 +10,7 @@ from fleet.core import events
 from fleet.core.model.preconditions import Skills
 from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanScope
 from fleet.core.state import State, put, without
-from fleet.core.updates import active_plan_of, answer, mark_goals, set_entry
+from fleet.core.updates import active_plan_of, answer, cancel, mark_goals, set_entry
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState, Task
@@ -199,10 +199,8 @@ def _release(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
 def _cancel(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if entry.ended:
         return f"plan {ask.plan} is {entry.state.value}"
-    waiting = entry.job.request if entry.job is not None else None
-    state = answer(state, waiting, False, f"plan {ask.plan} was cancelled while it was made")
-    state = set_entry(state, replace(entry, cancelling=True, job=None))
-    return answer(state, ask.request, True, f"plan {ask.plan} is being cancelled", ask.plan)
+    sentence = f"plan {ask.plan} is being cancelled"
+    return answer(cancel(state, entry), ask.request, True, sentence, ask.plan)
 
 
 def _delete(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:

@@ -156,7 +156,7 @@ async def _puts(session: Session) -> list[tuple[str, float]]:
 
 
 async def _journaled(session: Session) -> int:
-    return (await session.ask(STORE_JOURNAL, StoreAddress(), StoreQuery(limit=0))).last
+    return (await session.query(STORE_JOURNAL, StoreAddress(), StoreQuery(limit=0))).last
 
 
 async def _listed(writer: Session, reader: Session) -> float:

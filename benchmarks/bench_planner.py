@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from fleet.allocators.base import Allocated
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import check_plan
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.service.composition import Composition, compose
@@ -149,13 +149,13 @@ def _planned(
     goals, robots = size
     world = household(goals, robots, parts)
     problem = PlanningProblem(plan="p", goals=goals_of(goals), world=world, strategy=strategy)
-    plan, planning_s = _timed(lambda: parts.planners["symbolic"].plan(problem))
-    if isinstance(plan, NoPlan):
-        raise SystemExit(f"{goals} goals, {robots} robots, {strategy}: no plan: {plan.reason}")
-    found, allocating_s = _timed(lambda: parts.allocators["milp"].allocate(plan, world))
+    made, planning_s = _timed(lambda: parts.planners["symbolic"].plan(problem))
+    if isinstance(made, NoPlan):
+        raise SystemExit(f"{goals} goals, {robots} robots, {strategy}: no plan: {made.reason}")
+    found, allocating_s = _timed(lambda: parts.allocators["milp"].allocate(made))
     if not isinstance(found, Allocated):
         raise SystemExit(f"{goals} goals, {robots} robots, {strategy}: {found.violations[0]}")
-    return planning_s, planning_s + allocating_s, len(plan.tasks), found.schedule.makespan_s
+    return planning_s, planning_s + allocating_s, len(made.plan.tasks), found.schedule.makespan_s
 
 
 def _checker_table(parts: Composition) -> Table:
@@ -163,7 +163,7 @@ def _checker_table(parts: Composition) -> Table:
     table = Table("tasks", "edges", "check, median", "loosest order", title="plan checker")
     took_s = median(_timed(lambda: check_plan(plan, world))[1] for _ in range(REPEATS))
     checked = check_plan(plan, world)
-    if not checked.valid:
+    if checked.violations:
         raise SystemExit(f"the plan to be checked is wrong: {checked.violations[0].sentence}")
     edges = sum(len(task.after) for task in plan.tasks)
     table.add_row(str(len(plan.tasks)), str(edges), f"{took_s * 1e3:.0f} ms", "chains of four")

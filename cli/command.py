@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cli.errors import CliError
-from cli.parsing import Command
-from cli.settings import Settings, load_settings, one_line
+from cli.parsing import Command, Group
+from cli.settings import Settings, load_settings
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -61,9 +61,7 @@ class Call:
         """Whether data goes to stdout as JSON."""
         return self.settings.json
 
-    def session(
-        self, connect_timeout_s: float = CONNECT_TIMEOUT_S
-    ) -> AbstractAsyncContextManager[Session]:
+    def session(self) -> AbstractAsyncContextManager[Session]:
         """A session on the configured router; entering raises `Unreachable` if there is none."""
         from keyexpr_schema.transport.session import SessionConfig, open_session
 
@@ -72,7 +70,7 @@ class Call:
                 endpoints=self.settings.routers,
                 realm=self.settings.realm,
                 component="robotctl",
-                connect_timeout_s=connect_timeout_s,
+                connect_timeout_s=CONNECT_TIMEOUT_S,
             )
         )
 
@@ -104,10 +102,22 @@ class Call:
 Body = Callable[..., Coroutine[Any, Any, None] | None]
 
 
+def group(about: str) -> typer.Typer:
+    """A command with subcommands; `about` is its help."""
+    return typer.Typer(
+        cls=Group, help=about, no_args_is_help=True, rich_markup_mode=None, add_completion=False
+    )
+
+
+def single(body: Body) -> typer.Typer:
+    """`body(call, …)` as a command without subcommands."""
+    app = typer.Typer(rich_markup_mode=None, add_completion=False)
+    command(app)(body)
+    return app
+
+
 def command(
-    app: typer.Typer,
-    name: str | None = None,
-    cls: type[Command] = Command,
+    app: typer.Typer, name: str | None = None, cls: type[Command] = Command
 ) -> Callable[[Body], Body]:
     """Register `body(call, …)`, plain or async, as a command of `app` with the global options."""
 
@@ -164,7 +174,7 @@ class one_sentence_errors:  # noqa: N801 - used like a function, as contextlib's
         if found is not None:
             # Some libraries print to a buffered stdout; keep what was said before the error first.
             sys.stdout.flush()
-            typer.echo(f"Error: {one_line(found)}", err=True)
+            typer.echo(f"Error: {' '.join(str(found).split())}", err=True)
             raise typer.Exit(1) from None
 
 

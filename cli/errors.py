@@ -65,6 +65,12 @@ def check_known(what: str, name: str, known: Iterable[str], how_to_add: str = ""
         how_to_add = how_to_add or HOW_TO_ADD.get(what, "")
         how = f"; {how_to_add}" if how_to_add else ""
         raise Unknown(f"there is no {what} {name!r}: none is known yet{how}")
+    raise Unknown(
+        f"there is no {what} {name!r}{near_miss(name, names)}; known are: {', '.join(names)}"
+    )
+
+
+def near_miss(name: str, names: Iterable[str]) -> str:
+    """` (did you mean …?)`, where one of `names` is nearly `name`."""
     near = get_close_matches(name, names, n=1)
-    hint = f" (did you mean {near[0]!r}?)" if near else ""
-    raise Unknown(f"there is no {what} {name!r}{hint}; known are: {', '.join(names)}")
+    return f" (did you mean {near[0]!r}?)" if near else ""

@@ -17,27 +17,27 @@ from cli.command import GlobalFlags, JsonOption, RealmOption, RouterOption
 from cli.parsing import Group
 
 COMMANDS: dict[str, tuple[str, str]] = {
-    "status": ("cli.commands.overview:status_app", "The whole fleet on one page."),
-    "watch": ("cli.commands.overview:watch_app", "Follow goals, plans and tasks as they change."),
+    "status": ("cli.commands.overview:status", "The whole fleet on one page."),
+    "watch": ("cli.commands.overview:watch", "Follow goals, plans and tasks as they change."),
     "goal": ("cli.commands.goals:app", "Say what you want, in a sentence; see what became of it."),
     "plan": ("cli.commands.plans:app", "Make, look at, check, compare, start and cancel plans."),
     "task": ("cli.commands.tasks:app", "Look at tasks, or add one to a plan."),
-    "replan": ("cli.commands.plans:replan_app", "Plan again from what is known now."),
+    "replan": ("cli.commands.plans:replan", "Plan again from what is known now."),
     "world": ("cli.commands.world:app", "Places, objects, facts and statements."),
-    "robots": ("cli.commands.robots:robots_app", "Every robot: what it can do, and is doing."),
+    "robots": ("cli.commands.robots:robots", "Every robot: what it can do, and is doing."),
     "durations": (
-        "cli.commands.robots:durations_app",
+        "cli.commands.robots:durations",
         "How long each type of robot really takes.",
     ),
-    "register": ("cli.commands.robots:register_app", "Declare robots from YAML files."),
-    "unregister": ("cli.commands.robots:unregister_app", "Forget a robot."),
-    "journal": ("cli.commands.overview:journal_app", "What changed, in the order it was stored."),
-    "demo": ("cli.commands.demo:app", "Run a whole mission here, judged by the physics."),
-    "router": ("cli.commands.processes:router_app", "Run a Zenoh router with the fleet's store."),
-    "planner": ("cli.commands.processes:planner_app", "Run the planner."),
-    "worker": ("cli.commands.processes:worker_app", "Run one robot's worker."),
-    "sim": ("cli.commands.processes:sim_app", "Run a simulated world."),
-    "record": ("cli.commands.processes:record_app", "Record everything for Rerun."),
+    "register": ("cli.commands.robots:register", "Declare robots from YAML files."),
+    "unregister": ("cli.commands.robots:unregister", "Forget a robot."),
+    "journal": ("cli.commands.overview:journal", "What changed, in the order it was stored."),
+    "demo": ("cli.commands.demo:demo", "Run a whole mission here, judged by the physics."),
+    "router": ("cli.commands.processes:router", "Run a Zenoh router with the fleet's store."),
+    "planner": ("cli.commands.processes:planner", "Run the planner."),
+    "worker": ("cli.commands.processes:worker", "Run one robot's worker."),
+    "sim": ("cli.commands.processes:sim", "Run a simulated world."),
+    "record": ("cli.commands.processes:record", "Record everything for Rerun."),
 }
 """Name of each command: where its typer app is, and its line in `robotctl --help`."""
 

@@ -59,8 +59,13 @@ def load_settings(
         BadSettings: a value is not an endpoint or a realm, or a file is not readable; the message
             names where the value came from.
     """
-    path = config_file(environ, cwd)
-    written = _read(path) if path else {}
+    path = settings_file(environ, cwd)
+    written = {}
+    if path is not None:
+        from keyexpr_schema.config_files import read_yaml
+
+        example = f"router: {DEFAULT_ROUTER}"
+        written = _section(read_yaml(path, BadSettings), _FIELDS, str(path), example)
     chosen_routers, where = _choose(
         routers or None, environ.get("ROBOTFLEET_ROUTER"), written.get("router"), path, "--router"
     )
@@ -75,7 +80,7 @@ def load_settings(
     )
 
 
-def config_file(environ: Mapping[str, str], cwd: Path | None = None) -> Path | None:
+def settings_file(environ: Mapping[str, str], cwd: Path | None = None) -> Path | None:
     """The configuration file in force, if there is one.
 
     Raises:
@@ -94,22 +99,14 @@ def config_file(environ: Mapping[str, str], cwd: Path | None = None) -> Path | N
     return next((path for path in candidates if path.is_file()), None)
 
 
-def _read(path: Path) -> dict[str, Any]:
-    import yaml
-
-    try:
-        written = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadSettings(f"cannot read {path}: {error}") from None
-    except yaml.YAMLError as error:
-        raise BadSettings(f"{path} is not YAML: {one_line(error)}") from None
+def _section(written: object, known: tuple[str, ...], where: str, example: str) -> dict[str, Any]:
     if written is None:
         return {}
     if not isinstance(written, dict):
-        raise BadSettings(f"{path} must hold fields such as 'router: {DEFAULT_ROUTER}'")
+        raise BadSettings(f"{where} must hold fields such as {example!r}")
     for name in written:
-        if name not in _FIELDS:
-            raise BadSettings(f"{path} has a field {name!r}; valid are: {', '.join(_FIELDS)}")
+        if name not in known:
+            raise BadSettings(f"{where} has no field {name!r}; valid are: {', '.join(known)}")
     return written
 
 
@@ -148,16 +145,8 @@ def _realm(value: object, where: str) -> str:
     return value
 
 
-def _planner(written: object, path: Path) -> PlannerSettings:
-    if written is None:
-        return PlannerSettings()
-    if not isinstance(written, dict):
-        raise BadSettings(f"{path}: planner must hold fields such as 'approval: true'")
-    for name in written:
-        if name not in _PLANNER_FIELDS:
-            raise BadSettings(
-                f"{path}: planner has no field {name!r}; valid are: {', '.join(_PLANNER_FIELDS)}"
-            )
+def _planner(section: object, path: Path) -> PlannerSettings:
+    written = _section(section, _PLANNER_FIELDS, f"{path}: planner", "approval: true")
 
     def check(name: str, right: bool, what: str) -> None:
         if written.get(name) is not None and not right:
@@ -182,8 +171,3 @@ def _planner(written: object, path: Path) -> PlannerSettings:
         llm_config=None if llm is None else path.parent / Path(llm).expanduser(),
         skills=tuple(path.parent / Path(each).expanduser() for each in skills),
     )
-
-
-def one_line(error: object) -> str:
-    """The text of an error on one line."""
-    return " ".join(str(error).split())

@@ -26,12 +26,16 @@ import sys
 from pathlib import Path
 
 from keyexpr_schema import SchemaError
-from sim.embodiment import sim_embodiment
-from workers.context import SkillContext
-from workers.errors import SkillFailed, WorkerError
-from workers.process import run
-from workers.skill import ParameterKind, skill
-from workers.skills.household import HOUSEHOLD
+from sim import sim_embodiment
+from workers import (
+    HOUSEHOLD,
+    ParameterKind,
+    SkillContext,
+    SkillFailed,
+    WorkerError,
+    run_worker,
+    skill,
+)
 
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 
@@ -60,7 +64,7 @@ def main() -> None:
     router = words[1] if len(words) > 1 else DEFAULT_ROUTER
     data_dir = Path(words[2] if len(words) > 2 else "runs/custom-skill")
     try:
-        run(
+        run_worker(
             words[0],
             (router,),
             "robotfleet",

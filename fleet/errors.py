@@ -22,5 +22,13 @@ class NotUnderstood(FleetError):
     """A sentence could not be turned into facts; the message says which words, and the choices."""
 
 
+class StoreError(FleetError):
+    """A store cannot be used; the message says why and what would help."""
+
+
+class StoreInUse(StoreError):
+    """Another process has this store open."""
+
+
 class Superseded(FleetError):
     """Another planner with a higher epoch is in charge of this realm."""

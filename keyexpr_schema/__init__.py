@@ -8,8 +8,9 @@ checked does not load Zenoh.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from keyexpr_schema.lazy import lazy_names
 
 if TYPE_CHECKING:
     from keyexpr_schema.errors import *  # noqa: F403
@@ -29,59 +30,60 @@ if TYPE_CHECKING:
     from keyexpr_schema.payloads.world import *  # noqa: F403
     from keyexpr_schema.transport.router import *  # noqa: F403
     from keyexpr_schema.transport.session import *  # noqa: F403
-
-_NAMES = {
-    "errors": (
-        "SchemaError ForeignKey InvalidId NoAnswer NoConfigFile Unconfirmed UndecodablePayload "
-        "Unreachable"
-    ),
-    "facts": (
-        "AT HELD HOLDING LOCATED NOTHING ON SEARCHED FactKey Literal Value parse_literal "
-        "parse_value render_value"
-    ),
-    "ids": "Id check_id slug",
-    "key": "Address Component Delivery Key Payload",
-    "keyspace": (
-        "GOAL_SPEC GOAL_STATUS FACT STATEMENT STATEMENT_STATUS PLACE OBJECT ROBOT_SPEC ROBOT_STATE "
-        "ROBOT_ALIVE ORDER REPORT DURATIONS PLAN_SPEC PLAN_PROPOSAL PLAN_STATUS TASK_RECORD "
-        "PLAN_REQUEST REPLAN_REQUEST CONTROL_REQUEST ANSWER PLANNER_STATUS PLANNER_ALIVE REJECT "
-        "STORE_JOURNAL SIM_MOTION SIM_SENSES SIM_CLOCK SIM_FRAMES SIM_SCENE SIM_TRUTH SIM_CONTACTS "
-        "KEYSPACE key_of"
-    ),
-    "payloads.durations": "Durations DurationsAddress Estimate",
-    "payloads.goals": "Condition ENDED_GOALS Goal GoalAddress GoalState GoalStatus",
-    "payloads.motions": ("Detection Motion MotionKind MotionOutcome MotionState PointM Senses"),
-    "payloads.plans": (
-        "ENDED_PLANS Making Plan PlanAddress PlanChange PlanState PlanStatus Task Violation"
-    ),
-    "payloads.requests": ("Answer Control ControlRequest PlanRequest ReplanRequest RequestAddress"),
-    "payloads.robots": (
-        "Alive AliveAddress PoseMRad RobotActivity RobotAddress RobotSpec RobotState"
-    ),
-    "payloads.service": (
-        "JournalEntry PlannerAddress PlannerAliveAddress PlannerStatus Reject RejectAddress "
-        "StoreAddress StoreJournal StoreQuery"
-    ),
-    "payloads.simulation": (
-        "Body ContactCount Frame Frames MotionCall QuaternionWxyz Scene Shape ShapeKind SimAddress "
-        "SimClock SimRobotAddress Truth TruthAddress"
-    ),
-    "payloads.tasks": (
-        "ENDED_TASKS FINAL_REPORTS Order OrderAddress Report ReportAddress ReportState TaskAddress "
-        "TaskRecord TaskState Try"
-    ),
-    "payloads.world": (
-        "Fact FactAddress Object ObjectAddress Place PlaceAddress Statement StatementAddress "
-        "StatementStatus Surface"
-    ),
-    "transport.router": "run_router",
-    "transport.session": ("Change Session SessionConfig TokenChange TokenWatch Watch open_session"),
-}
-_MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}
-__all__ = sorted(_MODULES)
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
+else:
+    __all__, __getattr__ = lazy_names(
+        __name__,
+        {
+            "errors": (
+                "CannotListen SchemaError ForeignKey InvalidId NoReply NoConfigFile Unconfirmed "
+                "UndecodablePayload Unreachable"
+            ),
+            "facts": (
+                "AT HELD HOLDING LOCATED NOTHING ON SEARCHED FactKey Literal Value parse_literal "
+                "parse_value render_value"
+            ),
+            "ids": "Id actor_arg check_id slug",
+            "key": "Address Component Delivery Key Payload",
+            "keyspace": (
+                "GOAL_SPEC GOAL_STATUS FACT STATEMENT STATEMENT_STATUS PLACE OBJECT ROBOT_SPEC "
+                "ROBOT_STATE ROBOT_ALIVE ORDER REPORT DURATIONS PLAN_SPEC PLAN_PROPOSAL "
+                "PLAN_STATUS TASK_RECORD PLAN_REQUEST REPLAN_REQUEST CONTROL_REQUEST ANSWER "
+                "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE STORE_JOURNAL SIM_MOTION SIM_SENSES "
+                "SIM_CLOCK SIM_FRAMES SIM_SCENE SIM_TRUTH SIM_CONTACTS KEYSPACE key_of"
+            ),
+            "payloads.durations": "Durations DurationsAddress Estimate",
+            "payloads.goals": "Condition ENDED_GOALS Goal GoalAddress GoalState GoalStatus",
+            "payloads.motions": (
+                "Detection Motion MotionKind MotionOutcome MotionState PointM Senses"
+            ),
+            "payloads.plans": (
+                "ENDED_PLANS Making Plan PlanAddress PlanChange PlanState PlanStatus Task Violation"
+            ),
+            "payloads.requests": (
+                "Answer Control ControlRequest PlanRequest ReplanRequest RequestAddress"
+            ),
+            "payloads.robots": (
+                "Alive AliveAddress PoseMRad RobotActivity RobotAddress RobotSpec RobotState"
+            ),
+            "payloads.service": (
+                "JournalEntry PlannerAddress PlannerAliveAddress PlannerStatus StoreAddress "
+                "StoreJournal StoreQuery UndecodableAddress UndecodableValue"
+            ),
+            "payloads.simulation": (
+                "Body ContactCount Frame Frames MotionCall QuaternionWxyz Scene Shape ShapeKind "
+                "SimAddress SimClock SimRobotAddress Truth TruthAddress"
+            ),
+            "payloads.tasks": (
+                "ENDED_TASKS FINAL_REPORTS Order OrderAddress Report ReportAddress ReportState "
+                "TaskAddress TaskRecord TaskState Try"
+            ),
+            "payloads.world": (
+                "Fact FactAddress Object ObjectAddress Place PlaceAddress Statement "
+                "StatementAddress StatementStatus Surface"
+            ),
+            "transport.router": "run_router",
+            "transport.session": (
+                "Change Session SessionConfig TokenChange TokenWatch Watch open_session"
+            ),
+        },
+    )

@@ -7,6 +7,7 @@ beside this one where it was installed as a wheel.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from keyexpr_schema.errors import NoConfigFile
 
@@ -50,3 +51,22 @@ def config_file(kind: str, name: str | Path, named_in: Path | None = None) -> Pa
         f"{', '.join(known) or 'none'} (looked in {', '.join(map(str, folders))}), "
         "or give the path of a file"
     )
+
+
+def read_yaml(path: Path, error: type[Exception]) -> Any:
+    """What a YAML (or JSON) file holds.
+
+    Raises:
+        error: it cannot be read or is neither; the message is one sentence.
+    """
+    import yaml
+
+    try:
+        return yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as reason:
+        raise error(f"{path} cannot be read: {reason.strerror}") from None
+    except UnicodeDecodeError:
+        raise error(f"{path} cannot be read: it is not UTF-8 text") from None
+    except yaml.YAMLError as reason:
+        kind = "JSON" if path.suffix == ".json" else "YAML"
+        raise error(f"{path} is not {kind}: {' '.join(str(reason).split())}") from None

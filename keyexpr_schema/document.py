@@ -33,7 +33,10 @@ the last; *not stored* values reach whoever listens; a *liveliness token* is the
 is connected; *query and reply* keys are written by who sends the query, and read by who replies.
 
 A *person* uses the fleet by robotctl or a program of their own; an *own worker* is the worker of
-the robot that the key names, a *worker* that of any robot.
+the robot that the key names, a *worker* that of any robot. To see who uses which keys in a running
+fleet, start its processes with `ROBOTFLEET_TRACE=FILE`: each session appends a line for every
+operation that it had not done before on a key expression, such as
+`worker-hsr put report robots/hsr/reports/plan-1/t1/1`.
 """
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 
 class SchemaError(Exception):
     """Root of every error this package raises. The message is one sentence for a person."""
@@ -28,12 +30,25 @@ class NoConfigFile(SchemaError):
 
 
 class Unreachable(SchemaError):
-    """No router answers at the configured endpoints."""
+    """No router answers at the configured endpoints, or no store behind it."""
+
+    @classmethod
+    def no_router(cls, endpoints: Sequence[str], for_s: float | None = None) -> Unreachable:
+        """No router answered, for `for_s` [s] if that is given."""
+        waited = "" if for_s is None else f" for {for_s:g} s"
+        return cls(
+            f"no router answers at {', '.join(endpoints)}{waited}: "
+            "start one with `robotctl router` or name another with --router"
+        )
+
+
+class CannotListen(SchemaError):
+    """A router cannot listen on an endpoint: it is taken, or none."""
 
 
 class Unconfirmed(SchemaError):
     """A write that must last was not read back from storage before its deadline."""
 
 
-class NoAnswer(SchemaError):
+class NoReply(SchemaError):
     """A query ended without a reply: nobody serves the key, or the server was too slow."""

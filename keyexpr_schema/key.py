@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum, Flag, auto
+from functools import cached_property
 from typing import Generic, TypeVar
 
 import msgspec
@@ -108,9 +110,7 @@ class Key(Generic[A, P]):
 
     def build(self, address: A) -> str:
         """The key expression of `address`, canonical and without wildcards."""
-        return self.template.format(
-            **{name: getattr(address, name) for name in address.__struct_fields__}
-        )
+        return self.template.format(**msgspec.structs.asdict(address))
 
     def pattern(self, **fixed: str | int) -> str:
         """The key expression that matches every address whose named fields have these values.
@@ -133,27 +133,28 @@ class Key(Generic[A, P]):
         Raises:
             ForeignKey: the key expression is not one of this key.
         """
-        own, other = self.template.split("/"), keyexpr.split("/")
-        values: list[str | int] = []
-        types = self.address.__annotations__
-        try:
-            if len(own) != len(other):
-                raise ValueError
-            for mine, theirs in zip(own, other, strict=True):
-                if not mine.startswith("{"):
-                    if mine != theirs:
-                        raise ValueError
-                elif types[mine[1:-1]] in (int, "int"):
-                    if not re.fullmatch(r"[1-9][0-9]{0,17}", theirs, re.ASCII):
-                        raise ValueError
-                    values.append(int(theirs))
-                else:
-                    values.append(theirs)
-            return self.address(*values)
-        except (ValueError, InvalidId):
-            raise ForeignKey(
-                f"{keyexpr!r} is not a {self.name} key: those look like {self.template!r}"
-            ) from None
+        match = self._parser.fullmatch(keyexpr)
+        if match is not None:
+            with suppress(InvalidId):
+                chunks = zip(match.groups(), self._numbers, strict=True)
+                return self.address(*(int(text) if number else text for text, number in chunks))
+        raise ForeignKey(f"{keyexpr!r} is not a {self.name} key: those look like {self.template!r}")
+
+    @cached_property
+    def _numbers(self) -> list[bool]:
+        """Of each field of the address, whether it is a count."""
+        return [kind in (int, "int") for kind in self.address.__annotations__.values()]
+
+    @cached_property
+    def _parser(self) -> re.Pattern[str]:
+        chunks = iter(self._numbers)
+        return re.compile(
+            re.sub(
+                r"\{\w+\}",
+                lambda _: "([1-9][0-9]{0,17})" if next(chunks) else "([^/]+)",
+                self.template,
+            )
+        )
 
     def encode(self, payload: P) -> bytes:
         """JSON bytes of `payload`; that they decode is for the caller to see to, or `check`."""

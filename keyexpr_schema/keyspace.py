@@ -178,9 +178,9 @@ PLANNER_ALIVE = Key(
     writers=PLANNER, readers=PERSON,
     about="There while that run of the planner is connected.",
 )
-REJECT = Key(
+UNDECODABLE = Key(
     "reject", "rejects/{component}/{digest}",
-    service.RejectAddress, service.Reject, delivery=STORED,
+    service.UndecodableAddress, service.UndecodableValue, delivery=STORED,
     writers=ANYONE, readers=PERSON | RECORDER,
     about="A value that is not what its key promises: which key, why, how often.",
 )

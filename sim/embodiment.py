@@ -7,7 +7,7 @@ import secrets
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, suppress
 from types import TracebackType
 
-from keyexpr_schema.errors import NoAnswer
+from keyexpr_schema.errors import NoReply
 from keyexpr_schema.keyspace import SIM_CLOCK, SIM_MOTION
 from keyexpr_schema.payloads.motions import Motion, MotionOutcome, MotionState, Senses
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -108,10 +108,10 @@ class SimEmbodiment(AbstractAsyncContextManager["SimEmbodiment"]):
         pause_s = 0.05
         while True:
             try:
-                outcome: MotionOutcome = await self._session.ask(
+                outcome: MotionOutcome = await self._session.query(
                     SIM_MOTION, SimRobotAddress(self.robot), call, POLL_S + SLACK_S
                 )
-            except NoAnswer as error:
+            except NoReply as error:
                 if loop.time() + pause_s > deadline_s:
                     raise RobotUnreachable(f"the simulation does not answer: {error}") from None
                 await asyncio.sleep(pause_s)

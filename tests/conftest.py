@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from fleet.llm.client import ModelClient
 from fleet.service.router_process import with_port
 from keyexpr_schema.transport.session import SessionConfig
 
@@ -103,6 +104,14 @@ def router(tmp_path: Path) -> Iterator[RouterProcess]:
         yield process
     finally:
         process.kill()
+
+
+@pytest.fixture(scope="session")
+def model_client() -> Iterator[ModelClient]:
+    """The processes that ask language models: one set for all tests, as LiteLLM starts slowly."""
+    client = ModelClient()
+    yield client
+    client.close()
 
 
 @pytest.fixture

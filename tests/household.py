@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fleet.core.checker.checked_plan import CheckedPlan, check_plan
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.service.composition import load_skills
+from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import Condition, Goal
+from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Object, Place
 
@@ -91,3 +94,26 @@ def home(
         *facts,
     )
     return WorldModel.of(SKILLS, PLACES, tuple(cup(n) for n in range(1, cups + 1)), robots, known)
+
+
+def checked(plan: Plan, world: WorldModel) -> CheckedPlan:
+    """The plan, which must be valid, with its check."""
+    found = check_plan(plan, world)
+    assert isinstance(found, CheckedPlan), found.violations
+    return found
+
+
+def drives(*robots: str, after: dict[int, tuple[str, ...]] | None = None) -> Plan:
+    """A plan of one drive for each; a name pins its actor to that robot, "" leaves it free."""
+    tasks = [
+        Task(
+            task=f"t{n}",
+            skill="navigate",
+            args={"robot": actor_arg(f"a{n}"), "to": "kitchen"},
+            actor=f"a{n}",
+            after=(after or {}).get(n, ()),
+        )
+        for n in range(len(robots))
+    ]
+    pins = {f"a{n}": robot for n, robot in enumerate(robots) if robot}
+    return Plan(plan="p", goals=(), conditions=(), tasks=tuple(tasks), pins=pins)

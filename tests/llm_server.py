@@ -91,7 +91,7 @@ class LlmServer:
         """The URL to configure."""
         return f"http://127.0.0.1:{self._server.server_address[1]}/v1"
 
-    def said(self, request: int) -> str:
+    def prompt(self, request: int) -> str:
         """Everything that the client said in one of its requests."""
         return "\n".join(message["content"] for message in self.requests[request]["messages"])
 

@@ -12,9 +12,11 @@ from itertools import product
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from fleet.core.model.skills import Action, skills_from_data
-from fleet.core.model.world import WorldModel, condition_holds, first_unmet, room_left
-from fleet.planners.deordering import Strand, tasks_from
+from fleet.core.model.preconditions import first_unmet
+from fleet.core.model.skill_file import skills_from_data
+from fleet.core.model.skills import Action
+from fleet.core.model.world import WorldModel, condition_holds, room_left
+from fleet.planners.deordering import ActionSequence, deordered
 from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import Condition
@@ -141,7 +143,7 @@ def plans(draw: st.DrawFn) -> tuple[Plan, WorldModel]:
 
 def _lifted(walk: list[Action]) -> tuple[Task, ...]:
     """Tasks of the actors of `ALLOCATION`, in the order that matters."""
-    tasks, _ = tasks_from([Strand("g", tuple(walk))], one_actor_each=True)
+    tasks, _ = deordered([ActionSequence("g", tuple(walk))], one_actor_each=True)
     actor_of = {robot: actor for actor, robot in ALLOCATION.items()}
     return tuple(
         replace(

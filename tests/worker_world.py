@@ -24,7 +24,7 @@ from sim.files.mission_file import Mission, load_mission
 from sim.files.world_payloads import object_payloads, place_payloads
 from workers.orders.journal import Journal
 from workers.runtime import Worker
-from workers.skill import Skill, SkillRegistry
+from workers.skill_registry import Skill, SkillRegistry
 from workers.skills.household import HOUSEHOLD
 
 DEADLINE_S = 60.0

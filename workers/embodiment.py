@@ -14,7 +14,6 @@ To put a real robot behind it, map each `MotionKind` to what the robot offers (`
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 from keyexpr_schema.payloads.motions import Motion, MotionOutcome, Senses
@@ -76,9 +75,12 @@ class Embodiment(Protocol):
         ...
 
 
-EmbodimentFactory = Callable[[Session, RobotSpec, str], Embodiment]
-"""`(session, spec, incarnation) -> Embodiment`. `incarnation` names this run of the worker: a
-driver that is told of a new one stops what an older one had begun."""
+class EmbodimentFactory(Protocol):
+    """Makes a robot's embodiment. One that is an async context manager is entered and left."""
+
+    def __call__(self, session: Session, spec: RobotSpec, incarnation: str, /) -> Embodiment:
+        """For the run `incarnation` of a worker: what an earlier run had begun is stopped."""
+        ...
 
 
 def installed_embodiment(name: str) -> EmbodimentFactory:

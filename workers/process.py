@@ -1,4 +1,4 @@
-"""A worker as a process: `run` is the main function of `robotctl worker`."""
+"""A worker as a process: `run_worker` is the main function of `robotctl worker`."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from keyexpr_schema.transport.session import Session, SessionConfig, open_sessio
 from workers.embodiment import Embodiment, EmbodimentFactory
 from workers.orders.journal import Journal
 from workers.runtime import Worker
-from workers.skill import Skill, SkillRegistry
+from workers.skill_registry import Skill, SkillRegistry
 from workers.skills.household import HOUSEHOLD
 
 WAITING_LINE_S = 1.0
 """Wall seconds of waiting for a robot to be registered before it is announced."""
 
 
-def run(
+def run_worker(
     robot: str,
     endpoints: tuple[str, ...],
     realm: str,

@@ -28,7 +28,7 @@ from workers.recovery import (
 )
 from workers.retry import run_attempt
 from workers.single_instance import ensure_single_worker
-from workers.skill import SkillRegistry
+from workers.skill_registry import SkillRegistry
 from workers.state_publisher import StatePublisher
 from workers.world_cache import WORLD_KEYS, WorldCache
 

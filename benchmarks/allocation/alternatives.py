@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fleet.allocators.min_max_load import Bound, min_max_load
-from fleet.allocators.solver_run import solve
+from fleet.allocators.min_max_load_program import MinMaxLoadProgram, solve
 from fleet.jobshop.instance import Instance
 from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.problem import Shop
@@ -72,8 +71,11 @@ def papers_milp(instance: Instance) -> list[int] | None:
         return None
     able = {str(b): tuple(map(str, block.machines)) for b, block in enumerate(blocks)}
     load = {str(b): len(block.operations) for b, block in enumerate(blocks)}
-    made = min_max_load(able, load, frozenset(), Bound(), MILP_S)
-    return None if made.robot is None else [int(made.robot[str(b)]) for b in range(len(blocks))]
+    program = MinMaxLoadProgram(able, load)
+    program.minimise_max_load()
+    values = solve(program.model, MILP_S).values
+    robots = program.robots(values) if values else None
+    return None if robots is None else [int(robots[str(b)]) for b in range(len(blocks))]
 
 
 def big_m(instance: Instance) -> float | None:

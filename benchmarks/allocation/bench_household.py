@@ -27,13 +27,13 @@ from benchmarks.allocation.household import (
     scenarios,
     world_of,
 )
-from fleet.allocators.balanced import BalancedAllocator
 from fleet.allocators.base import Allocated, Allocator
 from fleet.allocators.cost_based import CostBasedAllocator
 from fleet.allocators.llm import LlmAllocator
 from fleet.allocators.makespan import DEADLINE_S, MakespanAllocator
-from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.allocators.round_robin import RoundRobinAllocator
+from fleet.core.checker.checked_plan import CheckedPlan, check_plan
 from fleet.core.schedule.idle_time import predicted_unit, union_s
 from fleet.llm import LanguageModel, load_llm_config
 
@@ -63,14 +63,19 @@ def allocators(limit_s: float = DEADLINE_S, llm_file: Path | None = None) -> tup
     """Those that are compared; the language model only where one is configured."""
     own: tuple[Allocator, ...] = (
         MakespanAllocator(limit_s),
-        BalancedAllocator(),
-        MilpAllocator(),
+        MinMaxLoadAllocator(TieBreak.NEXT_LOADS),
+        MinMaxLoadAllocator(TieBreak.TRAVEL),
         CostBasedAllocator(),
         RoundRobinAllocator(),
     )
     if llm_file is None:
         return own
-    return (*own, LlmAllocator(LanguageModel(load_llm_config(llm_file)), BalancedAllocator()))
+    return (
+        *own,
+        LlmAllocator(
+            LanguageModel(load_llm_config(llm_file)), MinMaxLoadAllocator(TieBreak.NEXT_LOADS)
+        ),
+    )
 
 
 def runs(seeds: int, compared: Sequence[Allocator], console: Console) -> list[Run]:
@@ -93,10 +98,11 @@ def compare(
 ) -> list[Run]:
     """All allocators on one task graph."""
     home = household(scenario, seed)
-    plan, world = plan_of(home, strategy), world_of(home, clock)
+    checked = check_plan(plan_of(home, strategy), world_of(home, clock))
+    assert isinstance(checked, CheckedPlan), checked
     answers: dict[str, Allocated] = {}
     for allocator in compared:
-        answer = allocator.allocate(plan, world)
+        answer = allocator.allocate(checked)
         assert isinstance(answer, Allocated), (allocator.name, answer)
         answers[allocator.name] = answer
     bound_s = max(answer.lower_bound_s or 0.0 for answer in answers.values())
@@ -109,7 +115,7 @@ def compare(
             name,
             answer.schedule.makespan_s,
             bound_s,
-            predicted_unit(plan, answer.allocation).mean,
+            predicted_unit(checked.plan, answer.allocation).mean,
             1 - _work_s(answer) / (len(home.robots) * answer.schedule.makespan_s),
             max(0.0, 1 - _work_s(answer) / (len(home.robots) * bound_s)),
         )

@@ -21,12 +21,12 @@ from rich.table import Table
 from benchmarks.allocation.alternatives import big_m, in_turn, makespan_s, nearest, papers_milp
 from benchmarks.allocation.shop_files import NAMES, load
 from benchmarks.allocation.shops import random_shop
-from fleet.jobshop.budget import Budget
 from fleet.jobshop.instance import Instance
 from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.portfolio import solve
 from fleet.jobshop.problem import Machine, Shop
 from fleet.jobshop.rescheduling import reschedule, without_machines
+from fleet.jobshop.time_budget import TimeBudget
 
 SIZES = ((8, 3), (10, 3), (20, 4), (50, 5), (100, 10), (1000, 50), (10_000, 1000))
 LIMITS_S = (1.0, 10.0)
@@ -38,7 +38,7 @@ LOST, LATE_S = 2, 300.0
 """The robot that is lost, or late by so much [s]."""
 LOSS = (1000, 50)
 PUBLIC_S = 30.0
-MENDING_S = 0.7
+RESCHEDULING_S = 0.7
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Public:
 
 
 @dataclass(frozen=True)
-class Mended:
+class Rescheduling:
     """One robot lost or late in a plan of 1,000 tasks for 50 robots; times in s."""
 
     what: str
@@ -86,13 +86,13 @@ class Mended:
     took_s: float
 
 
-def sizes(largest: int, limits_s: Sequence[float], tell: Callable[[str], None]) -> list[Size]:
+def sizes(largest: int, limits_s: Sequence[float], announce: Callable[[str], None]) -> list[Size]:
     """Every size with and without travel."""
     found = []
     for tasks, robots in SIZES:
         for travel in (False, True):
             if tasks <= largest:
-                tell(f"{tasks} x {robots}{', travel' if travel else ''}")
+                announce(f"{tasks} x {robots}{', travel' if travel else ''}")
                 found.append(size(tasks, robots, travel, limits_s))
     return found
 
@@ -106,7 +106,7 @@ def size(tasks: int, robots: int, travel: bool, limits_s: Sequence[float], seed:
     took: dict[str, float] = {}
     how: dict[str, str] = {}
 
-    def schedule_of(name: str, run: Callable[[], float | None]) -> None:
+    def measure(name: str, run: Callable[[], float | None]) -> None:
         began_s = time.perf_counter()
         found_s = run()
         if found_s is not None:
@@ -120,16 +120,16 @@ def size(tasks: int, robots: int, travel: bool, limits_s: Sequence[float], seed:
         found = list_schedule(Instance(shop))
         return None if found is None else found.makespan_s
 
-    schedule_of("greedy nearest", lambda: by_hand(nearest))
-    schedule_of("round-robin", lambda: by_hand(in_turn))
-    schedule_of("paper's MILP", lambda: by_hand(papers_milp))
-    schedule_of("big-M MILP", lambda: big_m(ready))
-    schedule_of("list schedule", listed)
+    measure("greedy nearest", lambda: by_hand(nearest))
+    measure("round-robin", lambda: by_hand(in_turn))
+    measure("paper's MILP", lambda: by_hand(papers_milp))
+    measure("big-M MILP", lambda: big_m(ready))
+    measure("list schedule", listed)
     bound_s, proven = 0.0, False
     for limit_s in limits_s:
         name = f"makespan, {limit_s:g} s"
         began_s = time.perf_counter()
-        found = solve(shop, Budget(limit_s))
+        found = solve(shop, TimeBudget(limit_s))
         took[name] = time.perf_counter() - began_s
         assert found is not None
         made[name], how[name] = found.makespan_s, ", ".join(found.notes)
@@ -145,20 +145,20 @@ def coalitions(limit_s: float = 10.0, seeds: int = 10) -> list[tuple[float, floa
     for seed in range(seeds):
         shop = random_shop(8, 3, True, COALITIONS, seed)
         began_s = time.perf_counter()
-        made = solve(shop, Budget(limit_s))
+        made = solve(shop, TimeBudget(limit_s))
         assert made is not None
         found.append((made.gap, time.perf_counter() - began_s))
     return found
 
 
-def public(limit_s: float, tell: Callable[[str], None]) -> list[Public]:
+def public(limit_s: float, announce: Callable[[str], None]) -> list[Public]:
     """The public instances; how long until the proof, or the limit."""
     found = []
     for name in NAMES:
-        tell(name)
+        announce(name)
         instance = load(name)
         began_s = time.perf_counter()
-        made = solve(instance.shop, Budget(limit_s))
+        made = solve(instance.shop, TimeBudget(limit_s))
         took_s = time.perf_counter() - began_s
         assert made is not None and instance.optimum_s is not None
         how = ", ".join(made.notes)
@@ -168,24 +168,26 @@ def public(limit_s: float, tell: Callable[[str], None]) -> list[Public]:
     return found
 
 
-def mended() -> list[Mended]:
+def rescheduling() -> list[Rescheduling]:
     """A robot lost, and one late, before 1,000 tasks, without and with travel."""
     found = []
     for travel in (False, True):
         shop = random_shop(*LOSS, travel, MEETINGS if travel else 0.0)
-        planned = solve(shop, Budget(2.0), exact=False)
+        planned = solve(shop, TimeBudget(2.0), exact=False)
         assert planned is not None
         for what in ("lost", "late"):
             left = without_machines(shop, frozenset({LOST})) if what == "lost" else _late(shop)
             frozen = under_way(shop, planned.machine_of, planned.order, LOST)
             began_s = time.perf_counter()
-            made = reschedule(left, planned.machine_of, planned.order, Budget(MENDING_S), frozen)
+            made = reschedule(
+                left, planned.machine_of, planned.order, TimeBudget(RESCHEDULING_S), frozen
+            )
             took_s = time.perf_counter() - began_s
             scratch = list_schedule(Instance(left))
             assert made is not None and scratch is not None
             pairs = zip(scratch.machine_of, planned.machine_of, strict=True)
             found.append(
-                Mended(
+                Rescheduling(
                     what,
                     travel,
                     planned.makespan_s,
@@ -264,7 +266,7 @@ def public_rows(found: Sequence[Public]) -> Rows:
     ]
 
 
-def mended_rows(found: Sequence[Mended]) -> Rows:
+def rescheduling_rows(found: Sequence[Rescheduling]) -> Rows:
     """What was before, what is now, what a new plan would have been."""
     head = (
         "robot", "travel", "before", "its blocks", "under way, stayed", "after", "best found",
@@ -312,7 +314,7 @@ def main() -> None:
             as_table("public instances", public_rows(public(chosen.public_s, console.print)))
         )
     if chosen.only in (None, "loss"):
-        console.print(as_table("one of 50 robots, 1,000 tasks", mended_rows(mended())))
+        console.print(as_table("one of 50 robots, 1,000 tasks", rescheduling_rows(rescheduling())))
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from typing import Any
 
 import yaml
 
-from fleet.core.model.skills import skills_from_data
+from fleet.core.model.skill_file import skills_from_data
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import AT
 from keyexpr_schema.ids import actor_arg
@@ -77,11 +77,11 @@ def scenarios() -> tuple[str, ...]:
 def household(scenario: str, seed: int) -> Household:
     """The household that a seed draws; the same for the same arguments."""
     random = Random(f"{scenario} {seed}")
-    told = data()["scenarios"][scenario]
-    chores = [chore for goal in told["goals"] for chore in _chores(goal, random)]
+    scenario_data = data()["scenarios"][scenario]
+    chores = [chore for goal in scenario_data["goals"] for chore in _chores(goal, random)]
     needed = sorted({chore.needs for chore in chores})
     robots: list[RobotSpec] = []
-    for number, kind in enumerate(told["robots"], start=1):
+    for number, kind in enumerate(scenario_data["robots"], start=1):
         about = data()["kinds"][kind]
         has = {c for c in needed if c in about["has"] or random.random() < CHANCE}
         robots.append(
@@ -92,7 +92,7 @@ def household(scenario: str, seed: int) -> Household:
                 capabilities={"drive": about["speed_m_s"], **dict.fromkeys(sorted(has), 1.0)},
             )
         )
-    return Household(scenario, seed, tuple(robots), tuple(told["goals"]), tuple(chores))
+    return Household(scenario, seed, tuple(robots), tuple(scenario_data["goals"]), tuple(chores))
 
 
 def _chores(goal: str, random: Random) -> list[Chore]:

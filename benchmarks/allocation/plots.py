@@ -10,7 +10,7 @@ from benchmarks.allocation.bench_household import PAPER
 from benchmarks.allocation.household import REAL, STRATEGIES, scenarios
 
 
-def draw(folder: Path, told: dict[str, Any]) -> dict[str, tuple[str, str]]:
+def draw(folder: Path, parts: dict[str, Any]) -> dict[str, tuple[str, str]]:
     """Draw what there are results of: by part, the file and what it shows."""
     import matplotlib
 
@@ -19,10 +19,15 @@ def draw(folder: Path, told: dict[str, Any]) -> dict[str, tuple[str, str]]:
     for part, run, name, about in (
         ("household", _households, "allocation-idle.png", "Idle time of the fleet"),
         ("sizes", _sizes, "allocation-sizes.png", "Makespan by lower bound, by size"),
-        ("mended", _mended, "allocation-mended.png", "Moves and makespan after a loss"),
+        (
+            "rescheduling",
+            _rescheduling,
+            "allocation-rescheduling.png",
+            "Moves and makespan after a loss",
+        ),
     ):
-        if part in told:
-            run(told[part]["results"], folder / name)
+        if part in parts:
+            run(parts[part]["results"], folder / name)
             drawn[part] = (name, about)
     return drawn
 
@@ -117,7 +122,7 @@ def _sizes(results: list[dict[str, Any]], path: Path) -> None:
     plt.close(figure)
 
 
-def _mended(results: list[dict[str, Any]], path: Path) -> None:
+def _rescheduling(results: list[dict[str, Any]], path: Path) -> None:
     import matplotlib.pyplot as plt
 
     figure, axis = plt.subplots(figsize=(8, 3.6), layout="constrained")
@@ -126,7 +131,7 @@ def _mended(results: list[dict[str, Any]], path: Path) -> None:
         travel = "travel" if row["travel"] else "no travel"
         labels.append(f"{row['what']}, {travel}")
         for shift, moves, after_s, color, label in (
-            (-0.2, row["moved"], row["after_s"], "C0", "mended"),
+            (-0.2, row["moved"], row["after_s"], "C0", "rescheduled"),
             (0.2, row["scratch_moved"], row["scratch_s"], "C1", "from scratch"),
         ):
             axis.bar(place + shift, moves, 0.38, color=color, label=None if place else label)

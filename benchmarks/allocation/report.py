@@ -37,9 +37,9 @@ def tables(part: str, results: Any) -> list[tuple[str, Rows]]:
     if part == "public":
         found_public = [bench_makespan.Public(**row) for row in results]
         return [("Public instances", bench_makespan.public_rows(found_public))]
-    if part == "mended":
-        found_mended = [bench_makespan.Mended(**row) for row in results]
-        return [("One of 50 robots, 1,000 tasks", bench_makespan.mended_rows(found_mended))]
+    if part == "rescheduling":
+        repaired = [bench_makespan.Rescheduling(**row) for row in results]
+        return [("One of 50 robots, 1,000 tasks", bench_makespan.rescheduling_rows(repaired))]
     return [("balanced: 10,000 tasks, 1,000 robots", _balanced_rows(results))]
 
 
@@ -64,9 +64,9 @@ def _balanced_rows(results: Sequence[dict[str, Any]]) -> Rows:
     ]
 
 
-def show(part: str, told: dict[str, Any], console: Console) -> None:
+def show(part: str, measured: dict[str, Any], console: Console) -> None:
     """Print a part."""
-    for title, rows in tables(part, told["results"]):
+    for title, rows in tables(part, measured["results"]):
         console.print(bench_makespan.as_table(title, rows))
 
 
@@ -93,21 +93,21 @@ def best_by_reference(results: Sequence[dict[str, Any]], scenario: str) -> tuple
     return 100 * mean(found[name]), name
 
 
-def write(folder: Path, told: dict[str, Any]) -> None:
+def write(folder: Path, measured: dict[str, Any]) -> None:
     """allocation.md with its plots, from all parts that there are."""
     folder.mkdir(parents=True, exist_ok=True)
-    drawn = plots.draw(folder, told)
+    drawn = plots.draw(folder, measured)
     texts = _texts()
     parts = [texts.pop("head").format(packages=_packages())]
     for part, text in texts.items():
-        if part not in told:
+        if part not in measured:
             continue
-        parts.append(text.format(**_facts(part, told[part]["results"])))
+        parts.append(text.format(**_facts(part, measured[part]["results"])))
         if part in drawn:
             parts.append(f"![{drawn[part][1]}]({drawn[part][0]})")
-        for title, rows in tables(part, told[part]["results"]):
+        for title, rows in tables(part, measured[part]["results"]):
             parts.append(f"**{title}**\n\n{as_markdown(rows[0], rows[1])}")
-        about = told[part]
+        about = measured[part]
         parts.append(
             f"`{about['command']}`: {about['took_s']:.0f} s on {about['machine']}; "
             f"load average before it began: {about['load_before']}."
@@ -118,7 +118,7 @@ def write(folder: Path, told: dict[str, Any]) -> None:
 
 def _packages() -> str:
     found = []
-    for name in ("ortools", "highspy", "pulp"):
+    for name in ("ortools", "pulp", "scipy"):
         try:
             found.append(f"{name} {version(name)}")
         except PackageNotFoundError:

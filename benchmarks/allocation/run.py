@@ -20,7 +20,7 @@ from typing import Any
 
 from rich.console import Console
 
-from benchmarks.allocation import bench_household, bench_makespan, report
+from benchmarks.allocation import bench_balanced, bench_household, bench_makespan, report
 from benchmarks.planning.report import machine
 from fleet.allocators.makespan import DEADLINE_S
 
@@ -29,7 +29,7 @@ QUICK_SEEDS = 3
 
 def main() -> None:
     """Run the parts that were asked for, and write everything."""
-    parts = ("household", "sizes", "coalitions", "public", "mended", "balanced")
+    parts = ("household", "sizes", "coalitions", "public", "rescheduling", "balanced")
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--quick", action="store_true")
     options.add_argument("--only", nargs="+", choices=parts, default=parts)
@@ -40,34 +40,34 @@ def main() -> None:
     options.add_argument("--llm-config", type=Path, help="add the allocator llm with this model")
     given = options.parse_args()
     console = Console(width=180)
-    told: dict[str, Any] = {}
+    measured: dict[str, Any] = {}
     known = given.out / "allocation.json" if given.out else None
     if known is not None:
         known.parent.mkdir(parents=True, exist_ok=True)
     if known is not None and known.exists():
-        told = json.loads(known.read_text(encoding="utf-8"))
+        measured = json.loads(known.read_text(encoding="utf-8"))
     runs = _runs(given, console)
     for part in given.only:
         began_s = time.perf_counter()
         load = os.getloadavg()[0]
         results = runs[part]()
-        told[part] = {
+        measured[part] = {
             "command": " ".join(["python -m benchmarks.allocation.run", *sys.argv[1:]]),
             "machine": machine(),
             "load_before": round(load, 1),
             "took_s": round(time.perf_counter() - began_s, 1),
             "results": results,
         }
-        report.show(part, told[part], console)
+        report.show(part, measured[part], console)
         if known is not None:
-            known.write_text(as_json(told), encoding="utf-8")
+            known.write_text(as_json(measured), encoding="utf-8")
     if given.out is not None:
-        report.write(given.out, told)
+        report.write(given.out, measured)
 
 
-def as_json(told: dict[str, Any]) -> str:
+def as_json(measured: dict[str, Any]) -> str:
     """A line a part, numbers to six digits."""
-    rounded = json.loads(json.dumps(told), parse_float=lambda text: float(f"{float(text):.6g}"))
+    rounded = json.loads(json.dumps(measured), parse_float=lambda text: float(f"{float(text):.6g}"))
     parts = (
         f"{json.dumps(part)}: {json.dumps(about, separators=(',', ':'))}"
         for part, about in rounded.items()
@@ -93,7 +93,7 @@ def _runs(given: argparse.Namespace, console: Console) -> dict[str, Callable[[],
         "public": lambda: [
             asdict(one) for one in bench_makespan.public(bench_makespan.PUBLIC_S, console.print)
         ],
-        "mended": lambda: [asdict(one) for one in bench_makespan.mended()],
+        "rescheduling": lambda: [asdict(one) for one in bench_makespan.rescheduling()],
         "balanced": _balanced,
     }
 
@@ -101,7 +101,7 @@ def _runs(given: argparse.Namespace, console: Console) -> dict[str, Callable[[],
 def _balanced() -> list[dict[str, Any]]:
     """Rows of bench_balanced at its largest size, each in a process of its own."""
     found = []
-    for kind in ("alike", "types", "different", "random", "sparse", "skewed", "weighted", "apart"):
+    for kind in bench_balanced.KINDS:
         command = [sys.executable, "-m", "benchmarks.allocation.bench_balanced", "--one"]
         ran = subprocess.run(
             [*command, kind, "10000", "1000"], capture_output=True, text=True, check=True

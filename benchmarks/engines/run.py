@@ -26,11 +26,11 @@ from rich.table import Table
 from benchmarks.bench_planner import goals_of, household
 from benchmarks.engines import pddl
 from fleet.allocators.base import Allocated, Allocator
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
-from fleet.planners.deordering import Strand, tasks_from
+from fleet.planners.deordering import ActionSequence, deordered
 from fleet.service.composition import Composition, compose
 from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.payloads.goals import Goal
@@ -89,13 +89,13 @@ def _own(size: tuple[int, int], parts: Composition) -> list[Row]:
     world, goals = household(*size, parts), goals_of(size[0])
     problem = PlanningProblem(plan="p", goals=goals, world=world, strategy="big-dag")
     began_s = time.process_time()
-    plan = parts.planners["symbolic"].plan(problem)
+    planned = parts.planners["symbolic"].plan(problem)
     took_s = time.process_time() - began_s
-    if isinstance(plan, NoPlan):
-        return [Row(size, "own search", plan.reason)]
-    made = _makespan_s(plan, world, parts.allocators["milp"])
-    best = _makespan_s(plan, world, parts.allocators["makespan"])
-    return [Row(size, "own search", "solved", took_s, len(plan.tasks), made, best)]
+    if isinstance(planned, NoPlan):
+        return [Row(size, "own search", planned.reason)]
+    made = _makespan_s(planned, parts.allocators["milp"])
+    best = _makespan_s(planned, parts.allocators["makespan"])
+    return [Row(size, "own search", "solved", took_s, len(planned.plan.tasks), made, best)]
 
 
 def _engine(
@@ -106,13 +106,13 @@ def _engine(
     if answer["status"] != "solved":
         return Row(size, engine, answer.get("why") or answer["status"])
     actions = pddl.actions(answer["steps"], world)
-    own = _plan([Strand("g", tuple(actions))], goals, together=True)
+    own = _plan([ActionSequence("g", tuple(actions))], goals, together=True)
     bound = {task.actor: actions[i].actor for i, task in enumerate(own.tasks)}
     checked = check_plan(own, world)
-    if not checked.valid:
+    if isinstance(checked, InvalidPlan):
         return Row(size, engine, f"rejected: {checked.violations[0].sentence}")
-    as_chosen = _Bound(bound).allocate(own, world)
-    cut = _plan(_strands(actions, world), goals, together=False)
+    as_chosen = _Bound(bound).allocate(checked)
+    cut = check_plan(_plan(_sequences(actions, world), goals, together=False), world)
     return Row(
         size,
         engine,
@@ -120,7 +120,7 @@ def _engine(
         answer["seconds"],
         len(actions),
         as_chosen.schedule.makespan_s if isinstance(as_chosen, Allocated) else None,
-        _makespan_s(cut, world, parts.allocators["makespan"]),
+        _makespan_s(cut, parts.allocators["makespan"]) if isinstance(cut, CheckedPlan) else None,
     )
 
 
@@ -157,12 +157,12 @@ class _Bound(Allocator):
         return self._bound
 
 
-def _strands(actions: Sequence[Action], world: WorldModel) -> list[Strand]:
+def _sequences(actions: Sequence[Action], world: WorldModel) -> list[ActionSequence]:
     """A sequence cut where a robot's hand is empty again, so that others can take over; each part
     begins with the way to its first place, whoever does it.
     """
     open_: dict[str, list[Action]] = {}
-    strands: list[Strand] = []
+    sequences: list[ActionSequence] = []
     for action in actions:
         mine = open_.setdefault(action.actor, [])
         for helper in action.participants[1:]:
@@ -175,18 +175,18 @@ def _strands(actions: Sequence[Action], world: WorldModel) -> list[Strand]:
                 mine.append(go)
         mine.append(action)
         if any(row.variable.relation == HOLDING and row.value == NOTHING for row in action.after):
-            strands.append(Strand("g", tuple(open_.pop(action.actor))))
-    return strands
+            sequences.append(ActionSequence("g", tuple(open_.pop(action.actor))))
+    return sequences
 
 
-def _plan(strands: Sequence[Strand], goals: Sequence[Goal], together: bool) -> Plan:
-    tasks, pins = tasks_from(strands, one_actor_each=together)
+def _plan(sequences: Sequence[ActionSequence], goals: Sequence[Goal], together: bool) -> Plan:
+    tasks, pins = deordered(sequences, one_actor_each=together)
     conditions = tuple(c for goal in goals for c in goal.conditions)
     return Plan(plan="p", goals=("g",), conditions=conditions, tasks=tasks, pins=pins)
 
 
-def _makespan_s(plan: Plan, world: WorldModel, allocator: Allocator) -> float | None:
-    found = allocator.allocate(plan, world)
+def _makespan_s(checked: CheckedPlan, allocator: Allocator) -> float | None:
+    found = allocator.allocate(checked)
     return found.schedule.makespan_s if isinstance(found, Allocated) else None
 
 

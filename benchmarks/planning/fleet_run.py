@@ -33,7 +33,7 @@ from keyexpr_schema.payloads.world import Fact, FactAddress, ObjectAddress, Plac
 from keyexpr_schema.transport.watch import Change
 from sim.files.world_payloads import object_payloads
 from sim.kinematic.backend import KinematicBackend
-from workers.skill import SkillRegistry
+from workers.skill_registry import SkillRegistry
 from workers.skills.household import HOUSEHOLD
 from workers.world_cache import WorldCache
 

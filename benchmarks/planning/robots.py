@@ -16,7 +16,7 @@ from workers.errors import BadArguments, UnknownSkill
 from workers.orders.reports import make_report
 from workers.recovery import make_safe, observe_robot
 from workers.retry import run_attempt
-from workers.skill import SkillRegistry
+from workers.skill_registry import SkillRegistry
 from workers.world_cache import WorldCache
 
 INCARNATION = "benchmark"

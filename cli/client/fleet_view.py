@@ -13,14 +13,12 @@ from msgspec.structs import astuple
 from cli.errors import TooLate
 from keyexpr_schema.errors import Unreachable
 from keyexpr_schema.facts import FactKey
-from keyexpr_schema.key import Payload
 from keyexpr_schema.keyspace import (
     FACT,
     GOAL_SPEC,
     GOAL_STATUS,
     PLAN_SPEC,
     PLAN_STATUS,
-    REJECT,
     ROBOT_SPEC,
     ROBOT_STATE,
     SIM_CLOCK,
@@ -29,12 +27,13 @@ from keyexpr_schema.keyspace import (
     SIM_SENSES,
     SIM_TRUTH,
     TASK_RECORD,
+    UNDECODABLE,
 )
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalStatus
 from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.plans import Plan, PlanStatus
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
-from keyexpr_schema.payloads.service import Reject
+from keyexpr_schema.payloads.service import UndecodableValue
 from keyexpr_schema.payloads.simulation import ContactCount, Scene, SimClock, Truth
 from keyexpr_schema.payloads.tasks import TaskRecord
 from keyexpr_schema.payloads.world import Fact
@@ -58,6 +57,21 @@ SIMULATION_KEYS = (SIM_CLOCK, SIM_TRUTH, SIM_CONTACTS, SIM_SCENE, SIM_SENSES)
 SYNC_S = 10.0
 """Longest time for the store to list what it has."""
 
+_TABLES = {
+    GOAL_SPEC.name: "goals",
+    GOAL_STATUS.name: "goal_status",
+    PLAN_SPEC.name: "plans",
+    PLAN_STATUS.name: "plan_status",
+    TASK_RECORD.name: "tasks",
+    ROBOT_SPEC.name: "robot_specs",
+    ROBOT_STATE.name: "robot_states",
+    FACT.name: "facts",
+    UNDECODABLE.name: "undecodable",
+    SIM_TRUTH.name: "truths",
+    SIM_SENSES.name: "senses",
+}
+_LATEST = {SIM_CLOCK.name: "clock", SIM_CONTACTS.name: "contacts", SIM_SCENE.name: "scene"}
+
 
 @dataclass
 class FleetView:
@@ -76,7 +90,7 @@ class FleetView:
     robot_specs: dict[str, RobotSpec] = field(default_factory=dict)
     robot_states: dict[str, RobotState] = field(default_factory=dict)
     facts: dict[FactKey, Fact] = field(default_factory=dict)
-    rejects: dict[tuple[str, str], Reject] = field(default_factory=dict)
+    undecodable: dict[tuple[str, str], UndecodableValue] = field(default_factory=dict)
     truths: dict[str, Truth] = field(default_factory=dict)
     senses: dict[str, Senses] = field(default_factory=dict)
     clock: SimClock | None = None
@@ -87,39 +101,17 @@ class FleetView:
 
     def apply(self, change: Change[Any, Any]) -> None:
         """Take in one change of a key."""
-        value: Payload | None = change.value
-        table = self._table(change.key.name)
-        if table is not None:
+        if (attribute := _LATEST.get(change.key.name)) and change.value is not None:
+            setattr(self, attribute, change.value)
+        elif attribute := _TABLES.get(change.key.name):
+            table = getattr(self, attribute)
             address = change.address.key if change.key is FACT else astuple(change.address)
             at = address if len(address) > 1 else address[0]
-            if value is None:
+            if change.value is None:
                 table.pop(at, None)
             else:
-                table[at] = value
-        elif value is not None:
-            if isinstance(value, SimClock):
-                self.clock = value
-            elif isinstance(value, ContactCount):
-                self.contacts = value
-            elif isinstance(value, Scene):
-                self.scene = value
+                table[at] = change.value
         self.changed.set()
-
-    def _table(self, key: str) -> dict[Any, Any] | None:
-        tables: dict[str, dict[Any, Any]] = {
-            GOAL_SPEC.name: self.goals,
-            GOAL_STATUS.name: self.goal_status,
-            PLAN_SPEC.name: self.plans,
-            PLAN_STATUS.name: self.plan_status,
-            TASK_RECORD.name: self.tasks,
-            ROBOT_SPEC.name: self.robot_specs,
-            ROBOT_STATE.name: self.robot_states,
-            SIM_TRUTH.name: self.truths,
-            SIM_SENSES.name: self.senses,
-            REJECT.name: self.rejects,
-            FACT.name: self.facts,
-        }
-        return tables.get(key)
 
     @property
     def now_s(self) -> float | None:
@@ -129,6 +121,10 @@ class FleetView:
         times = [state.time_s for state in self.robot_states.values()]
         times += [status.time_s for status in self.plan_status.values()]
         return max(times, default=None)
+
+    def records(self, plan: str) -> dict[str, TaskRecord]:
+        """The records of a plan's tasks, by task."""
+        return {task: record for (of, task), record in self.tasks.items() if of == plan}
 
     def changed_s(self, plan: str) -> float:
         """When a plan last changed, as far as its status says (0: no status)."""

@@ -6,11 +6,10 @@ import asyncio
 import uuid
 from collections.abc import Iterable
 from contextlib import suppress
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 from cli.client.presence import planner_alive
-from cli.errors import NotRunning, Refused, TooLate, Unknown
+from cli.errors import NotRunning, Refused, TooLate, Unknown, near_miss
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import (
     ANSWER,
@@ -123,8 +122,7 @@ async def check_skills(session: Session, specs: Iterable[RobotSpec]) -> None:
     for spec in specs:
         for skill in spec.skills:
             if skill not in planner.skills:
-                near = get_close_matches(skill, planner.skills, n=1)
-                hint = f" (did you mean {near[0]!r}?)" if near else ""
+                hint = near_miss(skill, planner.skills)
                 raise Unknown(
                     f"robot {spec.robot!r}: the planner knows no skill {skill!r}{hint}; it knows "
                     f"{', '.join(sorted(planner.skills))}; "

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, command
+from cli.command import Call, single
+from cli.commands.processes import BACKENDS, BackendOption, MissionArgument, parse_speed
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -17,18 +18,12 @@ if TYPE_CHECKING:
     from cli.demo.summary import Summary
     from cli.views.live import ChangePrinter
 
-app = typer.Typer(rich_markup_mode=None, add_completion=False)
 
-
-@command(app)
+@single
 async def demo(
     call: Call,
-    mission: Annotated[
-        str, typer.Argument(metavar="MISSION", help="A mission's file, or name as two-cups.")
-    ],
-    backend: Annotated[
-        str, typer.Option("--backend", help="mujoco (physics) or kinematic (fast, no physics).")
-    ] = "mujoco",
+    mission: MissionArgument,
+    backend: BackendOption = "mujoco",
     speed: Annotated[
         str, typer.Option("--headless-speed", help="Simulated seconds a second, or max.")
     ] = "max",
@@ -47,7 +42,6 @@ async def demo(
     """
     import msgspec
 
-    from cli.commands.processes import BACKENDS, parse_speed
     from cli.demo.bring_up import DemoOptions
     from cli.errors import check_known
     from cli.views.live import ChangePrinter

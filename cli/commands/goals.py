@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, command
-from cli.parsing import Group
+from cli.command import Call, command, group
 
 if TYPE_CHECKING:
     from keyexpr_schema.payloads.goals import Goal, GoalStatus
@@ -17,13 +16,8 @@ UNDERSTANDING_S = 10.0
 READING_S = 180.0
 """How long a language model may take to read a sentence that the grammar refuses."""
 
-app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, add_completion=False)
+app = group("Say what you want, in a sentence; see what became of it.")
 GoalArgument = Annotated[str, typer.Argument(metavar="GOAL", help="Its name.")]
-
-
-@app.callback()
-def goal() -> None:
-    """Say what you want, in a sentence; see what became of it."""
 
 
 @command(app, "add")

@@ -6,36 +6,32 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli.command import Call, command
+from cli.command import Call, single
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from keyexpr_schema.transport.session import Change
 
-status_app = typer.Typer(rich_markup_mode=None, add_completion=False)
-watch_app = typer.Typer(rich_markup_mode=None, add_completion=False)
-journal_app = typer.Typer(rich_markup_mode=None, add_completion=False)
 
-
-@command(status_app)
+@single
 async def status(call: Call) -> None:
     """The whole fleet on one page: router, planner, robots, goals, plans, unreadable values."""
     from cli.client.fleet_view import FLEET_KEYS, snapshot
     from cli.client.planner import planner_status
     from cli.client.presence import planner_alive, robots_alive
-    from cli.client.rejects import current_rejects
+    from cli.client.undecodable import still_undecodable
     from cli.views.goals import goal_rows
     from cli.views.robots import robot_rows
     from cli.views.status import status_page
-    from keyexpr_schema.keyspace import REJECT
+    from keyexpr_schema.keyspace import UNDECODABLE
 
     async with call.session() as session:
-        view = await snapshot(session, *FLEET_KEYS, REJECT)
+        view = await snapshot(session, *FLEET_KEYS, UNDECODABLE)
         planner = await planner_status(session)
         planning = await planner_alive(session)
         connected = await robots_alive(session)
-        rejects = await current_rejects(session, view.rejects.values())
+        undecodable = await still_undecodable(session, view.undecodable.values())
     robots = robot_rows(view.robot_specs, view.robot_states, connected)
     goals = goal_rows(view.goals, view.goal_status)
     settings = call.settings
@@ -47,15 +43,15 @@ async def status(call: Call) -> None:
             "robots": robots,
             "goals": goals,
             "plans": list(view.plan_status.values()),
-            "rejects": rejects,
+            "rejects": undecodable,
         },
         lambda: status_page(
-            settings.routers, settings.realm, planner, planning, robots, goals, view, rejects
+            settings.routers, settings.realm, planner, planning, robots, goals, view, undecodable
         ),
     )
 
 
-@command(watch_app)
+@single
 async def watch(
     call: Call,
     plan: Annotated[
@@ -91,7 +87,7 @@ def _as_json(change: Change[Any, Any]) -> None:
     typer.echo(msgspec.json.encode(what).decode())
 
 
-@command(journal_app)
+@single
 async def journal(
     call: Call,
     after: Annotated[int, typer.Option("--after", min=0, help="Only entries after this.")] = 0,
@@ -103,7 +99,7 @@ async def journal(
 
     async with call.session() as session:
         # What a query key replies is not in its type; the key table says it is a StoreJournal.
-        page: StoreJournal = await session.ask(
+        page: StoreJournal = await session.query(
             STORE_JOURNAL, StoreAddress(), StoreQuery(after=after, limit=limit)
         )
 

@@ -12,7 +12,6 @@ from cli.command import Call
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from cli.plans.comparison import PlanSide
     from fleet.core.model.world import WorldModel
     from keyexpr_schema.payloads.plans import Plan
     from keyexpr_schema.transport.session import Session
@@ -60,7 +59,7 @@ async def check(
     """
     from cli.plans.files import read_plan
     from cli.plans.worlds import world_of_files, world_of_fleet
-    from fleet.core.checker.plan_checker import check_plan
+    from fleet.core.checker.checked_plan import check_plan
     from fleet.service.composition import load_all_skills
 
     _only_with_world(world, connected, robots, facts)
@@ -77,12 +76,12 @@ async def check(
     def draw() -> RenderableType:
         from cli.views.plans import violations_table
 
-        if checked.valid:
+        if not checked.violations:
             return f"plan {plan.plan} is valid: {_size(plan, model)}"
         return violations_table(checked.violations)
 
     call.show(checked.violations, draw)
-    if not checked.valid:
+    if checked.violations:
         count = len(checked.violations)
         call.warn(
             f"Error: {file}: {count} {'thing speaks' if count == 1 else 'things speak'} "
@@ -209,21 +208,14 @@ async def diff(
     from cli.plans.comparison import compare
     from cli.plans.sources import finished_tasks, plan_in_file, plan_named
 
-    sides: list[PlanSide | None] = [plan_in_file(a), plan_in_file(b)]
+    before, now = plan_in_file(a), plan_in_file(b)
     finished: list[str] = []
-    if None in sides:
+    if before is None or now is None:
         async with call.session() as session:
-            for number, name in enumerate((a, b)):
-                if sides[number] is None:
-                    sides[number] = await plan_named(session, name)
-            first, second = sides
-            assert first is not None
-            assert second is not None
-            if first.plan.plan == second.plan.plan:
-                finished = await finished_tasks(session, first.plan.plan)
-    before, now = sides
-    assert before is not None
-    assert now is not None
+            before = before or await plan_named(session, a)
+            now = now or await plan_named(session, b)
+            if before.plan.plan == now.plan.plan:
+                finished = await finished_tasks(session, now.plan.plan)
     found = compare(before, now, finished)
 
     def draw() -> RenderableType:

@@ -7,24 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, command
+from cli.command import Call, command, group, single
 from cli.commands.plan_files import check, diff, propose
-from cli.parsing import FactWords, Group
+from cli.parsing import FactWords
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from keyexpr_schema.payloads.plans import PlanStatus
-    from keyexpr_schema.payloads.requests import Control
 
-app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, add_completion=False)
-replan_app = typer.Typer(rich_markup_mode=None, add_completion=False)
+app = group("Make, look at, check, compare, start and cancel plans.")
 PlanArgument = Annotated[str, typer.Argument(metavar="PLAN", help="Its name.")]
-
-
-@app.callback()
-def plan() -> None:
-    """Make, look at, check, compare, start and cancel plans."""
 
 
 @command(app, "create")
@@ -178,7 +171,7 @@ async def show(
         plan = max(names, key=lambda n: (view.changed_s(n), n))
     check_known("plan", plan, names)
     name = plan
-    records = {task: record for (of, task), record in view.tasks.items() if of == name}
+    records = view.records(name)
     spec, status = view.plans.get(name), view.plan_status.get(name)
     idle = idle_report(spec, status, records.values(), view.robot_specs.values()) if spec else None
 
@@ -212,36 +205,28 @@ command(app, "diff")(diff)
 @command(app, "start")
 async def start(call: Call, plan: PlanArgument) -> None:
     """Carry out a plan that was made with --no-start."""
-    from keyexpr_schema.payloads.requests import Control
-
-    await _control(call, Control.START, plan)
+    await _control(call, "start", plan)
 
 
 @command(app, "approve")
 async def approve(call: Call, plan: PlanArgument) -> None:
     """Let a plan be carried out that waits for a person (`robotctl planner --approval`)."""
-    from keyexpr_schema.payloads.requests import Control
-
-    await _control(call, Control.APPROVE, plan)
+    await _control(call, "approve", plan)
 
 
 @command(app, "cancel")
 async def cancel(call: Call, plan: PlanArgument) -> None:
     """Stop a plan: running tasks are told to stop, no further one begins."""
-    from keyexpr_schema.payloads.requests import Control
-
-    await _control(call, Control.CANCEL, plan)
+    await _control(call, "cancel", plan)
 
 
 @command(app, "delete")
 async def delete(call: Call, plan: PlanArgument) -> None:
     """Forget a plan and its tasks."""
-    from keyexpr_schema.payloads.requests import Control
-
-    await _control(call, Control.DELETE, plan)
+    await _control(call, "delete", plan)
 
 
-@command(replan_app, "replan")
+@single
 async def replan(
     call: Call,
     plan: PlanArgument,
@@ -274,7 +259,7 @@ def _state(status: PlanStatus | None) -> str:
     return status.state.value if status else "not there"
 
 
-async def _control(call: Call, control: Control, plan: str) -> None:
+async def _control(call: Call, control: str, plan: str) -> None:
     from cli.client.known import check_plan
     from cli.client.planner import ask_planner, request_name
     from keyexpr_schema.keyspace import PLAN_PROPOSAL
@@ -283,10 +268,10 @@ async def _control(call: Call, control: Control, plan: str) -> None:
 
     async with call.session() as session:
         await check_plan(session, plan)
-        if control is Control.DELETE:
+        if Control(control) is Control.DELETE:
             # First: a proposal that still stands when a planner starts is taken up.
             await session.delete(PLAN_PROPOSAL, PlanAddress(plan))
         answer = await ask_planner(
-            session, ControlRequest(request=request_name(), control=control, plan=plan)
+            session, ControlRequest(request=request_name(), control=Control(control), plan=plan)
         )
     call.show(answer, lambda: answer.sentence)

@@ -11,19 +11,19 @@ from typing import Annotated, TypeVar
 
 import typer
 
-from cli.command import Call, command
-
-router_app = typer.Typer(rich_markup_mode=None, add_completion=False)
-planner_app = typer.Typer(rich_markup_mode=None, add_completion=False)
-worker_app = typer.Typer(rich_markup_mode=None, add_completion=False)
-sim_app = typer.Typer(rich_markup_mode=None, add_completion=False)
-record_app = typer.Typer(rich_markup_mode=None, add_completion=False)
+from cli.command import Call, single
 
 T = TypeVar("T")
 SIM = "sim"
 """The embodiment that is not a plug-in."""
 BACKENDS = ("mujoco", "kinematic")
 
+MissionArgument = Annotated[
+    str, typer.Argument(metavar="MISSION", help="A mission's file, or name as two-cups.")
+]
+BackendOption = Annotated[
+    str, typer.Option("--backend", help="mujoco (physics) or kinematic (fast, no physics).")
+]
 DataOption = Annotated[
     Path | None,
     typer.Option(
@@ -32,7 +32,7 @@ DataOption = Annotated[
 ]
 
 
-@command(router_app)
+@single
 def router(
     call: Call,
     listen: Annotated[
@@ -59,7 +59,7 @@ def router(
     )
 
 
-@command(planner_app)
+@single
 def planner(
     call: Call,
     data: DataOption = None,
@@ -119,7 +119,7 @@ def planner(
     )
 
 
-@command(worker_app)
+@single
 def worker(
     call: Call,
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Which registered robot.")],
@@ -134,11 +134,11 @@ def worker(
     from keyexpr_schema.plug_ins import plug_in_names
     from sim.embodiment import sim_embodiment
     from workers.embodiment import EMBODIMENTS, installed_embodiment
-    from workers.process import run
+    from workers.process import run_worker
 
     check_known("embodiment", embodiment, [SIM, *plug_in_names(EMBODIMENTS)])
     end_with_parent()
-    run(
+    run_worker(
         robot=robot,
         endpoints=call.settings.routers,
         realm=call.settings.realm,
@@ -149,15 +149,11 @@ def worker(
     )
 
 
-@command(sim_app)
+@single
 def sim(
     call: Call,
-    mission: Annotated[
-        str, typer.Argument(metavar="MISSION", help="A mission's file, or name as two-cups.")
-    ],
-    backend: Annotated[
-        str, typer.Option("--backend", help="mujoco (physics) or kinematic (fast, no physics).")
-    ] = "mujoco",
+    mission: MissionArgument,
+    backend: BackendOption = "mujoco",
     speed: Annotated[
         str, typer.Option("--speed", help="Simulated seconds a second, or max.")
     ] = "1",
@@ -182,10 +178,10 @@ def sim(
         raise BadArgument("--spread and --failing are for --backend kinematic; physics needs none")
     from cli.demo.child_processes import end_with_parent
     from sim.kinematic.backend import MotionModel
-    from sim.server.process import run
+    from sim.server.process import run_simulation
 
     end_with_parent()
-    run(
+    run_simulation(
         mission=mission,
         endpoints=call.settings.routers,
         realm=call.settings.realm,
@@ -196,7 +192,7 @@ def sim(
     )
 
 
-@command(record_app)
+@single
 def record(
     call: Call,
     out: Annotated[Path, typer.Argument(metavar="OUT.rrd", help="The recording.")],
@@ -204,10 +200,10 @@ def record(
 ) -> None:
     """Record everything that happens for Rerun."""
     from cli.demo.child_processes import end_with_parent
-    from fleet.timeline.process import run
+    from fleet.timeline.process import run_recorder
 
     end_with_parent()
-    run(endpoints=call.settings.routers, realm=call.settings.realm, out=out, view=view)
+    run_recorder(endpoints=call.settings.routers, realm=call.settings.realm, out=out, view=view)
 
 
 def parse_speed(written: str) -> float | None:

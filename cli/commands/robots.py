@@ -6,19 +6,14 @@ from typing import Annotated
 
 import typer
 
-from cli.command import Call, command
-
-register_app = typer.Typer(rich_markup_mode=None, add_completion=False)
-unregister_app = typer.Typer(rich_markup_mode=None, add_completion=False)
-robots_app = typer.Typer(rich_markup_mode=None, add_completion=False)
-durations_app = typer.Typer(rich_markup_mode=None, add_completion=False)
+from cli.command import Call, single
 
 
-@command(register_app)
+@single
 async def register(
     call: Call,
     files: Annotated[
-        list[str], typer.Argument(metavar="FILE", help="Robot files; see configs/robots.")
+        list[str], typer.Argument(metavar="FILE", help="Robots' files, or names as hsr.")
     ],
 ) -> None:
     """Declare robots from YAML files; declaring one again replaces what was said of it."""
@@ -40,7 +35,7 @@ async def register(
     )
 
 
-@command(unregister_app)
+@single
 async def unregister(
     call: Call, robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Its name.")]
 ) -> None:
@@ -55,7 +50,7 @@ async def unregister(
     call.show({"unregistered": robot}, lambda: f"unregistered {robot}")
 
 
-@command(robots_app)
+@single
 async def robots(call: Call) -> None:
     """Every robot: what it can do, whether it is connected, where it is, what it does."""
     from cli.client.fleet_view import snapshot
@@ -70,7 +65,7 @@ async def robots(call: Call) -> None:
     call.show(rows, lambda: robots_table(rows) if rows else "No robots are registered.")
 
 
-@command(durations_app)
+@single
 async def durations(call: Call) -> None:
     """How long each type of robot really takes, learned from its reports."""
     from cli.views.robots import durations_table

@@ -6,19 +6,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, command
-from cli.parsing import Group
+from cli.command import Call, command, group
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, add_completion=False)
+app = group("Look at tasks, or add one to a plan.")
 PlanArgument = Annotated[str, typer.Argument(metavar="PLAN", help="Name of the plan.")]
-
-
-@app.callback()
-def task() -> None:
-    """Look at tasks, or add one to a plan."""
 
 
 @command(app, "list")

@@ -6,28 +6,23 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.command import Call, command
+from cli.command import Call, command, group
 from cli.commands.world_add import add
-from cli.parsing import Group
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from keyexpr_schema.transport.session import Session
 
-app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, add_completion=False)
-
-
-@app.callback()
-def world() -> None:
-    """Places, objects, facts and statements: what the fleet is told of its world."""
+app = group("Places, objects, facts and statements: what the fleet is told of its world.")
 
 
 @command(app, "load")
 async def load(
-    call: Call, file: Annotated[str, typer.Argument(metavar="FILE", help="See configs/worlds.")]
+    call: Call,
+    file: Annotated[str, typer.Argument(metavar="FILE", help="A world's file, or name as home.")],
 ) -> None:
-    """Tell the fleet the places and objects of a world file (not where the objects are)."""
+    """Put the places and objects of a world file (not where the objects are)."""
     from cli.client.world import put_world
     from sim.files.world_file import load_world
     from sim.files.world_payloads import object_payloads, place_payloads

@@ -13,7 +13,7 @@ from cli.client.planner import check_skills
 from cli.client.world import put_world
 from cli.demo.child_processes import ChildProcesses
 from cli.errors import TooLate
-from keyexpr_schema.errors import NoAnswer, Unreachable
+from keyexpr_schema.errors import NoReply, Unreachable
 from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import PLANNER_ALIVE, ROBOT_ALIVE, ROBOT_SPEC, STORE_JOURNAL
@@ -45,21 +45,12 @@ class DemoOptions:
 def declare_processes(processes: ChildProcesses, mission: Mission, options: DemoOptions) -> None:
     """Say which processes a mission is made of, and which are stopped first at its end."""
     data = options.out / "data"
-    processes.declare(
-        "router", "router", "--listen", processes.endpoint, "--data", str(data / "router")
-    )
+    listen = ("--listen", processes.endpoint)
+    processes.declare("router", "router", *listen, "--data", str(data / "router"))
     view = ("--view",) if options.view else ()
     processes.declare("record", "record", str(options.out / RECORDING), *view, layer=1)
-    processes.declare(
-        "sim",
-        "sim",
-        options.mission,
-        "--backend",
-        options.backend,
-        "--speed",
-        options.speed,
-        layer=2,
-    )
+    pace = ("--backend", options.backend, "--speed", options.speed)
+    processes.declare("sim", "sim", options.mission, *pace, layer=2)
     processes.declare("planner", "planner", "--data", str(data / "planner"), layer=2)
     for robot in mission.robots:
         name = f"worker-{robot.spec.robot}"
@@ -78,9 +69,9 @@ async def router_up(processes: ChildProcesses) -> None:
         async with asyncio.timeout(READY_S), open_session(config) as session:
             while True:
                 try:
-                    await session.ask(STORE_JOURNAL, StoreAddress(), StoreQuery(limit=1), 1.0)
+                    await session.query(STORE_JOURNAL, StoreAddress(), StoreQuery(limit=1), 1.0)
                     return
-                except NoAnswer:
+                except NoReply:
                     await session.wait_connected()
     except (TimeoutError, Unreachable):
         raise TooLate(
@@ -98,34 +89,26 @@ async def bring_up(
     for name in processes.names:
         if processes.pid(name) is None:
             await processes.start(name)
-    await asyncio.gather(
+    ready = [
         view.until(
             lambda: view.scene is not None and bool(view.truths),
             READY_S,
             f"the simulation (log: {processes.log('sim')})",
         ),
         _token(session, PLANNER_ALIVE, {}, "the planner", processes.log("planner")),
-        *(
-            _token(
-                session,
-                ROBOT_ALIVE,
-                {"robot": robot.spec.robot},
-                f"the worker of {robot.spec.robot}",
-                processes.log(f"worker-{robot.spec.robot}"),
-            )
-            for robot in mission.robots
-        ),
-        *(
-            view.until(
-                partial(_can_be_planned, view, robot.spec.robot),
-                READY_S,
-                f"{robot.spec.robot} to say where it is and what it holds "
-                f"(log: {processes.log(f'worker-{robot.spec.robot}')})",
-            )
-            for robot in mission.robots
-        ),
         _recording(processes),
-    )
+    ]
+    for name in (robot.spec.robot for robot in mission.robots):
+        log = processes.log(f"worker-{name}")
+        ready += [
+            _token(session, ROBOT_ALIVE, {"robot": name}, f"the worker of {name}", log),
+            view.until(
+                partial(_can_be_planned, view, name),
+                READY_S,
+                f"{name} to say where it is and what it holds (log: {log})",
+            ),
+        ]
+    await asyncio.gather(*ready)
     await check_skills(session, (robot.spec for robot in mission.robots))
 
 

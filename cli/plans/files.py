@@ -8,7 +8,7 @@ import msgspec
 import yaml
 
 from cli.errors import BadFile
-from cli.settings import one_line
+from keyexpr_schema.config_files import read_yaml
 from keyexpr_schema.payloads.plans import Plan
 
 SUFFIXES = (".yaml", ".yml", ".json")
@@ -25,17 +25,7 @@ def read_plan(path: Path) -> Plan:
     Raises:
         BadFile: it cannot be read or is no plan; the message names the file and the place in it.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise BadFile(f"{path} cannot be read: {reason}") from None
-    try:
-        # JSON is read as YAML, too: every JSON document is one.
-        data = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        kind = "JSON" if path.suffix == ".json" else "YAML"
-        raise BadFile(f"{path} is not {kind}: {one_line(error)}") from None
+    data = read_yaml(path, BadFile)
     if not isinstance(data, dict):
         raise BadFile(
             f"{path} is not a plan: it must hold fields such as plan, goals, conditions, tasks"

@@ -44,7 +44,7 @@ async def plan_named(session: Session, name: str) -> PlanSide:
 
     Raises:
         Unknown: there is no such plan, or no such revision; the message lists those there are.
-        NoAnswer: the store has no journal (a zenohd storage has none).
+        NoReply: the store has no journal (a zenohd storage has none).
     """
     plan, revision = revision_of(name)
     specs = {address.plan: spec for address, spec in (await session.list(PLAN_SPEC)).items()}
@@ -110,7 +110,7 @@ async def _journal(session: Session) -> AsyncIterator[JournalEntry]:
     after = 0
     while True:
         # What a query key replies is not in its type; the key table says it is a StoreJournal.
-        page: StoreJournal = await session.ask(
+        page: StoreJournal = await session.query(
             STORE_JOURNAL, StoreAddress(), StoreQuery(after=after, limit=PAGE), JOURNAL_S
         )
         for entry in page.entries:

@@ -101,16 +101,9 @@ def picture(view: FleetView, only: str | None = None) -> RenderableType:
     for name in sorted(view.plans):
         if only not in (None, name):
             continue
-        records = {task: record for (of, task), record in view.tasks.items() if of == name}
+        plan, status = view.plans[name], view.plan_status.get(name)
         parts.append(
-            plan_tree(
-                view.plans[name],
-                view.plan_status.get(name),
-                records,
-                view.goals,
-                view.goal_status,
-                clock,
-            )
+            plan_tree(plan, status, view.records(name), view.goals, view.goal_status, clock)
         )
     if not view.plans:
         waiting = ", ".join(view.goals) or "none"

@@ -8,8 +8,8 @@ from rich.table import Table
 from rich.text import Text
 
 from cli.views.plan_tree import MARKS, in_order
-from cli.views.text import STATE_STYLE, call, seconds
-from keyexpr_schema.ids import actor_arg, actor_in
+from cli.views.text import STATE_STYLE, performer, seconds, task_call
+from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.plans import Plan, PlanStatus, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
@@ -56,12 +56,13 @@ def plan_graph(
         for place, task in enumerate(row):
             last = place == len(row) - 1
             state = _state(task, records)
+            who = _who(task, status, records)
             before, after = ", ".join(task.after), ", ".join(followers.get(task.task, ()))
             drawn.add_row(
                 Text(f"{number + 1}" if place == 0 else "", "dim"),
                 Text(f"{before} →" if before else "", "dim"),
                 Text.assemble((f"{MARKS[state]} ", STATE_STYLE[state.value]), (task.task, "bold")),
-                Text.assemble(_said(task, status), (f"  {_who(task, status, records)}", "blue")),
+                Text.assemble(task_call(task, status), (f"  {who}", "blue")),
                 Text(f"→ {after}" if after else "", "dim"),
                 end_section=last,
             )
@@ -75,16 +76,8 @@ def plan_dot(plan: Plan, status: PlanStatus | None, records: Mapping[str, TaskRe
         '  rankdir=LR; node [shape=box, style="rounded,filled", fontname=sans];',
     ]
     for task in plan.tasks:
-        about = seconds(task.duration_s) if task.duration_s else ""
-        label = "\n".join(
-            part
-            for part in (
-                f"{task.task}  {_who(task, status, records)}",
-                _said(task, status),
-                about,
-            )
-            if part
-        )
+        parts = [f"{task.task}  {_who(task, status, records)}", task_call(task, status)]
+        label = "\n".join([*parts, seconds(task.duration_s)] if task.duration_s else parts)
         fill = FILL[_state(task, records)]
         lines.append(f"  {_quoted(task.task)} [label={_quoted(label)}, fillcolor={fill}];")
     there = {task.task for task in plan.tasks}
@@ -110,19 +103,4 @@ def _state(task: Task, records: Mapping[str, TaskRecord]) -> TaskState:
 
 
 def _who(task: Task, status: PlanStatus | None, records: Mapping[str, TaskRecord]) -> str:
-    record = records.get(task.task)
-    allocated = status.allocation.get(task.actor) if status else None
-    return (record.robot if record else None) or allocated or actor_arg(task.actor)
-
-
-def _said(task: Task, status: PlanStatus | None) -> str:
-    """The call, without the one who does it, and with robots in place of actors."""
-    allocation = status.allocation if status else {}
-    return call(
-        task.skill,
-        {
-            name: allocation.get(actor_in(value) or "", value)
-            for name, value in task.args.items()
-            if value != actor_arg(task.actor)
-        },
-    )
+    return performer(task, status, records.get(task.task)) or actor_arg(task.actor)

@@ -7,8 +7,15 @@ from collections.abc import Mapping, Sequence
 from rich.text import Text
 from rich.tree import Tree
 
-from cli.views.text import STATE_STYLE, call, natural_order, outcome, seconds, spent_s
-from keyexpr_schema.ids import actor_arg, actor_in
+from cli.views.text import (
+    STATE_STYLE,
+    natural_order,
+    outcome,
+    performer,
+    seconds,
+    spent_s,
+    task_call,
+)
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanStatus, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -116,16 +123,11 @@ def _goal(goal: str, spec: Goal | None, status: GoalStatus | None) -> Text:
 def _task(
     task: Task, record: TaskRecord | None, status: PlanStatus | None, now_s: float | None
 ) -> Text:
-    allocated = status.allocation.get(task.actor) if status else None
-    robot = (record.robot if record else None) or allocated
+    robot = performer(task, status, record)
     state = record.state if record else TaskState.WAITING
     style = STATE_STYLE[state.value]
-    own = (actor_arg(task.actor), robot)
-    args = {name: arg for name, arg in task.args.items() if arg not in own}
-    if status:
-        args = {n: status.allocation.get(actor_in(a) or "", a) for n, a in args.items()}
     text = Text.assemble((f"{MARKS[state]} ", style), (task.task, "bold"), " ")
-    text.append(call(task.skill, args))
+    text.append(task_call(task, status, robot))
     text.append(f"  {task.actor}→{robot or '?'}", "blue")
     text.append(f"  {state.value}", style)
     spent = spent_s(record, now_s) if record else None

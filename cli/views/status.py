@@ -13,7 +13,7 @@ from cli.views.console import table
 from cli.views.goals import GoalRow, goals_table
 from cli.views.plans import plans_table
 from cli.views.robots import RobotRow, robots_table
-from keyexpr_schema.payloads.service import PlannerStatus, Reject, StoreJournal
+from keyexpr_schema.payloads.service import PlannerStatus, StoreJournal, UndecodableValue
 
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView
@@ -30,11 +30,11 @@ def status_page(
     robots: Sequence[RobotRow],
     goals: Sequence[GoalRow],
     view: FleetView,
-    rejects: Sequence[Reject],
+    undecodable: Sequence[UndecodableValue],
 ) -> Group:
     """One page; a part with nothing in it is one short line."""
     plans = set(view.plans) | set(view.plan_status)
-    unreadable: list[RenderableType] = ["", rejects_table(rejects)] if rejects else []
+    unreadable: list[RenderableType] = ["", undecodable_table(undecodable)] if undecodable else []
     return Group(
         f"router   {', '.join(routers)}, realm {realm}",
         f"planner  {_planner(planner, planning)}",
@@ -63,11 +63,11 @@ def _planner(planner: PlannerStatus | None, planning: bool) -> str:
     return "\n".join([f"running, epoch {planner.epoch}", *lines])
 
 
-def rejects_table(rejects: Sequence[Reject]) -> Table:
+def undecodable_table(undecodable: Sequence[UndecodableValue]) -> Table:
     """One line a value that somebody could not read."""
     return table(
         ["key", "told by", "times", "reason"],
-        ((r.keyexpr, r.component, r.count, r.reason) for r in rejects),
+        ((r.keyexpr, r.component, r.count, r.reason) for r in undecodable),
         title="Unreadable values",
     )
 

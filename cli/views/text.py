@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from keyexpr_schema.ids import actor_arg, actor_in
 from keyexpr_schema.payloads.goals import Condition, GoalStatus
-from keyexpr_schema.payloads.plans import PlanStatus
+from keyexpr_schema.payloads.plans import PlanStatus, Task
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 from keyexpr_schema.payloads.world import StatementStatus
@@ -38,6 +39,25 @@ def call(skill: str, args: Mapping[str, str], leave_out: str | None = None) -> s
     """`pick(object=cup_1)`; arguments equal to `leave_out` (the robot itself) are not shown."""
     inner = ", ".join(f"{name}={arg}" for name, arg in args.items() if arg != leave_out)
     return f"{skill}({inner})"
+
+
+def task_call(task: Task, status: PlanStatus | None, robot: str | None = None) -> str:
+    """The call of a task without who does it (`robot`), with robots in place of actors."""
+    allocation = status.allocation if status else {}
+    return call(
+        task.skill,
+        {
+            name: allocation.get(actor_in(arg) or "", arg)
+            for name, arg in task.args.items()
+            if arg not in (actor_arg(task.actor), robot)
+        },
+    )
+
+
+def performer(task: Task, status: PlanStatus | None, record: TaskRecord | None) -> str | None:
+    """The robot that does a task, as far as that is decided."""
+    allocated = status.allocation.get(task.actor) if status else None
+    return (record.robot if record else None) or allocated
 
 
 def spent_s(record: TaskRecord, now_s: float | None) -> float | None:

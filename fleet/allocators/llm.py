@@ -11,11 +11,10 @@ from typing import Any
 import msgspec
 
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
-from fleet.core.checker.plan_checker import check_plan
-from fleet.core.schedule.plan_schedule import best_schedule
 from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
 from fleet.llm.quoting import fenced
 from fleet.llm.structured_output import StructuredAnswer, enumerated, read_answer, schema_of
+from fleet.scheduling.plan_schedule import AllocatedPlan
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.plans import Violation
 
@@ -76,8 +75,7 @@ class LlmAllocator(Allocator):
 
 def problem_text(problem: AllocationProblem) -> str:
     """Robots, actors with their tasks and able robots, and who must be apart, fenced."""
-    graph = problem.checked.graph
-    rank = {task: i for i, task in enumerate(graph.order if graph else ())}
+    rank = {task: i for i, task in enumerate(problem.checked.graph.order)}
     tasks = sorted(problem.plan.tasks, key=lambda task: rank[task.task])
     world = problem.world
     return fenced(
@@ -123,13 +121,14 @@ def read_allocation(text: str, problem: AllocationProblem) -> dict[str, str] | R
     allocation = {row.actor: row.robot for row in answer.robots}
     if sentences := _wrong(answer, allocation, problem):
         return Rejected(tuple(Violation(code="no-robot", sentence=text) for text in sentences))
-    schedule = best_schedule(problem.plan, problem.checked, allocation, problem.world)
+    allocated = AllocatedPlan(problem.checked, allocation)
+    schedule = next(allocated.schedules(), None)
     if schedule is None:
         return Rejected.because(
             "no-allocation", "with these robots some wait for each other for ever: choose others"
         )
-    checked = check_plan(problem.plan, problem.world, allocation, schedule.extra_after)
-    return Rejected(checked.violations) if checked.violations else allocation
+    violations = allocated.violations(schedule)
+    return Rejected(violations) if violations else allocation
 
 
 def _wrong(

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from dataclasses import replace
 
 from fleet.allocators.base import (
     AllocationProblem,
     Allocator,
     Assignment,
-    Circumstances,
     NotAllocated,
 )
-from fleet.allocators.milp import MilpAllocator
-from fleet.allocators.plan_shop import PlanShop, plan_shop
-from fleet.jobshop.bounds import lower_bound
-from fleet.jobshop.budget import Budget, Clock
-from fleet.jobshop.instance import Instance
+from fleet.allocators.min_max_load import assign_with_least_travel
 from fleet.jobshop.portfolio import solve
 from fleet.jobshop.problem import Schedule
 from fleet.jobshop.rescheduling import reschedule
+from fleet.jobshop.time_budget import Clock, TimeBudget
+from fleet.scheduling.plan_shop import AllocationContext, PlanShop, plan_shop
 
 DEADLINE_S = 1.0
 """Time that the search may take, s."""
@@ -32,7 +29,7 @@ NOBODY = -1
 class MakespanAllocator(Allocator):
     """Least makespan, with durations from skill models, travel and the order of actors.
 
-    List scheduling and dispatch rules at once; then annealing until the deadline, with CP-SAT
+    List scheduling and dispatching rules at once; then annealing until the deadline, with CP-SAT
     beside it where OR-Tools is installed (extra `cp-sat`) and the plan is small enough. The answer
     says how far from optimal it is at most.
     """
@@ -57,44 +54,44 @@ class MakespanAllocator(Allocator):
         self._clock = clock
 
     def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
-        made = plan_shop(problem)
-        if problem.circumstances.home:
-            budget = Budget(RESCHEDULE_SHARE * self._deadline_s, self._clock)
-            rescheduled = _rescheduled(made, problem.circumstances, budget, self._seed)
+        made = plan_shop(problem.checked, problem.able, problem.apart, problem.context)
+        if problem.context.home:
+            budget = TimeBudget(RESCHEDULE_SHARE * self._deadline_s, self._clock)
+            rescheduled = _rescheduled(made, problem.context, budget, self._seed)
             if rescheduled is not None:
                 return rescheduled
-        found = solve(made.shop, Budget(self._deadline_s, self._clock), self._exact, self._seed)
+        found = solve(made.shop, TimeBudget(self._deadline_s, self._clock), self._exact, self._seed)
         if found is None:
             # Robots are so few that rules run into a dead end: what is left is a matching problem.
-            chosen = MilpAllocator()._assign(problem)
-            return chosen if isinstance(chosen, NotAllocated) else _by_load(chosen)
-        return _assignment(made, found, found.lower_bound_s, found.notes)
+            chosen = assign_with_least_travel(problem)
+            if isinstance(chosen, NotAllocated):
+                return chosen
+            return Assignment(chosen.allocation, notes=("load balanced: no rule found an order",))
+        return _assignment(made, found)
 
 
-def _assignment(
-    made: PlanShop, found: Schedule, lower_bound_s: float, notes: tuple[str, ...]
-) -> Assignment:
+def _assignment(made: PlanShop, found: Schedule) -> Assignment:
     """A schedule of the shop in terms of actors and robots."""
     return Assignment(
         allocation={
             actor: made.robots[found.machine_of[block]] for block, actor in enumerate(made.actors)
         },
         sequence=tuple(made.actors[b] for b in found.order if b < len(made.actors)),
-        lower_bound_s=lower_bound_s,
-        notes=notes,
+        lower_bound_s=found.lower_bound_s,
+        notes=found.notes,
     )
 
 
 def _rescheduled(
-    made: PlanShop, told: Circumstances, budget: Budget, seed: int
+    made: PlanShop, context: AllocationContext, budget: TimeBudget, seed: int
 ) -> Assignment | None:
     """The allocation there was, with few actors in other hands."""
     machine = {robot: i for i, robot in enumerate(made.robots)}
     named = made.shop.blocks[len(made.actors) :]
-    home = [machine.get(told.home.get(actor, ""), NOBODY) for actor in made.actors]
+    home = [machine.get(context.home.get(actor, ""), NOBODY) for actor in made.actors]
     home += [block.machines[0] for block in named]
     block_of = {actor: block for block, actor in enumerate(made.actors)}
-    order = [block_of[actor] for actor in told.sequence if actor in block_of]
+    order = [block_of[actor] for actor in context.sequence if actor in block_of]
     found = reschedule(made.shop, home, order, budget, seed=seed)
     if found is None:
         return None
@@ -103,9 +100,4 @@ def _rescheduled(
         f"rescheduled: {moved} of {len(made.actors)} actors changed hands; "
         f"with any number of changes the least found is {found.best_makespan_s:.1f} s"
     )
-    return _assignment(made, found.schedule, lower_bound(Instance(made.shop)), (note,))
-
-
-def _by_load(chosen: Mapping[str, str] | Assignment) -> Assignment:
-    allocation = chosen.allocation if isinstance(chosen, Assignment) else chosen
-    return Assignment(allocation, notes=("load balanced: no rule found an order",))
+    return _assignment(made, replace(found.schedule, notes=(note,)))

@@ -1,184 +1,173 @@
-"""The paper's mixed-integer program, on actors: least maximum load, then least travel.
-
-Source: RobotFleet (Gupta et al.), its MILP allocation: binary `x[a, r]` says that robot `r` is
-actor `a`; every actor is one robot among those able; the number of tasks on the busiest robot is
-least. Added here: actors that must be apart, and, among the sharings with that maximum, the one
-with the least travel. The two are solved one after the other: a weighted sum would make the
-tie-break either outweigh a task or vanish in the solver's tolerance.
-"""
+"""Least maximum load, as the paper's allocation; ties by the next loads, or by travel."""
 
 from __future__ import annotations
 
+import logging
 import time
-from collections import defaultdict
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from enum import Enum
 
-from fleet.allocators.solver_run import Found, solve
+from fleet.allocators.approach import approach_s
+from fleet.allocators.balancing_problem import balancing_problem, named
+from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
+from fleet.allocators.infeasibility import explanation
+from fleet.allocators.load_balancing.balance import balance
+from fleet.allocators.load_balancing.problem import BalancedAssignment, NoAssignment
+from fleet.allocators.min_max_load_program import MinMaxLoadProgram, Status, max_load, solve
+from fleet.allocators.round_robin import assign_in_turn
+from keyexpr_schema.payloads.plans import Violation
 
-Pair = tuple[str, str]
-TRAVEL_GAP = 1e-3
-"""Relative gap at which the tie-break stops: a second in a quarter of an hour of travel."""
-TRAVEL_LIMIT_S = 2.0
-"""Wall time for the tie-break at most, s."""
+log = logging.getLogger(__name__)
+
+TIME_LIMIT_S = 20.0
+"""Wall time given to the solver, s; the best answer so far is taken: every answer is checked."""
 IMPROVE_LIMIT_S = 3.0
-"""Wall time to better a sharing that is there already, s at most. If the solver gets anywhere with
-it, it has within a second; what is left is to prove that 20 alike robots cannot do with one less.
+"""Wall time to better an assignment that is there already, s at most. If the solver gets anywhere
+with it, it has within a second; what is left is to prove that 20 alike robots cannot do with less.
 """
+TRAVEL_LIMIT_S = 2.0
+"""Wall time for the least travel at most, s."""
+TRAVEL_GAP = 1e-3
+"""Relative gap at which the least travel is near enough: a second in a quarter of an hour."""
+MAX_VARIABLES = 100_000
+"""Pairs of an actor and a robot that are put to the solver: so many take some seconds."""
 
 
-@dataclass(frozen=True)
-class Bound:
-    """What is known before: a load that some robot must have, and a sharing to begin with."""
+class TieBreak(Enum):
+    """Which of the allocations with the least maximum load; the value is the allocator's name."""
 
-    least_top: int = 0
-    robot: Mapping[str, str] = field(default_factory=dict)
+    NEXT_LOADS = "balanced"
+    """The one whose next greatest load is least, and so on: lexicographic min-max fairness."""
+    TRAVEL = "milp"
+    """The one whose robots have the least way to where they start."""
 
 
-@dataclass(frozen=True)
-class LeastLoad:
-    """A robot for every actor and the greatest load; `None` if there is none or none was found.
+class MinMaxLoadAllocator(Allocator):
+    """Minimise the largest number of tasks on a robot (RobotFleet, Gupta et al.), on actors.
 
-    `proven`: no sharing has a lesser greatest load; or, with `robot` `None`, there is none.
+    Every actor is one robot that is able to be it; actors that meet in one task are different
+    robots. What is not proven is noted, with what is.
+
+    With `fallback_round_robin` the paper's round-robin takes over where nothing is found, and a
+    note in the answer says so. It still gives no robot what it cannot do.
     """
-
-    robot: dict[str, str] | None
-    top: int
-    proven: bool
-
-
-def min_max_load(
-    able: Mapping[str, tuple[str, ...]],
-    load: Mapping[str, int],
-    apart: frozenset[Pair],
-    bound: Bound,
-    limit_s: float,
-    travel_s: Mapping[Pair, float] | None = None,
-    solver: str | None = None,
-) -> LeastLoad:
-    """Solve it within `limit_s` seconds of wall time, and much less if `bound` has a sharing.
-
-    `travel_s[actor, robot]` is for the tie-break; without it there is none. With a `bound` that
-    its sharing meets there is nothing left to minimise but travel.
-    """
-    end_s = time.monotonic() + limit_s
-    top = max(_loads(bound.robot, load).values(), default=0)
-    if bound.robot and top == bound.least_top:
-        first = LeastLoad(dict(bound.robot), top, proven=True)
-    else:
-        first = _least_top(_Model(able, load, apart), bound, limit_s, solver)
-    if first.robot is None or travel_s is None or not _robots_matter(able, travel_s):
-        return first
-    left_s = min(TRAVEL_LIMIT_S, end_s - time.monotonic())
-    if left_s <= 0:
-        return first
-    model = _Model(able, load, apart)
-    model.minimise_travel(travel_s, first.top)
-    made = solve(model.problem, left_s, TRAVEL_GAP, model.start(first.robot), solver)
-    if not made.values:
-        return first
-    return LeastLoad(model.robots(made.values), first.top, first.proven)
-
-
-def _least_top(model: _Model, bound: Bound, limit_s: float, solver: str | None) -> LeastLoad:
-    model.minimise_top(bound.least_top)
-    start = None
-    if bound.robot:
-        start = model.start(bound.robot)
-        start["top"] = float(max(_loads(bound.robot, model.load).values()))
-        limit_s = min(limit_s, IMPROVE_LIMIT_S)
-    made = solve(model.problem, limit_s, 0.0, start, solver)
-    if made.values:
-        robot = model.robots(made.values)
-    elif bound.robot:
-        robot = dict(bound.robot)
-    else:
-        return LeastLoad(None, 0, made.found is Found.INFEASIBLE)
-    top = max(_loads(robot, model.load).values(), default=0)
-    return LeastLoad(robot, top, made.found is Found.OPTIMAL or top == bound.least_top)
-
-
-def _loads(robot: Mapping[str, str], load: Mapping[str, int]) -> dict[str, int]:
-    loads: dict[str, int] = defaultdict(int)
-    for actor, its in robot.items():
-        loads[its] += load[actor]
-    return loads
-
-
-def _robots_matter(able: Mapping[str, tuple[str, ...]], travel_s: Mapping[Pair, float]) -> bool:
-    """Whether travel differs between the robots that can be some actor."""
-    return any(len({travel_s[a, robot] for robot in robots}) > 1 for a, robots in able.items())
-
-
-class _Model:
-    """Variables and constraints that both steps share."""
 
     def __init__(
         self,
-        able: Mapping[str, tuple[str, ...]],
-        load: Mapping[str, int],
-        apart: frozenset[Pair],
+        tie_break: TieBreak,
+        fallback_round_robin: bool = False,
+        time_limit_s: float = TIME_LIMIT_S,
     ) -> None:
-        import pulp
+        self.name = f"{tie_break.value}-or-round-robin" if fallback_round_robin else tie_break.value
+        self._tie_break = tie_break
+        self._fallback = fallback_round_robin
+        self._time_limit_s = time_limit_s
 
-        self.load = load
-        self.problem: Any = pulp.LpProblem("allocation", pulp.LpMinimize)
-        self.chosen: dict[Pair, Any] = {
-            (actor, robot): self.problem.add_variable(f"x_{i}_{j}", cat="Binary")
-            for i, (actor, robots) in enumerate(able.items())
-            for j, robot in enumerate(robots)
-        }
-        self._sum = pulp.lpSum
-        self._of: dict[str, list[str]] = defaultdict(list)
-        for actor, robots in able.items():
-            self.problem += self._sum(self.chosen[actor, robot] for robot in robots) == 1
-            for robot in robots:
-                self._of[robot].append(actor)
-        for one, other in apart:
-            for robot in able[one]:
-                if (other, robot) in self.chosen:
-                    self.problem += self.chosen[one, robot] + self.chosen[other, robot] <= 1
+    def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
+        if self._tie_break is TieBreak.NEXT_LOADS:
+            found = assign_balanced(problem)
+        else:
+            found = assign_with_least_travel(problem, self._time_limit_s)
+        if self._fallback and isinstance(found, NotAllocated):
+            return in_turn_instead(problem, found)
+        return found
 
-    def minimise_top(self, least: int) -> None:
-        """The greatest number of tasks on a robot.
 
-        Robots that can be the same actors are interchangeable: their loads come in order, which
-        keeps the solver from looking at every permutation of them.
-        """
-        top = self.problem.add_variable("top", lowBound=least, cat="Integer")
-        self.problem += top
-        before: dict[tuple[str, ...], str] = {}
-        for robot, actors in self._of.items():
-            self.problem += self._tasks(robot) <= top
-            same = before.get(key := tuple(actors))
-            if same is not None:
-                self.problem += self._tasks(same) >= self._tasks(robot)
-            before[key] = robot
+def assign_balanced(problem: AllocationProblem) -> Assignment | NotAllocated:
+    """Lexicographically least loads: exact for actors of equal load that need not be apart, for
+    small problems, and wherever the lower bound is met."""
+    found = balance(balancing_problem(problem))
+    if isinstance(found, NoAssignment):
+        return explanation(problem, found)
+    robots = named(problem, found.robot)
+    if found.optimal:
+        return Assignment(robots)
+    note = (
+        f"the busiest robot has {found.loads[0]} tasks, and one must have {found.lower_bound} at "
+        "least; that no loads are more even is not proven"
+    )
+    return Assignment(robots, notes=(note,))
 
-    def minimise_travel(self, travel_s: Mapping[Pair, float], top: int) -> None:
-        """Seconds until every actor's robot is where it starts; no robot with more than `top`."""
-        self.problem += self._sum(travel_s[k] * x for k, x in self.chosen.items())
-        for robot in self._of:
-            self.problem += self._tasks(robot) <= top
 
-    def start(self, robot: Mapping[str, str]) -> dict[str, float]:
-        """Values of the `x` for a sharing; among interchangeable robots the busiest comes first."""
-        loads = _loads(robot, self.load)
-        alike: dict[tuple[str, ...], list[str]] = defaultdict(list)
-        for name, actors in self._of.items():
-            alike[tuple(actors)].append(name)
-        renamed: dict[str, str] = {}
-        for members in alike.values():
-            busiest = sorted(members, key=lambda name: -loads.get(name, 0))
-            renamed.update(zip(busiest, members, strict=True))
-        return {
-            x.name: float(renamed[robot[actor]] == name) for (actor, name), x in self.chosen.items()
-        }
+def assign_with_least_travel(
+    problem: AllocationProblem, time_limit_s: float = TIME_LIMIT_S
+) -> Assignment | NotAllocated:
+    """Least maximum load, then least travel, by the paper's program within `time_limit_s` [s].
 
-    def robots(self, values: Mapping[str, float]) -> dict[str, str]:
-        """The robot of every actor in a solution."""
-        return {a: robot for (a, robot), x in self.chosen.items() if values[x.name] > 0.5}
+    The program gets the balanced assignment's maximum and bound: identical robots would keep its
+    solver busy for ever otherwise. Where the bound is met, travel is all that is left to minimise.
+    """
+    end_s = time.monotonic() + time_limit_s
+    balanced = balance(balancing_problem(problem))
+    if isinstance(balanced, BalancedAssignment):
+        if sum(map(len, problem.able.values())) > MAX_VARIABLES:
+            note = (
+                f"more than {MAX_VARIABLES} choices are too many for the solver: loads are "
+                "balanced without it, and travel is not looked at"
+            )
+            return Assignment(named(problem, balanced.robot), notes=(note,))
+    elif balanced.proven:
+        return explanation(problem, balanced)
+    robots, proven = _least_max_load(problem, balanced, time_limit_s)
+    if robots is None:
+        return explanation(problem, NoAssignment(proven))
+    robots = _least_travel(problem, robots, min(TRAVEL_LIMIT_S, end_s - time.monotonic()))
+    if proven:
+        return Assignment(robots)
+    note = (
+        f"the busiest robot has {max_load(robots, problem.load)} tasks, and the solver has not "
+        "proven in its time that it cannot have fewer"
+    )
+    return Assignment(robots, notes=(note,))
 
-    def _tasks(self, robot: str) -> Any:
-        return self._sum(self.load[a] * self.chosen[a, robot] for a in self._of[robot])
+
+def in_turn_instead(problem: AllocationProblem, refused: NotAllocated) -> Assignment | NotAllocated:
+    """The fallback to round-robin where the program found nothing, with a note that says so."""
+    why = refused.violations[0].sentence
+    found = assign_in_turn(problem)
+    if isinstance(found, NotAllocated):
+        sentence = f"round-robin instead of the MILP finds none either: {why}"
+        return NotAllocated((Violation(code="no-allocation", sentence=sentence),))
+    note = f"allocated by round-robin and not by the MILP: {why}"
+    log.warning(note)
+    return Assignment(found.allocation, notes=(note,))
+
+
+def _least_max_load(
+    problem: AllocationProblem, balanced: BalancedAssignment | NoAssignment, limit_s: float
+) -> tuple[dict[str, str] | None, bool]:
+    """Robots with the least maximum load, if there are any, and whether that is proven."""
+    lower, upper, best = 0, None, None
+    if isinstance(balanced, BalancedAssignment):
+        best, lower = named(problem, balanced.robot), balanced.lower_bound
+        upper = max(balanced.loads, default=0) - 1
+        if upper < lower:
+            return best, True
+        limit_s = min(limit_s, IMPROVE_LIMIT_S)
+    program = MinMaxLoadProgram(problem.able, problem.load, problem.apart)
+    program.minimise_max_load(lower, upper)
+    found = solve(program.model, limit_s)
+    proven = found.status in (Status.OPTIMAL, Status.INFEASIBLE)
+    if not found.values:
+        return best, proven
+    robots = program.robots(found.values)
+    return robots, proven or max_load(robots, problem.load) == lower
+
+
+def _least_travel(
+    problem: AllocationProblem, known: dict[str, str], limit_s: float
+) -> dict[str, str]:
+    """Of the robots of which none has more tasks than in `known`, those with the least travel, if
+    the solver finds them in time; else the known ones."""
+    travel_s = approach_s(problem)
+    free = any(len({travel_s[a, r] for r in robots}) > 1 for a, robots in problem.able.items())
+    if not free or limit_s <= 0:
+        return known
+    program = MinMaxLoadProgram(problem.able, problem.load, problem.apart)
+    program.minimise_travel(travel_s, max_load(known, problem.load))
+    found = solve(program.model, limit_s, TRAVEL_GAP)
+    if not found.values:
+        return known
+    return min(
+        (program.robots(found.values), known),
+        key=lambda robots: sum(travel_s[pair] for pair in robots.items()),
+    )

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from fleet.allocators.balanced import load_problem
-from fleet.allocators.base import AllocationProblem, Allocator, NotAllocated
-from fleet.allocators.load_balancing.apart import why_not_apart
-from fleet.allocators.reasons import not_apart
+from bisect import bisect_left
+
+from fleet.allocators.balancing_problem import balancing_problem, named
+from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
+from fleet.allocators.infeasibility import explanation
+from fleet.allocators.load_balancing.local_search import PartialAssignment
+from fleet.allocators.load_balancing.problem import NoAssignment, overfull_clique
+from fleet.allocators.load_balancing.robot_sets import bits
 
 MAX_STEPS = 100_000
-"""Robots that are tried for actors, going back included, before it is given up."""
+"""Robots that are tried for actors, backtracking included, before it is given up."""
 
 
 class RoundRobinAllocator(Allocator):
@@ -19,47 +23,36 @@ class RoundRobinAllocator(Allocator):
 
     name = "round-robin"
 
-    def _assign(self, problem: AllocationProblem) -> dict[str, str] | NotAllocated:
-        return in_turn(problem)
+    def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
+        return assign_in_turn(problem)
 
 
-def in_turn(problem: AllocationProblem) -> dict[str, str] | NotAllocated:
+def assign_in_turn(problem: AllocationProblem) -> Assignment | NotAllocated:
     """Every actor's robot: the first in turn that will do.
 
     Where actors that must be apart leave none, the choice before is taken back, and so on.
     """
-    team = problem.world.team
-    actors = tuple(problem.able)
-    near: dict[str, set[str]] = {actor: set() for actor in actors}
-    for one, other in problem.apart:
-        near[one].add(other)
-        near[other].add(one)
-    chosen: dict[str, str] = {}
-    tried: list[list[str]] = []
-    turn = 0
-    steps = 0
-    while len(chosen) < len(actors):
-        actor = actors[len(chosen)]
-        if len(tried) == len(chosen):
-            able = set(problem.able[actor])
-            tried.append([r for r in (*team[turn:], *team[:turn]) if r in able])
-        taken = {chosen.get(other) for other in near[actor]}
-        left = tried[-1]
-        while left and left[0] in taken:
-            left.pop(0)
+    numbers = balancing_problem(problem)
+    made = PartialAssignment(numbers)
+    untried: list[list[int]] = []
+    actor = first = steps = 0
+    while actor < len(numbers.able):
+        if len(untried) == actor:
+            able = list(bits(numbers.able[actor]))
+            turn = bisect_left(able, first)
+            untried.append([*able[turn:], *able[:turn]])
+        robots = untried[-1]
+        while robots and not made.fits(actor, robots[0]):
+            robots.pop(0)
         steps += 1
-        if left:
-            chosen[actor] = left.pop(0)
-            turn = (team.index(chosen[actor]) + 1) % len(team)
+        if robots:
+            made.assign(actor, robots[0])
+            first = robots.pop(0) + 1
+            actor += 1
             continue
-        tried.pop()
-        if not chosen or steps > MAX_STEPS:
-            short = why_not_apart(*_numbers(problem))
-            return not_apart(problem, [actors[a] for a in short], proven=not chosen)
-        chosen.popitem()
-    return chosen
-
-
-def _numbers(problem: AllocationProblem) -> tuple[list[int], frozenset[tuple[int, int]]]:
-    made = load_problem(problem)
-    return list(made.able), made.apart
+        untried.pop()
+        if not actor or steps > MAX_STEPS:
+            return explanation(problem, NoAssignment(not actor, overfull_clique(numbers)))
+        actor -= 1
+        made.assign(actor, -1)
+    return Assignment(named(problem, made.robot))

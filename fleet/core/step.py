@@ -25,7 +25,7 @@ from fleet.core.handlers import (
     statements,
     world,
 )
-from fleet.core.model.preconditions import Skills
+from fleet.core.model.skills import Skills
 from fleet.core.state import State
 
 _Handler = Callable[[State, Any, Skills], State]

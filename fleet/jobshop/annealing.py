@@ -11,9 +11,9 @@ from collections.abc import Callable, Sequence
 from math import inf, log
 from random import Random
 
-from fleet.jobshop.budget import Budget
 from fleet.jobshop.forward_pass import Solution, evaluate
 from fleet.jobshop.instance import Instance
+from fleet.jobshop.time_budget import TimeBudget
 
 HOT, COLD = 0.02, 0.0002
 """Temperatures at the beginning and the end, as shares of the makespan."""
@@ -33,7 +33,7 @@ NEAR = 1e-9
 def anneal(
     instance: Instance,
     begin: Solution,
-    budget: Budget,
+    budget: TimeBudget,
     bound_s: float = 0.0,
     seed: int = 0,
     move_price_s: float = 0.0,
@@ -75,12 +75,14 @@ class _Search:
         self.makespan = begin.makespan_s
         self.cost = begin.cost + self._moves_price()
         self.best, self.best_cost = begin, self.cost
+        self.settled = all(len(block.machines) == 1 for block in instance.shop.blocks)
+        """Whether only the order is left to choose."""
         self.index_of = [0] * len(self.order)
         self.critical: list[int] = []
         self._index(0, len(self.order))
         self._trace()
 
-    def run(self, budget: Budget, bound_s: float, stopped: Callable[[], bool]) -> bool:
+    def run(self, budget: TimeBudget, bound_s: float, stopped: Callable[[], bool]) -> bool:
         """One cooling; whether there is nothing more to look for."""
         random = self.random
         scale = self.makespan or 1.0
@@ -101,7 +103,7 @@ class _Search:
                 temperature = scale * HOT * (COLD / HOT) ** spent
             tries += 1
             limit = self.cost - temperature * log(1.0 - random.random())
-            pick = random.random()
+            pick = 1.0 if self.settled else random.random()
             if pick < REASSIGN:
                 self._reassign(limit)
             elif pick < SWAP:

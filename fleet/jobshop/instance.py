@@ -222,6 +222,8 @@ def _strong_components(predecessors: Sequence[set[int]]) -> list[int]:
     from scipy.sparse.csgraph import connected_components
 
     columns = [before for befores in predecessors for before in befores]
+    if not columns:
+        return list(range(len(predecessors)))
     ends = [0]
     for befores in predecessors:
         ends.append(ends[-1] + len(befores))

@@ -14,9 +14,9 @@ from math import inf
 from random import Random
 from typing import NamedTuple
 
-from fleet.jobshop.budget import Budget
 from fleet.jobshop.forward_pass import LAST, PartialSchedule, Solution
 from fleet.jobshop.instance import Instance
+from fleet.jobshop.time_budget import TimeBudget
 
 ALPHAS = (0.1, 0.5, 1.0, 2.0, 0.2, 0.0, 0.3, 0.03, 0.7, 0.05, 0.4, 5.0)
 """Tried one after the other while there is time; spread around those that won most often."""
@@ -32,7 +32,7 @@ def list_schedule(
     instance: Instance,
     alpha: float | None = None,
     at_random: Random | None = None,
-    budget: Budget | None = None,
+    budget: TimeBudget | None = None,
 ) -> Solution | None:
     """Place one ready component after the other; without `alpha` the one of highest rank (HEFT).
 
@@ -71,8 +71,10 @@ def list_schedule(
     return partial.solution(order)
 
 
-def dispatching_rules(instance: Instance, best: Solution | None, budget: Budget) -> Solution | None:
-    """The best of the list schedule `best` and dispatching rules, tried until the `budget` is over.
+def dispatching_rules(
+    instance: Instance, best: Solution | None, budget: TimeBudget
+) -> Solution | None:
+    """The best of `best` and dispatching rules, tried until the `budget` is over.
 
     Those that are tried at small sizes take no time worth counting.
     """
@@ -86,7 +88,7 @@ def dispatching_rules(instance: Instance, best: Solution | None, budget: Budget)
     return best
 
 
-def random_restarts(instance: Instance, budget: Budget, seed: int) -> Solution | None:
+def random_restarts(instance: Instance, budget: TimeBudget, seed: int) -> Solution | None:
     """Some schedule where rules run into dead ends: blocks of a component in other orders, machines
     at random for one component after the other."""
     random = Random(seed)

@@ -9,12 +9,12 @@ from math import ceil
 from fleet.jobshop.annealing import anneal
 from fleet.jobshop.bounds import bound_with_travel, lower_bound
 from fleet.jobshop.branch_and_bound import branch_and_bound
-from fleet.jobshop.budget import Budget
 from fleet.jobshop.cpsat import CpSat, helps, installed
 from fleet.jobshop.forward_pass import Solution, schedule_of
 from fleet.jobshop.instance import Instance
 from fleet.jobshop.list_scheduling import dispatching_rules, list_schedule, random_restarts
 from fleet.jobshop.problem import Schedule, Shop
+from fleet.jobshop.time_budget import TimeBudget
 
 RULES_SHARE = 0.3
 """Of the time, how much dispatching rules may take before the search begins."""
@@ -26,7 +26,7 @@ MET = 1e-6
 """Relative difference between makespan and bound that counts as none."""
 
 
-def solve(shop: Shop, budget: Budget, exact: bool = True, seed: int = 0) -> Schedule | None:
+def solve(shop: Shop, budget: TimeBudget, exact: bool = True, seed: int = 0) -> Schedule | None:
     """The best schedule found within the `budget` (the list schedule however long that takes).
 
     `exact` allows CP-SAT, where it is installed and the size is right; it then takes up to
@@ -75,7 +75,7 @@ def _search(
     best: Solution,
     schedule: Schedule,
     bound_s: float,
-    budget: Budget,
+    budget: TimeBudget,
     exact: bool,
     seed: int,
 ) -> tuple[Schedule, float, str]:

@@ -14,12 +14,13 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from fleet.jobshop.annealing import anneal
-from fleet.jobshop.budget import Budget
+from fleet.jobshop.bounds import lower_bound
 from fleet.jobshop.forward_pass import Solution, evaluate
 from fleet.jobshop.instance import Instance
 from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.portfolio import schedule_in_order
 from fleet.jobshop.problem import BadShop, Position, Schedule, Shop
+from fleet.jobshop.time_budget import TimeBudget
 from fleet.jobshop.warm_start import warm_start
 
 WITHIN = 0.02
@@ -66,7 +67,7 @@ def reschedule(
     shop: Shop,
     home: Sequence[int],
     order: Sequence[int],
-    budget: Budget,
+    budget: TimeBudget,
     frozen: frozenset[int] = frozenset(),
     seed: int = 0,
 ) -> Rescheduled | None:
@@ -90,6 +91,7 @@ def reschedule(
     search.keep_to_targets(budget.until(MORE_TARGETS_SHARE))
     chosen = search.move_less(budget.until(TAKE_BACK_SHARE), budget)
     schedule = schedule_in_order(instance, chosen)
+    schedule = replace(schedule, lower_bound_s=lower_bound(instance))
     return Rescheduled(schedule, tuple(_moved(chosen.machine_of, home)), search.best_s)
 
 
@@ -122,7 +124,7 @@ class _Rescheduling:
         """The longest makespan that fewer moves may lead to."""
         return self.best_s * (1 + WITHIN)
 
-    def begin(self, budget: Budget) -> bool:
+    def begin(self, budget: TimeBudget) -> bool:
         """From scratch, and with everybody at home who can be; whether there is any schedule."""
         self._add(list_schedule(self.instance))
         self._add(warm_start(self.instance, self.order, self.home, inf))
@@ -130,7 +132,7 @@ class _Rescheduling:
             self.place_orphans(budget)
         return bool(self.found)
 
-    def keep_to_targets(self, budget: Budget) -> None:
+    def keep_to_targets(self, budget: TimeBudget) -> None:
         """Everybody stays where the target can be met. That may miss it by a little, where there
         is travel or are partners, so that shorter ones are tried, too."""
         tried = 0
@@ -155,18 +157,18 @@ class _Rescheduling:
         limit_s = self.limit_s
         return any(solution.makespan_s <= limit_s for solution in self.kept)
 
-    def place_orphans(self, budget: Budget) -> None:
+    def place_orphans(self, budget: TimeBudget) -> None:
         """Only orphans move."""
         self._add(_orphans_placed(self.instance, self.home, self.order, budget))
 
-    def shorten(self, budget: Budget) -> None:
+    def shorten(self, budget: TimeBudget) -> None:
         """Search for a shorter schedule at any number of moves, from one that has few: what comes
         out of a new one would set a limit that only new ones meet."""
         begin = self.kept if self.met else self.found
         shortest = min(begin, key=lambda solution: solution.makespan_s)
         self._add(anneal(self.instance, shortest, budget, 0.0, self.seed, frozen=self.frozen))
 
-    def move_less(self, take_back: Budget, budget: Budget) -> Solution:
+    def move_less(self, take_back: TimeBudget, budget: TimeBudget) -> Solution:
         """The solution with the fewest moves within the limit, and fewer if that can be."""
         chosen = self._chosen()
         chosen = _taken_back(self.instance, chosen, self.home, self.limit_s, take_back)
@@ -207,7 +209,7 @@ def _moved(machine_of: Sequence[int], home: Sequence[int]) -> list[int]:
 
 
 def _orphans_placed(
-    instance: Instance, home: Sequence[int], order: list[int], budget: Budget
+    instance: Instance, home: Sequence[int], order: list[int], budget: TimeBudget
 ) -> Solution | None:
     """Everything stays but the orphans, the one of highest rank first; they go where there is least
     to do, and while there is time, where the makespan is least."""
@@ -273,7 +275,7 @@ def _components_in_order(instance: Instance, order: Sequence[int]) -> list[int]:
 
 
 def _taken_back(
-    instance: Instance, begin: Solution, home: Sequence[int], limit_s: float, budget: Budget
+    instance: Instance, begin: Solution, home: Sequence[int], limit_s: float, budget: TimeBudget
 ) -> Solution:
     """Moves undone one by one, as long as the makespan stays within the limit."""
     best = begin

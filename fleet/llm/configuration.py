@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
-import yaml
 
 from fleet.errors import BadLlmConfig
-from keyexpr_schema.config_files import config_file
+from keyexpr_schema.config_files import config_file, read_yaml
 
 Seconds = Annotated[float, msgspec.Meta(gt=0)]
 Count = Annotated[int, msgspec.Meta(ge=0)]
@@ -123,12 +122,7 @@ def load_llm_config(path: Path | None = None) -> LlmConfig:
         BadLlmConfig: the file cannot be read, or a field is not right.
     """
     path = path or config_file(".", "planner")
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise BadLlmConfig(f"{path} cannot be read: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise BadLlmConfig(f"{path} is not YAML: {' '.join(str(error).split())}") from None
+    data = read_yaml(path, BadLlmConfig)
     if not isinstance(data, dict) or set(data) - {"llm"} or not isinstance(data.get("llm"), dict):
         raise BadLlmConfig(f"{path} must have one section, `llm`, with fields such as `model`")
     fields = {field.name for field in msgspec.structs.fields(LlmConfig)}

@@ -23,14 +23,11 @@ __all__ = [
 _MODULES = {
     "LlmInterpreter": "llm.interpreter",
     "LlmPlanner": "llm.planner",
-    "NoPlan": "base",
-    "Planner": "base",
-    "PlanningProblem": "base",
     "SymbolicPlanner": "symbolic.planner",
 }
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _MODULES:
+    if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
+    return getattr(import_module(f"{__name__}.{_MODULES.get(name, 'base')}"), name)

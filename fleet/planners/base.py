@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import CheckedPlan, check_plan
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan, Violation
@@ -39,13 +39,13 @@ class NoPlan:
 
 
 class Planner(ABC):
-    """Makes plans. Subclasses solve; this class has every answer checked."""
+    """Makes plans. Subclasses solve; this class sees to it that every plan is checked."""
 
     name: str
     strategies: tuple[str, ...]
 
-    def plan(self, problem: PlanningProblem) -> Plan | NoPlan:
-        """A plan that the checker passed, or why there is none."""
+    def plan(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
+        """A valid plan, or why there is none."""
         if problem.strategy not in self.strategies:
             return NoPlan(
                 f"planner {self.name} has no strategy {problem.strategy}: "
@@ -56,11 +56,14 @@ class Planner(ABC):
         made = self._solve(problem)
         if isinstance(made, NoPlan):
             return made
-        checked = check_plan(made, problem.world)
-        if not checked.valid:
-            return NoPlan(checked.violations[0].sentence, checked.violations)
-        return made
+        if isinstance(made, CheckedPlan) and made.world is problem.world:
+            return made
+        plan = made.plan if isinstance(made, CheckedPlan) else made
+        checked = check_plan(plan, problem.world)
+        if isinstance(checked, CheckedPlan):
+            return checked
+        return NoPlan(checked.violations[0].sentence, checked.violations)
 
     @abstractmethod
-    def _solve(self, problem: PlanningProblem) -> Plan | NoPlan:
-        """A plan for the problem; checked by the caller."""
+    def _solve(self, problem: PlanningProblem) -> Plan | CheckedPlan | NoPlan:
+        """A plan for the problem; the caller checks it, unless its check comes along."""

@@ -1,4 +1,4 @@
-"""From a sequence of actions of certain robots to a DAG of tasks of actors."""
+"""Deordering: from sequences of actions of certain robots to a DAG of tasks of actors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from keyexpr_schema.payloads.plans import Task
 
 
 @dataclass(frozen=True)
-class Strand:
+class ActionSequence:
     """Consecutive actions for one goal; each robot in it becomes an actor of its own.
 
     `named` are robots that the goal itself speaks of: their actors are pinned to them.
@@ -25,23 +25,23 @@ class Strand:
     named: frozenset[str] = frozenset()
 
 
-def tasks_from(
-    strands: Sequence[Strand], first_task: int = 1, one_actor_each: bool = False
+def deordered(
+    sequences: Sequence[ActionSequence], first_task: int = 1, one_actor_each: bool = False
 ) -> tuple[tuple[Task, ...], dict[str, str]]:
-    """Tasks that do what the strands do, with only the order that matters, and pinned actors.
+    """Tasks that do what the sequences do, in a partial order, and the actors that are pinned.
 
     A task waits for the last one before it that wrote what it reads, for those that read what it
-    overwrites, and for its robots' earlier tasks in the same strand (deordering by causal links).
-    Each robot becomes a new actor in every strand, or with `one_actor_each` one in all of them.
+    overwrites, and for its robots' earlier tasks in the same sequence (deordering by causal links).
+    Each robot becomes a new actor in every sequence, or with `one_actor_each` one in all of them.
     """
     rows: list[tuple[str, str, Action]] = []
     pins: dict[str, str] = {}
     actor_count = 0
     actors: dict[str, str] = {}
-    for strand in strands:
+    for sequence in sequences:
         if not one_actor_each:
             actors = {}
-        for action in strand.actions:
+        for action in sequence.actions:
             args = dict(action.args)
             for parameter in action.skill.robot_parameters:
                 robot = args[parameter]
@@ -50,11 +50,11 @@ def tasks_from(
                     # Names stay unique over the revisions of a plan, as the task numbers do.
                     revision = f"{first_task}-" if first_task > 1 else ""
                     actors[robot] = f"a{revision}{actor_count}"
-                    if robot in strand.named:
+                    if robot in sequence.named:
                         pins[actors[robot]] = robot
                 args[parameter] = actor_arg(actors[robot])
             lifted = action.skill.ground(args)
-            rows.append((f"t{first_task + len(rows)}", strand.goal, lifted))
+            rows.append((f"t{first_task + len(rows)}", sequence.goal, lifted))
     after = _dependencies([(name, action) for name, _, action in rows])
     reduced = TaskGraph(after).reduced()
     tasks = tuple(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from fleet.core.checker.checked_plan import CheckedPlan
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from keyexpr_schema.payloads.plans import Plan
 
@@ -16,9 +17,14 @@ class PartialPlan:
     `changed` is false for a residual plan that stays as it was.
     """
 
-    plan: Plan
+    checked: CheckedPlan
     left_out: Mapping[str, str] = field(default_factory=dict)
     changed: bool = True
+
+    @property
+    def plan(self) -> Plan:
+        """The plan without its check."""
+        return self.checked.plan
 
 
 def plan_reachable_goals(
@@ -33,7 +39,7 @@ def plan_reachable_goals(
     else is no plan.
     """
     made = planner.plan(problem)
-    if isinstance(made, Plan):
+    if isinstance(made, CheckedPlan):
         return PartialPlan(made)
     left_out: dict[str, str] = {}
     for goal in problem.goals if len(problem.goals) > 1 else ():

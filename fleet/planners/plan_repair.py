@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import CheckedPlan, check_plan
 from fleet.core.revision.repair import beside, broken_goals, for_goals, without_tasks_of
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
@@ -32,9 +32,9 @@ def repair_plan(
     """
     whole = for_goals(residual, problem.goals)
     checked = check_plan(whole, problem.world)
-    if checked.valid:
-        return PartialPlan(whole, changed=False)
-    broken = broken_goals(whole, checked, problem.goals)
+    if isinstance(checked, CheckedPlan):
+        return PartialPlan(checked, changed=False)
+    broken = broken_goals(checked, problem.goals)
     rest = tuple(goal for goal in problem.goals if goal.goal not in broken)
     if not broken or all(goal.goal in reached for goal in rest):
         return None
@@ -51,4 +51,5 @@ def repair_plan(
         left_out = dict(part.left_out)
         repaired = beside(repaired, part.plan)
     repaired = for_goals(repaired, [g for g in problem.goals if g.goal not in left_out])
-    return PartialPlan(repaired, left_out) if check_plan(repaired, problem.world).valid else None
+    rechecked = check_plan(repaired, problem.world)
+    return PartialPlan(rechecked, left_out) if isinstance(rechecked, CheckedPlan) else None

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Set
 
-from fleet.allocators.base import Circumstances
 from fleet.core.dispatch.delays import behind_s
 from fleet.core.plan_entry import PlanningJob
 from fleet.core.state import State
+from fleet.scheduling.plan_shop import AllocationContext
 from keyexpr_schema.ids import actor_in
 from keyexpr_schema.payloads.plans import Plan
 
 
-def circumstances_of(job: PlanningJob, state: State, busy: frozenset[str]) -> Circumstances:
-    """The circumstances of a planning job, in seconds from now; actors in `busy` are under way."""
+def context_of(job: PlanningJob, state: State, busy: frozenset[str]) -> AllocationContext:
+    """What a planning job is allocated in, in seconds from now; actors in `busy` are under way."""
     goals = [state.goals[goal] for goal in job.goals if goal in state.goals]
-    return Circumstances(
+    return AllocationContext(
         ready_s={
             robot: wait_s for robot in state.robots if (wait_s := _busy_s(job, state, robot)) > 0.0
         },

@@ -10,16 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from fleet.allocators.balanced import BalancedAllocator
 from fleet.allocators.base import Allocator
 from fleet.allocators.cost_based import CostBasedAllocator
 from fleet.allocators.llm import LlmAllocator
 from fleet.allocators.makespan import MakespanAllocator
-from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.allocators.round_robin import RoundRobinAllocator
-from fleet.core.model.skills import SkillModel, skills_from_data
+from fleet.core.model.skill_file import skills_from_data
+from fleet.core.model.skills import SkillModel
 from fleet.errors import BadSkillFile
 from fleet.llm.configuration import load_llm_config
 from fleet.llm.conversation import LanguageModel
@@ -27,7 +25,7 @@ from fleet.planners.base import Planner
 from fleet.planners.llm.interpreter import LlmInterpreter
 from fleet.planners.llm.planner import LlmPlanner
 from fleet.planners.symbolic.planner import SymbolicPlanner
-from keyexpr_schema.config_files import config_file
+from keyexpr_schema.config_files import config_file, read_yaml
 from keyexpr_schema.plug_ins import load_plug_ins
 
 SKILL_MODELS = "robotfleet.skill_models"
@@ -69,9 +67,9 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
     planners: dict[str, Planner] = {symbolic.name: symbolic, llm.name: llm}
     own: tuple[Allocator, ...] = (
         MakespanAllocator(),
-        MilpAllocator(),
-        MilpAllocator(fallback_round_robin=True),
-        BalancedAllocator(),
+        MinMaxLoadAllocator(TieBreak.TRAVEL),
+        MinMaxLoadAllocator(TieBreak.TRAVEL, fallback_round_robin=True),
+        MinMaxLoadAllocator(TieBreak.NEXT_LOADS),
         CostBasedAllocator(),
         RoundRobinAllocator(),
         LlmAllocator(model, MakespanAllocator()),
@@ -120,13 +118,7 @@ def load_skills(path: Path) -> dict[str, SkillModel]:
     Raises:
         BadSkillFile: it cannot be read, or what is in it is not right.
     """
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise BadSkillFile(f"{path} cannot be read: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise BadSkillFile(f"{path} is not YAML: {' '.join(str(error).split())}") from None
-    return skills_from_data(data, str(path))
+    return skills_from_data(read_yaml(path, BadSkillFile), str(path))
 
 
 def _planner(offered: Any) -> Planner:

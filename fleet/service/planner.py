@@ -57,7 +57,7 @@ class PlannerService:
         self._interpreter = composition.interpreter
         self._policy = replace(
             policy or Policy(),
-            interpreter=self._interpreter.configured,
+            interpreter=composition.language_model.configured,
             skill_phrases=phrases_of(composition.skills),
         )
         self._incarnation = uuid.uuid4().hex[:12]

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import signal
 import sys
+from importlib import import_module
 from pathlib import Path
 
 from fleet.core.state import Policy
@@ -66,7 +67,7 @@ async def _run(
             waiting = asyncio.create_task(ready.wait())
             await asyncio.wait((service, waiting), return_when=asyncio.FIRST_COMPLETED)
             waiting.cancel()
-            warming = asyncio.create_task(asyncio.to_thread(composition.language_model.warm))
+            warming = asyncio.create_task(asyncio.to_thread(_warm_up, composition))
             if ready.is_set():
                 print(f"planner ready in realm {realm}", flush=True)  # noqa: T201
             try:
@@ -77,3 +78,10 @@ async def _run(
                 # Ends calls to a model that are under way, so that no thread keeps the process.
                 composition.language_model.close()
                 warming.cancel()
+
+
+def _warm_up(composition: Composition) -> None:
+    """Load what plans are made with now, so that the first one need not wait for it."""
+    for library in ("pulp", "scipy.optimize", "scipy.sparse.csgraph"):
+        import_module(library)
+    composition.language_model.warm()

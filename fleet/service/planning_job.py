@@ -10,14 +10,16 @@ from dataclasses import replace as changed
 from msgspec.structs import replace
 
 from fleet.allocators.base import Allocated, Allocator, NotAllocated
+from fleet.core.checker.checked_plan import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.events import At, PlanningFailed, PlanningSucceeded
 from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import PlanningJob
+from fleet.core.schedule.actor_constraints import tasks_nobody_can_do
 from fleet.core.state import State
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
 from fleet.planners.plan_repair import repair_plan
-from fleet.service.allocation_context import circumstances_of, robots_under_way
+from fleet.service.allocation_context import context_of, robots_under_way
 from fleet.service.composition import Composition
 from keyexpr_schema.facts import SEARCHED
 from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
@@ -78,7 +80,8 @@ class _Run:
         if made is None:
             return None
         begun = {task.actor for task in made.plan.tasks} & set(self.job.begun_actors)
-        found = self._allocate(made.plan, robots_under_way(self.job, made.plan, self.state, begun))
+        busy = robots_under_way(self.job, made.plan, self.state, begun)
+        found = self._allocate(made.checked, busy)
         if isinstance(found, NotAllocated):
             return None
         if not self.job.reallocation and not made.left_out and not made.changed:
@@ -90,7 +93,7 @@ class _Run:
         made = self._plan()
         if isinstance(made, NoPlan):
             return made
-        found = self._allocate(made.plan, robots_under_way(self.job, made.plan, self.state))
+        found = self._allocate(made.checked, robots_under_way(self.job, made.plan, self.state))
         if isinstance(found, NotAllocated):
             return NoPlan(found.violations[0].sentence, found.violations)
         return self._succeeded(made, found)
@@ -120,23 +123,31 @@ class _Run:
             planning_time_s=0.0,
         )
 
-    def _allocate(self, plan: Plan, busy: Mapping[str, str]) -> Allocated | NotAllocated:
+    def _allocate(self, checked: CheckedPlan, busy: Mapping[str, str]) -> Allocated | NotAllocated:
         """With actors that robots are `busy` with left where they are and begun with, if that can
         be; else only left where they are; else as if nothing were under way."""
-        context = circumstances_of(self.job, self.state, frozenset(busy))
+        context = context_of(self.job, self.state, frozenset(busy))
         calm = changed(context, under_way=frozenset())
-        kept = replace(plan, pins={**busy, **plan.pins})
-        made = self.allocator.allocate(kept, self.world, context)
+        plan = checked.plan
+        pins = {**busy, **plan.pins}
+        kept = checked if pins == plan.pins else check_plan(replace(plan, pins=pins), self.world)
+        if isinstance(kept, InvalidPlan):
+            return self.allocator.allocate(checked, calm)
+        made = self.allocator.allocate(kept, context)
         if isinstance(made, NotAllocated) and context.under_way:
-            made = self.allocator.allocate(kept, self.world, calm)
-        if isinstance(made, NotAllocated) and kept.pins != plan.pins:
-            made = self.allocator.allocate(plan, self.world, calm)
+            made = self.allocator.allocate(kept, calm)
+        if isinstance(made, NotAllocated) and kept is not checked:
+            made = self.allocator.allocate(checked, calm)
         return made
 
     def _plan(self) -> PartialPlan | NoPlan:
         job, planners = self.job, self.composition.planners
         if job.proposal is not None:
-            return PartialPlan(_with_goal_conditions(job.proposal, self.state))
+            checked = check_plan(_with_goal_conditions(job.proposal, self.state), self.world)
+            if isinstance(checked, InvalidPlan):
+                violations = (*tasks_nobody_can_do(checked), *checked.violations)
+                return NoPlan(violations[0].sentence, violations)
+            return PartialPlan(checked)
         planner = planners.get(job.planner)
         if planner is None:
             return NoPlan(

@@ -9,9 +9,10 @@ import sys
 from contextlib import nullcontext
 from pathlib import Path
 
-from fleet.stores.errors import StoreError
+from fleet.errors import StoreError
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.transport.router import CannotListen, run_router
+from keyexpr_schema.errors import CannotListen
+from keyexpr_schema.transport.router import run_router
 
 FREE_PORT = ":0"
 

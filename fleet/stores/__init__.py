@@ -1,0 +1,6 @@
+"""The durable store behind a router: what every key holds, and the journal of what changed."""
+
+from fleet.errors import StoreError, StoreInUse
+from fleet.stores.sqlite import SqliteStore
+
+__all__ = ["SqliteStore", "StoreError", "StoreInUse"]

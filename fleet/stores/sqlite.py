@@ -9,12 +9,11 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
-from fleet.stores.base import StateStore
-from fleet.stores.errors import StoreError, StoreInUse
+from fleet.errors import StoreError, StoreInUse
 from fleet.stores.index import Index
-from keyexpr_schema.transport.storage import Journaled, Write
+from keyexpr_schema.transport.storage import AppliedWrite, Write
 
 FORMAT = 1
 _STAMP_BYTES = 24
@@ -39,8 +38,8 @@ PRAGMA user_version = {FORMAT};
 """
 
 
-class SqliteStore(StateStore):
-    """A `StateStore` in the directory `data_dir`, which one process uses at a time.
+class SqliteStore:
+    """A `Store` (which see) in the directory `data_dir`, which one process uses at a time.
 
     `synchronous`: `NORMAL` outlives the end of the process at any moment; `FULL` also a power cut,
     at about half the speed. `journal_limit`: how many changes the journal remembers.
@@ -58,7 +57,7 @@ class SqliteStore(StateStore):
         journal_limit: int = 100_000,
         wall_time_s: Callable[[], float] = time.time,
     ) -> None:
-        super().__init__(wall_time_s)
+        self._wall_time_s = wall_time_s
         self._journal_limit = journal_limit
         self._lock = threading.Lock()
         self._index = Index()
@@ -90,7 +89,16 @@ class SqliteStore(StateStore):
             if not deleted:
                 self._index.set(Write(keyexpr, number, False, encoding, data))
 
-    def _apply(self, batch: Sequence[Write], wall_time_s: float) -> int:
+    def apply(self, batch: Sequence[Write]) -> int:
+        """Apply `batch` in one transaction; how many of the writes changed something.
+
+        Raises:
+            StoreError: nothing of the batch was applied.
+        """
+        for write in batch:
+            if write.stamp <= 0:
+                raise StoreError(f"a write to {write.keyexpr!r} carries no timestamp")
+        wall_time_s = self._wall_time_s()
         with self._lock:
             fresh, changes = self._decide(batch)
             if not changes:
@@ -163,11 +171,17 @@ class SqliteStore(StateStore):
                 (self._journal_limit,),
             )
 
+    def get(self, keyexpr: str) -> Write | None:
+        """The value of one key, None when it has none or it was deleted."""
+        return next(iter(self.select(keyexpr)), None)
+
     def select(self, pattern: str) -> list[Write]:
+        """The values of every key that `pattern` (`*`, `**` and `$*` allowed) matches, by key."""
         with self._lock:
             return self._index.matching(pattern)
 
-    def journal(self, prefix: str, after: int, limit: int) -> tuple[list[Journaled], int]:
+    def journal(self, prefix: str, after: int, limit: int) -> tuple[list[AppliedWrite], int]:
+        """At most `limit` changes after number `after` under `prefix/`, and the last number."""
         with self._lock:
             rows = self._db.execute(
                 "SELECT number, wall_time_s, keyexpr, deleted, stamp, data FROM journal "
@@ -176,17 +190,24 @@ class SqliteStore(StateStore):
             ).fetchall()
             last = self._last
         entries = [
-            Journaled(number, wall_s, keyexpr, bool(deleted), int.from_bytes(stamp, "big"), data)
+            AppliedWrite(number, wall_s, keyexpr, bool(deleted), int.from_bytes(stamp, "big"), data)
             for number, wall_s, keyexpr, deleted, stamp, data in rows
         ]
         return entries, last
 
     def close(self) -> None:
+        """Release everything; what was applied stays."""
         with self._lock:
             self._db.close()
             if self._guard >= 0:
                 os.close(self._guard)
                 self._guard = -1
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 def _blob(stamp: int) -> bytes:

@@ -38,7 +38,7 @@ def say(sentence: str) -> None:
     sys.stdout.flush()
 
 
-def run(
+def run_recorder(
     endpoints: Sequence[str],
     realm: str,
     out: Path,
@@ -65,7 +65,7 @@ async def record(
     connect_timeout_s: float | None = 3.0,
     tell: Callable[[str], None] = say,
 ) -> None:
-    """The same as `run`, in a running loop; ends at a signal or when it is cancelled."""
+    """The same as `run_recorder`, in a running loop; ends at a signal or when it is cancelled."""
     config = SessionConfig(
         endpoints=tuple(endpoints),
         realm=realm,

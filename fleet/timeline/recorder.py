@@ -31,7 +31,6 @@ from keyexpr_schema.keyspace import (
     PLACE,
     PLAN_SPEC,
     PLAN_STATUS,
-    REJECT,
     REPORT,
     ROBOT_SPEC,
     ROBOT_STATE,
@@ -40,6 +39,7 @@ from keyexpr_schema.keyspace import (
     SIM_SCENE,
     SIM_TRUTH,
     TASK_RECORD,
+    UNDECODABLE,
 )
 from keyexpr_schema.payloads.tasks import OrderAddress, Report, TaskRecord, TaskState
 
@@ -59,7 +59,7 @@ RECORDED: tuple[Key[Any, Any], ...] = (
     ORDER,
     REPORT,
     FACT,
-    REJECT,
+    UNDECODABLE,
 )
 """The keys the recorder listens to."""
 
@@ -77,7 +77,7 @@ _TELL: dict[str, tuple[str, Callable[[Any, Any], Iterator[event_log.Line]]]] = {
     ROBOT_SPEC.name: ("robots", event_log.robot_spec),
     ROBOT_STATE.name: ("robots", event_log.robot_state),
     SIM_TRUTH.name: ("truth", event_log.truth),
-    REJECT.name: ("rejects", event_log.reject),
+    UNDECODABLE.name: ("rejects", event_log.reject),
 }
 
 _COLOURS = {

@@ -13,7 +13,7 @@ from typing import IO, Any
 from fleet.timeline import viewer
 from fleet.timeline.drawing.sink import SIM_TIME, free_port
 from fleet.timeline.errors import NoPicture, TimelineError
-from fleet.timeline.read import summary
+from fleet.timeline.reader import summary
 
 DRIVER = "mesa-vulkan-drivers"
 """The Debian package with a Vulkan driver that needs no graphics card."""
@@ -22,7 +22,7 @@ START_S = 40.0
 _NO_DRIVER = ("adapter", "render context", "vulkan", "wgpu")
 
 
-def screenshot(
+def save_screenshot(
     recording: Path, out: Path, size: tuple[int, int] = (1600, 900), at_s: float | None = None
 ) -> None:
     """Draw a recording as the viewer shows it, at fleet time `at_s` [s] (`None`: at its end).
@@ -129,7 +129,7 @@ def main(arguments: list[str] | None = None) -> int:
     if not (width.isdigit() and height.isdigit()):
         parser.error(f"--size {options.size!r} is not WIDTHxHEIGHT, e.g. 1600x900")
     try:
-        screenshot(options.recording, options.out, (int(width), int(height)), options.at)
+        save_screenshot(options.recording, options.out, (int(width), int(height)), options.at)
     except TimelineError as error:
         sys.stderr.write(f"{error}\n")
         return 1

@@ -80,6 +80,11 @@ class Plan(Payload, frozen=True, kw_only=True):
     seeks: tuple[Id, ...] = ()
     """Objects that this plan only looks for; once one is found, a new revision goes on."""
 
+    @property
+    def actors(self) -> tuple[str, ...]:
+        """Its actors, in the order of their first tasks."""
+        return tuple(dict.fromkeys(task.actor for task in self.tasks))
+
 
 class PlanState(str, Enum):
     """Where a plan stands."""

@@ -27,14 +27,14 @@ class PlannerStatus(Payload, frozen=True, kw_only=True):
     skills: tuple[str, ...] = ()
 
 
-class RejectAddress(Address, frozen=True):
+class UndecodableAddress(Address, frozen=True):
     """A payload that `component` could not decode; `digest` names the key it was on."""
 
     component: str
     digest: str
 
 
-class Reject(Payload, frozen=True, kw_only=True):
+class UndecodableValue(Payload, frozen=True, kw_only=True):
     """A value that was put on a key and is not what the key promises."""
 
     component: Id

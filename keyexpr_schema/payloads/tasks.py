@@ -17,7 +17,7 @@ class TaskAddress(Address, frozen=True):
 
 
 class OrderAddress(Address, frozen=True):
-    """A task in one robot's in-tray."""
+    """An order of one robot."""
 
     robot: str
     plan: str

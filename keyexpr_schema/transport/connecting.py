@@ -1,4 +1,4 @@
-"""Opening and closing a link, such that no session is ever left open.
+"""Configuring, opening and closing Zenoh sessions, such that none is ever left open.
 
 An unclosed Zenoh session has threads that keep the interpreter from ending.
 """
@@ -7,17 +7,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import logging
 import threading
 from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
+from typing import Any
 
 import zenoh
 
 from keyexpr_schema.errors import Unreachable
 from keyexpr_schema.transport.link import Link
-from keyexpr_schema.transport.wire import zenoh_config
 
 _log = logging.getLogger(__name__)
 
@@ -26,6 +27,44 @@ WAITING_LINE_S = 1.0
 
 OPEN_ATTEMPT_MS = 500
 """Zenoh's own retry inside `open` cannot be interrupted, so it gets short attempts."""
+
+
+def zenoh_config(
+    mode: str,
+    *,
+    connect: Sequence[str] = (),
+    listen: Sequence[str] = (),
+    lease_s: float = 2.0,
+    namespace: str | None = None,
+    connect_timeout_ms: int | None = None,
+) -> zenoh.Config:
+    """A Zenoh configuration: no multicast, source timestamps, no shared memory, quick retries.
+
+    Shared memory is off because with it a router refuses sessions past 351.
+    """
+    values: dict[str, Any] = {
+        "mode": mode,
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": mode == "router",
+        "timestamping/enabled": True,
+        "transport/shared_memory/enabled": False,
+        "transport/link/tx/lease": round(lease_s * 1000),
+        "connect/endpoints": list(connect),
+        "connect/retry": {
+            "period_init_ms": 100,
+            "period_max_ms": 500,
+            "period_increase_factor": 2,
+        },
+        "listen/endpoints": list(listen),
+    }
+    if namespace is not None:
+        values["namespace"] = namespace
+    if connect_timeout_ms is not None:
+        values["connect/timeout_ms"] = connect_timeout_ms
+    config = zenoh.Config()
+    for path, value in values.items():
+        config.insert_json5(path, json.dumps(value))
+    return config
 
 
 class _Opening:
@@ -64,7 +103,7 @@ async def _connect(
     loop = asyncio.get_running_loop()
     started_s = loop.time()
     pause_s = 0.1
-    told = timeout_s is not None
+    warned = timeout_s is not None
     while True:
         left_s = None if timeout_s is None else timeout_s - (loop.time() - started_s)
         attempt_ms = OPEN_ATTEMPT_MS if left_s is None else min(OPEN_ATTEMPT_MS, left_s * 1000)
@@ -86,16 +125,13 @@ async def _connect(
             return await asyncio.shield(loop.run_in_executor(executor, opening.run))
         except zenoh.ZError as error:
             if timeout_s is not None and loop.time() - started_s + pause_s >= timeout_s:
-                raise Unreachable(
-                    f"no router answers at {', '.join(endpoints)}: start one with "
-                    "`robotctl router` or name another with --router"
-                ) from error
+                raise Unreachable.no_router(endpoints) from error
         except asyncio.CancelledError:
             opening.abandon()
             raise
-        if not told and loop.time() - started_s >= WAITING_LINE_S:
+        if not warned and loop.time() - started_s >= WAITING_LINE_S:
             _log.warning("no router answers at %s; waiting for one", ", ".join(endpoints))
-            told = True
+            warned = True
         await asyncio.sleep(pause_s)
         pause_s = min(0.5, pause_s * 2)
 
@@ -118,7 +154,7 @@ async def open_link(
             link = Link(session, executor)
             close = link.close
             with contextlib.suppress(TimeoutError):
-                await link.wait_up(1.0)
+                await link.router.wait_up(1.0)
             yield link
         finally:
             # Shielded: an unclosed session keeps the interpreter from ending.

@@ -1,9 +1,8 @@
-"""One Zenoh session seen from asyncio: whether it is up, and calls that never block the loop.
+"""One Zenoh session seen from asyncio: calls that never block the loop.
 
-Zenoh's callbacks run on its own network threads and only hand over to the loop. Calls that may
-block (a full link, a handshake) run on one thread of their own, in the order in which they were
-made, so that a read never overtakes a write. `wire`, `link`, `connecting` and `router` are the
-only modules that import zenoh.
+Zenoh's callbacks run on its own network threads and only schedule a call on the loop. Calls that
+may block (a full link, a handshake) run on one thread of their own, in the order in which they were
+made, so that a read never overtakes a write.
 """
 
 from __future__ import annotations
@@ -13,14 +12,15 @@ import contextlib
 import logging
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import zenoh
 from zenoh import handlers
 
-from keyexpr_schema.transport.wire import Wire, read_sample
+from keyexpr_schema.transport.router_presence import RouterPresence
+from keyexpr_schema.transport.samples import Encoded, Sample, read_sample
 
 _T = TypeVar("_T")
 _log = logging.getLogger(__name__)
@@ -31,121 +31,69 @@ _TIMED_OUT = b"Timeout"
 
 @dataclass
 class Replies:
-    """What a query brought: values, sentences of refusal, and whether all answered in time."""
+    """What a query brought: values, error replies, and whether all replied in time."""
 
-    values: list[Wire] = field(default_factory=list)
+    values: list[Sample] = field(default_factory=list)
     errors: list[str] = field(default_factory=list)
     timed_out: bool = False
 
-    def note_error(self, data: bytes) -> None:
-        """Take in the payload of an error reply."""
-        if data == _TIMED_OUT:
-            self.timed_out = True
-        else:
-            self.errors.append(data.decode(errors="replace"))
+    def add(self, reply: zenoh.Reply) -> None:
+        """Take in one reply, from any thread: a list takes appends from there."""
+        if reply.ok is not None:
+            self.values.append(read_sample(reply.ok))
+        elif reply.err is not None:
+            data = reply.err.payload.to_bytes()
+            if data == _TIMED_OUT:
+                self.timed_out = True
+            else:
+                self.errors.append(data.decode(errors="replace"))
 
 
 @dataclass(frozen=True)
-class Request:
-    """A query to be answered with `answer` or `refuse`, once, then `close`."""
+class IncomingQuery(Encoded):
+    """A query to be ended with `reply` or `refuse`, once."""
 
     link: Link
     query: zenoh.Query
-    keyexpr: str
-    data: bytes
-    encoding: str
 
-    async def answer(self, data: bytes, encoding: str) -> None:
+    async def reply(self, data: bytes, encoding: str) -> None:
         """Send the reply and end the query."""
-        await self.link.call(self._answer, data, encoding)
+        await self.link.call(
+            self._end, lambda: self.query.reply(self.keyexpr, data, encoding=encoding)
+        )
 
-    def _answer(self, data: bytes, encoding: str) -> None:
-        # An asker whom the answer cannot reach any more sees that by its own timeout.
-        with contextlib.suppress(zenoh.ZError), self.query as query:
-            query.reply(self.keyexpr, data, encoding=encoding)
-
-    async def refuse(self, sentence: str) -> None:
+    async def refuse(self, reason: str) -> None:
         """Send an error reply and end the query."""
-        await self.link.call(self._refuse, sentence)
+        await self.link.call(
+            self._end, lambda: self.query.reply_err(reason.encode(), encoding="text/plain")
+        )
 
-    def _refuse(self, sentence: str) -> None:
-        with contextlib.suppress(zenoh.ZError), self.query as query:
-            query.reply_err(sentence.encode(), encoding="text/plain")
+    def _end(self, send: Callable[[], object]) -> None:
+        # A client whom the reply cannot reach any more sees that by its own timeout.
+        with contextlib.suppress(zenoh.ZError), self.query:
+            send()
 
 
 class Link:
-    """A Zenoh client session; made by `connecting.open_link`.
-
-    `generation` counts how often a router came into view: what was learned in one generation
-    says nothing about the next.
-    """
+    """A Zenoh client session; made by `connecting.open_link`."""
 
     def __init__(self, session: zenoh.Session, executor: ThreadPoolExecutor) -> None:
         self._session = session
         self._executor = executor
         self._loop = asyncio.get_running_loop()
-        self._routers: dict[str, int] = {}
-        self._up = asyncio.Event()
-        self._listeners: list[Callable[[], None]] = []
-        self.generation = 0
-        self.up_since_s = 0.0
+        self.router = RouterPresence()
         self._events = session.info.declare_transport_events_listener(
             handlers.Callback(self._on_transport, indirect=False), history=True
         )
 
-    # --- whether it is up ------------------------------------------------------------------------
-
-    @property
-    def up(self) -> bool:
-        """Whether a router is visible now."""
-        return self._up.is_set()
-
-    @property
-    def age_s(self) -> float:
-        """Seconds since a router came into view; 0 while there is none."""
-        return self._loop.time() - self.up_since_s if self.up else 0.0
-
-    async def wait_up(self, timeout_s: float | None = None) -> None:
-        """Wait until a router is visible.
-
-        Raises:
-            TimeoutError: none was within `timeout_s`.
-        """
-        async with asyncio.timeout(timeout_s):
-            await self._up.wait()
-
-    @contextlib.contextmanager
-    def listening(self, listener: Callable[[], None]) -> Any:
-        """Call `listener` on the loop whenever the link comes up or goes down."""
-        self._listeners.append(listener)
-        try:
-            yield
-        finally:
-            self._listeners.remove(listener)
-
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         if event.transport.whatami == zenoh.WhatAmI.ROUTER:
             opened = event.kind == zenoh.SampleKind.PUT
-            self.hand_over(self._count_router, str(event.transport.zid), opened)
-
-    def _count_router(self, zid: str, opened: bool) -> None:
-        # A fast reconnection can show the new transport before the end of the old one.
-        self._routers[zid] = self._routers.get(zid, 0) + (1 if opened else -1)
-        if not self._routers[zid]:
-            del self._routers[zid]
-        if opened:
-            self.generation += 1
-            self.up_since_s = self._loop.time()
-        if any(count > 0 for count in self._routers.values()):
-            self._up.set()
-        else:
-            self._up.clear()
-        for listener in list(self._listeners):
-            listener()
+            self._call_soon(self.router.count, str(event.transport.zid), opened)
 
     # --- threads ---------------------------------------------------------------------------------
 
-    def hand_over(self, function: Callable[..., object], *args: Any) -> bool:
+    def _call_soon(self, function: Callable[..., object], *args: Any) -> bool:
         """Call `function(*args)` soon on the loop, from any thread; whether the loop still runs."""
         try:
             self._loop.call_soon_threadsafe(function, *args)
@@ -203,7 +151,7 @@ class Link:
         *,
         first: bool = False,
     ) -> Replies:
-        """Ask everyone who answers for `keyexpr`; `first`: return with the first value."""
+        """Query everyone who replies for `keyexpr`; `first`: return with the first value."""
         replies = Replies()
         done: asyncio.Future[None] = self._loop.create_future()
 
@@ -212,19 +160,14 @@ class Link:
                 done.set_result(None)
 
         def on_reply(reply: zenoh.Reply) -> None:
-            # On a network thread: a list takes appends from there, and one wake-up is enough.
-            sample = reply.ok
-            if sample is not None:
-                replies.values.append(read_sample(sample))
-                if first:
-                    self.hand_over(finish)
-            elif reply.err is not None:
-                replies.note_error(reply.err.payload.to_bytes())
+            replies.add(reply)
+            if first and reply.ok is not None:
+                self._call_soon(finish)
 
-        def ask() -> None:
+        def get() -> None:
             self._session.get(
                 keyexpr,
-                handlers.Callback(on_reply, lambda: self.hand_over(finish), indirect=False),
+                handlers.Callback(on_reply, lambda: self._call_soon(finish), indirect=False),
                 target=zenoh.QueryTarget.ALL,
                 consolidation=zenoh.ConsolidationMode.NONE,
                 timeout=timeout_s,
@@ -234,94 +177,68 @@ class Link:
             )
 
         started_s = self._loop.time()
-        await self.call(ask)
+        await self.call(get)
         await done
         # The router's own clock may end a query first, and then without an error reply.
         if not replies.values and self._loop.time() - started_s >= 0.9 * timeout_s:
             replies.timed_out = True
         return replies
 
-    @asynccontextmanager
-    async def subscribed(
-        self, keyexpr: str, receive: Callable[[Wire], None]
-    ) -> AsyncIterator[None]:
+    def subscribed(
+        self, keyexpr: str, receive: Callable[[Sample], None]
+    ) -> AbstractAsyncContextManager[None]:
         """Call `receive` on the loop with every value and deletion that passes."""
+        callback = self._callback(receive)
+        return self._declared(lambda: self._session.declare_subscriber(keyexpr, callback))
 
-        def declare() -> zenoh.Subscriber[None]:
-            return self._session.declare_subscriber(
-                keyexpr,
-                handlers.Callback(  # type: ignore[arg-type]
-                    lambda sample: self.hand_over(receive, read_sample(sample)), indirect=False
-                ),
-            )
-
-        async with self._declared(declare):
-            yield
-
-    @asynccontextmanager
-    async def answering(
-        self, keyexpr: str, receive: Callable[[Request], None]
-    ) -> AsyncIterator[None]:
+    def queryable(
+        self, keyexpr: str, receive: Callable[[IncomingQuery], None]
+    ) -> AbstractAsyncContextManager[None]:
         """Call `receive` on the loop with every query for `keyexpr`."""
 
         def on_query(query: zenoh.Query) -> None:
             data = query.payload.to_bytes() if query.payload is not None else b""
             encoding = str(query.encoding) if query.encoding is not None else ""
-            request = Request(self, query, str(query.key_expr), data, encoding)
-            if not self.hand_over(receive, request):
+            incoming = IncomingQuery(str(query.key_expr), data, encoding, self, query)
+            if not self._call_soon(receive, incoming):
                 query.drop()  # type: ignore[no-untyped-call]
 
-        def declare() -> zenoh.Queryable[None]:
-            return self._session.declare_queryable(
-                keyexpr,
-                handlers.Callback(on_query, indirect=False),
-            )
-
-        async with self._declared(declare):
-            yield
+        callback = handlers.Callback(on_query, indirect=False)
+        return self._declared(lambda: self._session.declare_queryable(keyexpr, callback))
 
     # --- liveliness ------------------------------------------------------------------------------
 
-    @asynccontextmanager
-    async def token(self, keyexpr: str) -> AsyncIterator[None]:
+    def token(self, keyexpr: str) -> AbstractAsyncContextManager[None]:
         """Hold a liveliness token; Zenoh declares it again after every reconnection."""
-        async with self._declared(lambda: self._session.liveliness().declare_token(keyexpr)):
-            yield
+        return self._declared(lambda: self._session.liveliness().declare_token(keyexpr))
 
     async def tokens(self, keyexpr: str, timeout_s: float) -> Replies:
         """The liveliness tokens there are now."""
 
-        def ask() -> list[zenoh.Reply]:
+        def get() -> Replies:
             # A channel of the default size deadlocks past 256 tokens when the session also has
             # a liveliness subscriber.
             channel: handlers.FifoChannel[zenoh.Reply] = handlers.FifoChannel(100_000)
-            return list(self._session.liveliness().get(keyexpr, channel, timeout=timeout_s))
+            replies = Replies()
+            for reply in self._session.liveliness().get(keyexpr, channel, timeout=timeout_s):
+                replies.add(reply)
+            return replies
 
-        replies = Replies()
-        for reply in await asyncio.to_thread(ask):
-            if reply.ok is not None:
-                replies.values.append(read_sample(reply.ok))
-            elif reply.err is not None:
-                replies.note_error(reply.err.payload.to_bytes())
-        return replies
+        return await asyncio.to_thread(get)
 
-    @asynccontextmanager
-    async def tokens_watched(
-        self, keyexpr: str, receive: Callable[[Wire], None]
-    ) -> AsyncIterator[None]:
+    def tokens_watched(
+        self, keyexpr: str, receive: Callable[[Sample], None]
+    ) -> AbstractAsyncContextManager[None]:
         """Call `receive` on the loop with tokens that come (those there already, too) and go."""
+        callback = self._callback(receive)
+        return self._declared(
+            lambda: self._session.liveliness().declare_subscriber(keyexpr, callback, history=True)
+        )
 
-        def declare() -> zenoh.Subscriber[None]:
-            return self._session.liveliness().declare_subscriber(
-                keyexpr,
-                handlers.Callback(  # type: ignore[arg-type]
-                    lambda sample: self.hand_over(receive, read_sample(sample)), indirect=False
-                ),
-                history=True,
-            )
-
-        async with self._declared(declare):
-            yield
+    def _callback(self, receive: Callable[[Sample], None]) -> Any:
+        return handlers.Callback(
+            lambda sample: self._call_soon(receive, read_sample(sample)), indirect=False
+        )
 
     @asynccontextmanager
     async def _declared(self, declare: Callable[[], Any]) -> AsyncIterator[None]:

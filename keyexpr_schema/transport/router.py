@@ -19,27 +19,24 @@ from functools import lru_cache
 import zenoh
 from zenoh import handlers
 
-from keyexpr_schema.errors import ForeignKey, SchemaError
+from keyexpr_schema.errors import CannotListen, ForeignKey, SchemaError
 from keyexpr_schema.keyspace import STORE_JOURNAL, key_of
-from keyexpr_schema.payloads.service import JournalEntry, StoreAddress, StoreJournal, StoreQuery
-from keyexpr_schema.transport.questions import reply_encoding
-from keyexpr_schema.transport.storage import Store, Write
-from keyexpr_schema.transport.trace import Operation, Trace
-from keyexpr_schema.transport.wire import (
-    decode_wire,
+from keyexpr_schema.payloads.service import JournalEntry, StoreAddress, StoreJournal
+from keyexpr_schema.transport.connecting import zenoh_config
+from keyexpr_schema.transport.samples import (
+    Encoded,
+    decode_value,
+    reply_encoding_of,
     stamp_of_text,
     text_of_stamp,
     timestamp_of_stamp,
-    zenoh_config,
 )
+from keyexpr_schema.transport.storage import Store, Write
+from keyexpr_schema.transport.trace import Trace
 
 _log = logging.getLogger(__name__)
 CHANNEL = 10_000
 _MAX_JOURNAL_REPLY = 10_000
-
-
-class CannotListen(SchemaError):
-    """A router cannot listen where it was told to."""
 
 
 @lru_cache(maxsize=65_536)
@@ -54,8 +51,8 @@ def is_stored(keyexpr: str) -> bool:
         return False
 
 
-class _Feed:
-    """The store's two threads between a Zenoh session and a `Store`."""
+class _Storage:
+    """Subscribes for a `Store` and replies to queries from it, on two threads."""
 
     def __init__(self, session: zenoh.Session, store: Store) -> None:
         self._session = session
@@ -65,11 +62,10 @@ class _Feed:
         # Not complete: a complete queryable on `**` would take queries away from those that
         # serve a key.
         self._queryable = session.declare_queryable("**", handlers.FifoChannel(CHANNEL))
-        journal = STORE_JOURNAL.build(StoreAddress())
-        Trace("store").note(Operation.SERVE, STORE_JOURNAL, journal)
+        Trace("store").note("serve", STORE_JOURNAL, STORE_JOURNAL.build(StoreAddress()))
         self._threads = [
-            threading.Thread(target=self._write, name="store-write"),
-            threading.Thread(target=self._answer, name="store-answer"),
+            threading.Thread(target=self._write_for_ever, name="store-write"),
+            threading.Thread(target=self._reply_for_ever, name="store-answer"),
         ]
         for thread in self._threads:
             thread.start()
@@ -81,7 +77,7 @@ class _Feed:
         for thread in self._threads:
             thread.join()
 
-    def _write(self) -> None:
+    def _write_for_ever(self) -> None:
         while True:
             try:
                 sample = self._subscriber.handler.recv()
@@ -124,7 +120,7 @@ class _Feed:
             )
         )
 
-    def _answer(self) -> None:
+    def _reply_for_ever(self) -> None:
         while True:
             try:
                 query = self._queryable.handler.recv()
@@ -161,14 +157,8 @@ class _Feed:
     def _reply_journal(self, query: zenoh.Query, keyexpr: str, realm: str) -> None:
         try:
             data = query.payload.to_bytes() if query.payload is not None else b"{}"
-            asked = decode_wire(
-                data,
-                str(query.encoding or ""),
-                StoreQuery,
-                STORE_JOURNAL.name,
-                STORE_JOURNAL.version,
-                keyexpr,
-            )
+            encoding = str(query.encoding or "")
+            asked = decode_value(STORE_JOURNAL, Encoded(keyexpr, data, encoding))
         except SchemaError as error:
             query.reply_err(str(error).encode())
             return
@@ -189,7 +179,7 @@ class _Feed:
         query.reply(
             keyexpr,
             STORE_JOURNAL.encode(reply),  # type: ignore[arg-type]
-            encoding=reply_encoding(STORE_JOURNAL),
+            encoding=reply_encoding_of(STORE_JOURNAL),
         )
 
 
@@ -223,12 +213,12 @@ async def run_router(
             "program using the port?"
         ) from None
     try:
-        feed = await asyncio.to_thread(_Feed, session, store) if store is not None else None
+        storage = await asyncio.to_thread(_Storage, session, store) if store is not None else None
         try:
             yield
         finally:
-            if feed is not None:
-                await asyncio.shield(asyncio.to_thread(feed.close))
+            if storage is not None:
+                await asyncio.shield(asyncio.to_thread(storage.close))
     finally:
         await asyncio.shield(asyncio.to_thread(session.close))
 

@@ -11,7 +11,7 @@ from typing import Protocol
 class Write:
     """A put or a deletion of one key (realm included), or with wildcards of those that exist.
 
-    `stamp` orders writes; see `wire.stamp_of_text`.
+    `stamp` orders writes; see `samples.stamp_of_text`.
     """
 
     keyexpr: str
@@ -22,8 +22,8 @@ class Write:
 
 
 @dataclass(frozen=True, slots=True)
-class Journaled:
-    """A write as it was applied: its number, when (Unix seconds), and what."""
+class AppliedWrite:
+    """A write in a store's journal: its number, when it was applied (Unix seconds), and what."""
 
     number: int
     wall_time_s: float
@@ -34,10 +34,22 @@ class Journaled:
 
 
 class Store(Protocol):
-    """What the router needs of a store; `fleet.stores.StateStore` says what each promises."""
+    """A durable map from key expression to latest value, and a journal of what changed when.
 
-    def apply(self, batch: Sequence[Write], /) -> int: ...
+    The meaning is that of zenohd's storage manager: the write with the latest timestamp wins,
+    whatever the order of arrival; a deletion is a write and leaves a tombstone; a write with a
+    wildcard applies to the keys that exist. Thread-safe. Reads show what is durable and nothing
+    else: a value that was read survives the end of the process at any moment.
+    """
 
-    def select(self, pattern: str, /) -> list[Write]: ...
+    def apply(self, batch: Sequence[Write], /) -> int:
+        """Apply `batch` in one transaction; how many of the writes changed something."""
 
-    def journal(self, prefix: str, after: int, limit: int, /) -> tuple[list[Journaled], int]: ...
+    def select(self, pattern: str, /) -> list[Write]:
+        """The values of every key that `pattern` (`*`, `**` and `$*` allowed) matches, by key."""
+
+    def journal(self, prefix: str, after: int, limit: int, /) -> tuple[list[AppliedWrite], int]:
+        """At most `limit` changes numbered above `after` of keys under `prefix/`, oldest first.
+
+        Also the number of the newest entry there is, of any key.
+        """

@@ -7,30 +7,13 @@ operation and key expression that it had not used before: `component operation k
 from __future__ import annotations
 
 import os
-from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from keyexpr_schema.key import Key
 
 TRACE_VARIABLE = "ROBOTFLEET_TRACE"
-
-
-class Operation(str, Enum):
-    """What can be done with a key."""
-
-    PUT = "put"
-    DELETE = "delete"
-    READ = "read"
-    WATCH = "watch"
-    TOKEN = "token"
-    WATCH_TOKENS = "watch-tokens"
-    QUERY = "query"
-    SERVE = "serve"
-
-
-WRITES = frozenset({Operation.PUT, Operation.DELETE, Operation.TOKEN, Operation.QUERY})
-"""The others read: whoever serves a query key reads the queries."""
+Operation = Literal["put", "delete", "read", "watch", "token", "watch-tokens", "query", "serve"]
 
 
 class Trace:
@@ -49,4 +32,4 @@ class Trace:
         self._known.add((operation, keyexpr))
         # One write in append mode: lines of other processes do not end up inside it.
         with self._path.open("a", encoding="utf-8") as file:
-            file.write(f"{self._component} {operation.value} {key.name} {keyexpr}\n")
+            file.write(f"{self._component} {operation} {key.name} {keyexpr}\n")

@@ -1,4 +1,4 @@
-"""The simulation as a process: `run` is the main function of `robotctl sim`."""
+"""The simulation as a process: `run_simulation` is the main function of `robotctl sim`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 BACKENDS = ("mujoco", "kinematic")
 
 
-def run(
+def run_simulation(
     mission: str,
     endpoints: tuple[str, ...],
     realm: str = "robotfleet",

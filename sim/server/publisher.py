@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import time
 
 from keyexpr_schema.errors import SchemaError
@@ -107,11 +106,9 @@ class WorldPublisher:
         scene = self._backend.scene()
         while True:
             await self._session.wait_connected()
-            generation = self._session.link.generation
+            connections = self._session.connections
             try:
                 await self._session.confirm(SIM_SCENE, SimAddress(), scene)
             except SchemaError:
                 continue  # no store there yet: without one there is nothing to look at, either
-            # The link shows its state only in these fields, and half a second is soon enough.
-            while self._session.link.generation == generation:  # noqa: ASYNC110
-                await asyncio.sleep(0.5)
+            await self._session.wait_reconnected(connections)

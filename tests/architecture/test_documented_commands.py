@@ -29,17 +29,23 @@ def documented() -> Iterator[tuple[str, str]]:
                 yield str(page.relative_to(ROOT)), found[1]
 
 
+def leaf(words: list[str]) -> tuple[typer.core.TyperCommand, list[str]]:
+    """The command that these words begin with, and the words after it."""
+    module, _, attribute = COMMANDS[words[0]][0].partition(":")
+    command = typer.main.get_command(getattr(importlib.import_module(module), attribute))
+    rest = words[1:]
+    while isinstance(command, typer.core.TyperGroup):
+        command, rest = command.commands[rest[0]], rest[1:]  # type: ignore[assignment]
+    return command, rest  # type: ignore[return-value]
+
+
 def parse(arguments: list[str]) -> None:
     """Parse a command line as robotctl would, and do not run it.
 
     Raises:
         UsageError: robotctl would not take it.
     """
-    module, _, attribute = COMMANDS[arguments[0]][0].partition(":")
-    command = typer.main.get_command(getattr(importlib.import_module(module), attribute))
-    rest = arguments[1:]
-    while isinstance(command, typer.core.TyperGroup):
-        command, rest = command.commands[rest[0]], rest[1:]
+    command, rest = leaf(arguments)
     command.make_context("robotctl", rest)
 
 
@@ -51,3 +57,38 @@ def test_a_documented_line_is_taken(page: str, line: str) -> None:
 def test_lines_were_found() -> None:
     pages = {page for page, _ in documented()}
     assert {"README.md", "docs/cli.md", "docs/timeline.md", "docs/workers.md"} <= pages
+
+
+def synopses() -> Iterator[tuple[str, str]]:
+    """Command and synopsis of each entry of the table of commands: ``goal list` · `show GOAL`."""
+    text = (ROOT / "docs" / "cli.md").read_text(encoding="utf-8")
+    for row in re.findall(r"^\| (`.*?) \| ", text.replace("\\|", "/"), re.MULTILINE):
+        group = ""
+        for synopsis in re.findall(r"`(.*?)`", row):
+            words = synopsis.split()
+            if words[0] in COMMANDS:
+                group = words[0]
+            else:
+                words = [group, *words]
+            lower = [word for word in words[:2] if word.islower() and word.isalpha()]
+            yield " ".join(lower), synopsis
+
+
+SYNOPSES = list(synopses())
+
+
+@pytest.mark.parametrize(("command", "synopsis"), SYNOPSES)
+def test_a_command_of_the_table_is_there_with_its_options(command: str, synopsis: str) -> None:
+    found, _ = leaf(command.split())
+    flags = {flag for parameter in found.params for flag in getattr(parameter, "opts", ())}
+    assert set(re.findall(r"--[a-z-]+", synopsis)) <= flags
+
+
+def test_the_table_has_every_command() -> None:
+    leaves = set()
+    for name, (where, _) in COMMANDS.items():
+        module, _, attribute = where.partition(":")
+        command = typer.main.get_command(getattr(importlib.import_module(module), attribute))
+        names = getattr(command, "commands", None)
+        leaves |= {name} if names is None else {f"{name} {inner}" for inner in names}
+    assert {command for command, _ in SYNOPSES} == leaves

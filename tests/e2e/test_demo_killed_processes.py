@@ -61,7 +61,7 @@ async def all_reports(demo: Demo) -> Reports:
     told: Reports = defaultdict(list)
     after = 0
     while True:
-        page: StoreJournal = await demo.session.ask(
+        page: StoreJournal = await demo.session.query(
             STORE_JOURNAL, StoreAddress(), StoreQuery(after=after), 10.0
         )
         if not page.entries:

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from cli.demo.mission_run import DemoOptions, running
+from cli.demo.bring_up import DemoOptions
+from cli.demo.mission_run import running_demo
 from keyexpr_schema.key import Component
-from keyexpr_schema.keyspace import GOAL_SPEC, KEYSPACE, REJECT
+from keyexpr_schema.keyspace import GOAL_SPEC, KEYSPACE, UNDECODABLE
 from keyexpr_schema.payloads.goals import GoalAddress
-from keyexpr_schema.transport.trace import TRACE_VARIABLE, WRITES, Operation
+from keyexpr_schema.transport.trace import TRACE_VARIABLE
 from tests.planner_process import until
 from tests.robotctl import Robotctl
 
@@ -29,6 +30,9 @@ COMPONENTS = {
     "robotctl": Component.PERSON,
 }
 """By the name that a session goes by, up to the first hyphen."""
+
+WRITES = {"put", "delete", "token", "query"}
+"""The others read: whoever serves a query key reads the queries."""
 
 NOT_WRITTEN = {
     # Who cannot read a value says so; here nothing of that kind is for workers or the simulation.
@@ -50,7 +54,7 @@ tasks:
 
 
 @pytest.fixture(scope="module")
-def trace(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, Operation, str, str]]:
+def trace(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, str, str, str]]:
     """Component, operation, name of the key and key expression of all that a mission does."""
     folder = tmp_path_factory.mktemp("trace")
     file = folder / "trace.txt"
@@ -58,7 +62,7 @@ def trace(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, Operation
         patch.setenv(TRACE_VARIABLE, str(file))
         asyncio.run(mission(folder))
     lines = (line.split(" ") for line in file.read_text(encoding="utf-8").splitlines())
-    return [(name, Operation(operation), key, at) for name, operation, key, at in lines]
+    return [(name, operation, key, at) for name, operation, key, at in lines]
 
 
 async def mission(folder: Path) -> None:
@@ -66,18 +70,18 @@ async def mission(folder: Path) -> None:
     options = DemoOptions(mission="two-cups", out=folder / "run", backend="kinematic")
     (folder / "plan.yaml").write_text(f"plan: mine{PLAN}", encoding="utf-8")
 
-    async with running(options) as demo:
-        robotctl = Robotctl(demo.fleet.endpoint, folder, demo.fleet.realm)
+    async with running_demo(options) as demo:
+        robotctl = Robotctl(demo.processes.endpoint, folder, demo.processes.realm)
         robotctl.env[TRACE_VARIABLE] = str(folder / "trace.txt")
 
         async def play() -> None:
-            await demo.give()
-            await demo.ended()
+            await demo.submit()
+            await demo.wait_until_ended()
             key, link = GOAL_SPEC.build(GoalAddress("bad")), demo.session.link
             link.send_soon(key, b"{", "application/json", block=True)
 
             async def unread() -> bool:
-                found = {address.component for address in await demo.session.list(REJECT)}
+                found = {address.component for address in await demo.session.list(UNDECODABLE)}
                 return found == {"planner", "recorder", "robotctl"}
 
             await until(unread, "all who read goals to say that they cannot read this one")
@@ -99,7 +103,7 @@ async def mission(folder: Path) -> None:
             refused = await robotctl.soon("replan", "plan-1")
             assert "not running" in refused.err
 
-        await demo.fleet.guard(play())
+        await demo.processes.guard(play())
 
 
 def allowed(column: Component, name: str, key: str, at: str) -> bool:
@@ -111,12 +115,12 @@ def allowed(column: Component, name: str, key: str, at: str) -> bool:
     return kind == "worker" and Component.OWN_WORKER in column and chunks["{robot}"] == robot
 
 
-def column(key: str, operation: Operation) -> Component:
+def column(key: str, operation: str) -> Component:
     return KEYS[key].writers if operation in WRITES else KEYS[key].readers
 
 
 def test_nothing_is_done_that_the_table_does_not_allow(
-    trace: list[tuple[str, Operation, str, str]],
+    trace: list[tuple[str, str, str, str]],
 ) -> None:
     assert [
         (name, operation, at)
@@ -126,7 +130,7 @@ def test_nothing_is_done_that_the_table_does_not_allow(
 
 
 def test_all_that_the_table_says_is_done_but_for_what_is_named_here(
-    trace: list[tuple[str, Operation, str, str]],
+    trace: list[tuple[str, str, str, str]],
 ) -> None:
     written: dict[str, Component] = defaultdict(lambda: Component(0))
     read: dict[str, Component] = defaultdict(lambda: Component(0))

@@ -14,13 +14,12 @@ from typing import Any
 
 import pytest
 
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import CheckedPlan
 from fleet.llm.configuration import LlmConfig
 from fleet.llm.conversation import LanguageModel
 from fleet.planners.base import PlanningProblem
 from fleet.planners.llm.planner import LlmPlanner
 from fleet.planners.symbolic.planner import SymbolicPlanner
-from keyexpr_schema.payloads.plans import Plan
 from tests.household import bring, home
 from tests.llm_server import LlmServer, Reply
 
@@ -66,11 +65,11 @@ class SmallModel:
                 text += choice["delta"].get("content", "")
                 finish = choice["finish_reason"] or finish
                 count += 1
-            told = sum(
+            prompt_tokens = sum(
                 len(self._model.tokenize(message["content"].encode()))
                 for message in request["messages"]
             )
-        return Reply(text, finish_reason=finish, tokens=(told, count))
+        return Reply(text, finish_reason=finish, tokens=(prompt_tokens, count))
 
     def close(self) -> None:
         """Give its memory back, once it has stopped."""
@@ -103,14 +102,14 @@ def test_a_bad_model_makes_no_bad_plan(strategy: str) -> None:
             try:
                 language_model.warm()
                 started = time.perf_counter()
-                plan = planner.plan(PlanningProblem("p", goals, world, strategy=strategy))
+                made = planner.plan(PlanningProblem("p", goals, world, strategy=strategy))
                 took_s = time.perf_counter() - started
             finally:
                 language_model.close()
     finally:
         model.close()
-    assert isinstance(plan, Plan), plan
-    assert check_plan(plan, world).valid
+    assert isinstance(made, CheckedPlan), made
+    plan = made.plan
     assert plan.tasks
     making = plan.making
     print(f"\n{strategy}: {took_s:.1f} s, {making}")

@@ -7,9 +7,10 @@ from itertools import combinations
 
 from hypothesis import given, settings
 
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import check_allocation, check_plan
+from fleet.core.model.preconditions import first_unmet
 from fleet.core.model.task_graph import TaskGraph
-from fleet.core.model.world import WorldModel, condition_holds, first_unmet, room_left
+from fleet.core.model.world import WorldModel, condition_holds, room_left
 from keyexpr_schema.ids import bare_name
 from keyexpr_schema.payloads.plans import Plan
 from tests.random_plans import ALLOCATION, plans
@@ -55,8 +56,8 @@ def works(plan: Plan, world: WorldModel, allocation: dict[str, str]) -> bool:
 def test_a_plan_passes_exactly_if_every_order_works(drawn: tuple[Plan, WorldModel]) -> None:
     plan, world = drawn
     good = works(plan, world, ALLOCATION)
-    checked = check_plan(plan, world, ALLOCATION)
-    assert checked.valid == good, checked.violations
+    violations = check_allocation(plan, world, ALLOCATION)
+    assert (not violations) == good, violations
     if good:  # each actor has at least the robot that it is here
         assert not check_plan(plan, world).violations
 
@@ -68,16 +69,17 @@ def test_the_plans_drawn_are_good_and_bad_in_many_ways() -> None:
     @given(plans())
     def count(drawn: tuple[Plan, WorldModel]) -> None:
         plan, world = drawn
-        checked = check_plan(plan, world, ALLOCATION)
-        outcomes["good" if checked.valid else "bad"] += 1
-        outcomes["good with a handover"] += checked.valid and any(
+        violations = check_allocation(plan, world, ALLOCATION)
+        valid = not violations
+        outcomes["good" if valid else "bad"] += 1
+        outcomes["good with a handover"] += valid and any(
             task.skill in ("place_on_robot", "unload") for task in plan.tasks
         )
-        outcomes["good and open"] += checked.valid and any(
+        outcomes["good and open"] += valid and any(
             not TaskGraph({t.task: t.after for t in plan.tasks}).ordered(one.task, other.task)
             for one, other in combinations(plan.tasks, 2)
         )
-        outcomes.update({violation.code for violation in checked.violations})
+        outcomes.update({violation.code for violation in violations})
 
     count()
     total = outcomes["good"] + outcomes["bad"]

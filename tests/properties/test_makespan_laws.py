@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from fleet.jobshop.bounds import bound_with_travel, lower_bound
 from fleet.jobshop.branch_and_bound import branch_and_bound
-from fleet.jobshop.budget import Budget, StepClock
 from fleet.jobshop.cpsat import helps, installed, request_of
 from fleet.jobshop.cpsat_process import Model
 from fleet.jobshop.forward_pass import schedule_of
@@ -19,6 +18,7 @@ from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.portfolio import schedule_in_order, solve
 from fleet.jobshop.problem import BadShop, Block, Machine, Operation, Position, Schedule, Shop
 from fleet.jobshop.rescheduling import WITHIN, reschedule, without_machines
+from fleet.jobshop.time_budget import StepClock, TimeBudget
 from fleet.jobshop.warm_start import warm_start
 
 NEAR = 1e-6
@@ -82,9 +82,9 @@ def shops(draw: st.DrawFn, most_blocks: int = 4) -> Shop:
     return Shop(tuple(operations), blocks, machines, ways)
 
 
-def steps(seconds: float) -> Budget:
+def steps(seconds: float) -> TimeBudget:
     """The same number of iterations on every machine."""
-    return Budget(seconds, StepClock())
+    return TimeBudget(seconds, StepClock())
 
 
 def wrong(shop: Shop, found: Schedule) -> str | None:
@@ -195,7 +195,7 @@ def test_what_looked_at_every_schedule_is_as_short_as_brute_force(shop: Shop) ->
 @given(shops(most_blocks=3))
 def test_cp_sat_agrees_with_brute_force(shop: Shop) -> None:
     assume(sound(shop) and solve(shop, steps(0.0), exact=False) is not None)
-    found = solve(shop, Budget(NEVER_S) if helps(Instance(shop)) else steps(0.05))
+    found = solve(shop, TimeBudget(NEVER_S) if helps(Instance(shop)) else steps(0.05))
     assert found is not None
     assert wrong(shop, found) is None
     least_s = min(one.makespan_s for one in every_schedule(shop))

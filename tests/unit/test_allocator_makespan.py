@@ -5,23 +5,27 @@ from __future__ import annotations
 import time
 
 import pytest
+from msgspec.structs import replace
 
 from benchmarks.allocation.shops import random_shop
-from fleet.allocators.base import Allocated, Circumstances, NotAllocated
+from fleet.allocators.base import Allocated, NotAllocated
 from fleet.allocators.makespan import MakespanAllocator
-from fleet.allocators.milp import MilpAllocator
+from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
+from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
-from fleet.jobshop.budget import Budget, StepClock
 from fleet.jobshop.cpsat import CpSat, installed
 from fleet.jobshop.instance import Instance
 from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.portfolio import solve
 from fleet.jobshop.problem import BadShop, Block, Machine, Operation, Shop
 from fleet.jobshop.rescheduling import reschedule, without_machines
+from fleet.jobshop.time_budget import StepClock, TimeBudget
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
-from keyexpr_schema.payloads.plans import Plan
-from tests.household import bring, carrier, home, manipulator
+from fleet.scheduling.plan_shop import AllocationContext
+from keyexpr_schema.ids import actor_arg, bound
+from keyexpr_schema.payloads.plans import Plan, Task
+from tests.household import bring, carrier, checked, home, manipulator
 
 QUICK = MakespanAllocator(deadline_s=0.2, exact=False, clock=StepClock())
 
@@ -29,9 +33,9 @@ NEVER_S = 600.0
 """A search that has not ended by itself by then never will: it takes seconds."""
 
 
-def steps(seconds: float) -> Budget:
+def steps(seconds: float) -> TimeBudget:
     """The same number of iterations on every machine."""
-    return Budget(seconds, StepClock())
+    return TimeBudget(seconds, StepClock())
 
 
 def planned(world: WorldModel, *goals: tuple[int, str]) -> Plan:
@@ -39,12 +43,12 @@ def planned(world: WorldModel, *goals: tuple[int, str]) -> Plan:
         PlanningProblem(plan="p", goals=tuple(bring(n, where) for n, where in goals), world=world)
     )
     assert not isinstance(made, NoPlan)
-    return made
+    return made.plan
 
 
-def allocated(allocator: MakespanAllocator | MilpAllocator, plan: Plan, world: WorldModel,
-              told: Circumstances | None = None) -> Allocated:  # fmt: skip
-    found = allocator.allocate(plan, world, told)
+def allocated(allocator: MakespanAllocator | MinMaxLoadAllocator, plan: Plan, world: WorldModel,
+              told: AllocationContext | None = None) -> Allocated:  # fmt: skip
+    found = allocator.allocate(checked(plan, world), told)
     assert isinstance(found, Allocated), found
     return found
 
@@ -57,7 +61,7 @@ def team() -> WorldModel:
 def test_it_is_no_longer_than_the_balanced_plan_and_says_how_far_from_optimal() -> None:
     world = team()
     plan = planned(world, (1, "hallway"), (2, "living_room"), (3, "hallway"), (4, "living_room"))
-    balanced = allocated(MilpAllocator(), plan, world)
+    balanced = allocated(MinMaxLoadAllocator(TieBreak.TRAVEL), plan, world)
     found = allocated(QUICK, plan, world)
     assert found.schedule.makespan_s <= balanced.schedule.makespan_s + 1e-6
     assert found.lower_bound_s is not None and found.gap is not None
@@ -67,22 +71,26 @@ def test_it_is_no_longer_than_the_balanced_plan_and_says_how_far_from_optimal() 
     assert balanced.lower_bound_s is None and balanced.gap is None
 
 
-def test_what_the_core_predicts_is_what_the_schedule_says() -> None:
-    """The shop and the plan's own schedule are two ways to reckon; both must agree."""
+def test_tasks_start_as_soon_as_those_before_them_end() -> None:
+    """With the way from where the robot is by then; robots take actors in the schedule's order."""
     world = team()
     plan = planned(world, (1, "hallway"), (2, "living_room"), (3, "hallway"))
-
-    class Telling(MakespanAllocator):
-        def _assign(self, problem):  # type: ignore[no-untyped-def]
-            from fleet.allocators.plan_shop import plan_shop
-
-            self.core_s = solve(plan_shop(problem).shop, steps(0.1), exact=False)
-            return super()._assign(problem)
-
-    allocator = Telling(deadline_s=0.1, exact=False, clock=StepClock())
-    found = allocated(allocator, plan, world)
-    assert allocator.core_s is not None
-    assert found.schedule.makespan_s == pytest.approx(allocator.core_s.makespan_s, abs=1e-6)
+    found = allocated(QUICK, plan, world)
+    schedule = found.schedule
+    extra = schedule.extra_after
+    graph = TaskGraph({t.task: {*t.after, *extra.get(t.task, ())} for t in plan.tasks})
+    tasks = {task.task: task for task in plan.tasks}
+    where = {robot: world.value("at", robot) for robot in world.team}
+    for task in graph.order:
+        args = {name: bound(arg, found.allocation) for name, arg in tasks[task].args.items()}
+        action = world.skills[tasks[task].skill].ground(args)
+        befores = graph.predecessors[task]
+        start_s = max((schedule.end_s[before] for before in befores), default=0.0)
+        end_s = start_s + world.duration_s(action, where[action.actor], action.actor)
+        assert (schedule.start_s[task], schedule.end_s[task]) == pytest.approx((start_s, end_s))
+        for key, value in action.after:
+            if key == ("at", action.actor):
+                where[action.actor] = value
 
 
 def test_the_same_question_has_the_same_answer_where_it_is_settled_at_once() -> None:
@@ -95,9 +103,9 @@ def test_a_robot_that_is_busy_gets_no_work_that_another_can_do_sooner() -> None:
     world = home((manipulator("arm_1"), manipulator("arm_2")), cups=1)
     plan = planned(world, (1, "hallway"))
     for busy, free in (("arm_1", "arm_2"), ("arm_2", "arm_1")):
-        found = allocated(QUICK, plan, world, Circumstances(ready_s={busy: 100.0}))
+        found = allocated(QUICK, plan, world, AllocationContext(ready_s={busy: 100.0}))
         assert set(found.allocation.values()) == {free}
-    both = allocated(QUICK, plan, world, Circumstances(ready_s={"arm_1": 100.0, "arm_2": 50.0}))
+    both = allocated(QUICK, plan, world, AllocationContext(ready_s={"arm_1": 100.0, "arm_2": 50.0}))
     assert min(both.schedule.start_s.values()) == pytest.approx(50.0)
 
 
@@ -105,7 +113,7 @@ def test_of_equal_makespans_the_urgent_goal_is_done_first() -> None:
     world = home((manipulator("arm_1"),), cups=3)
     plan = planned(world, (1, "hallway"), (2, "hallway"), (3, "hallway"))
     for urgent in ("g1", "g2", "g3"):
-        found = allocated(QUICK, plan, world, Circumstances(priority={urgent: 6}))
+        found = allocated(QUICK, plan, world, AllocationContext(priority={urgent: 6}))
         ends = {
             goal: max(found.schedule.end_s[t.task] for t in plan.tasks if t.goal == goal)
             for goal in plan.goals
@@ -114,9 +122,22 @@ def test_of_equal_makespans_the_urgent_goal_is_done_first() -> None:
 
 
 def test_too_few_robots_is_a_sentence() -> None:
-    world = home((carrier("cart_1"),), cups=1)
-    plan = planned(home(cups=1), (1, "hallway"))
-    found = QUICK.allocate(plan, world)
+    """One robot has a hand and a basket, and cannot give anything to itself."""
+    one = replace(manipulator(), capabilities={**manipulator().capabilities, "basket": 1.0})
+    world = home((one,), cups=1)
+    cup = {"object": "cup_1", "place": "kitchen"}
+    calls = (
+        ("go", "navigate", "a1", (), {"to": "kitchen"}),
+        ("pick", "pick", "a1", ("go",), cup),
+        ("come", "navigate", "a2", (), {"to": "kitchen"}),
+        ("give", "place_on_robot", "a1", ("pick", "come"), {**cup, "carrier": actor_arg("a2")}),
+    )
+    tasks = tuple(
+        Task(task=t, skill=skill, actor=a, after=after, args={"robot": actor_arg(a), **args})
+        for t, skill, a, after, args in calls
+    )
+    plan = Plan(plan="p", goals=(), conditions=(), tasks=tasks)
+    found = QUICK.allocate(checked(plan, world))
     assert isinstance(found, NotAllocated)
     assert found.violations[0].sentence
 
@@ -124,7 +145,7 @@ def test_too_few_robots_is_a_sentence() -> None:
 @pytest.mark.skipif(not installed(), reason="OR-Tools is an extra: cp-sat")
 @pytest.mark.parametrize("seed", range(3))
 def test_eight_tasks_with_meetings_are_proven_optimal(seed: int) -> None:
-    found = solve(random_shop(8, 3, travel=True, meetings=0.5, seed=seed), Budget(NEVER_S))
+    found = solve(random_shop(8, 3, travel=True, meetings=0.5, seed=seed), TimeBudget(NEVER_S))
     assert found is not None
     assert found.gap < 1e-4
 

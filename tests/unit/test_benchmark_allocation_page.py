@@ -7,7 +7,7 @@ from pathlib import Path
 
 from benchmarks.allocation import report
 from benchmarks.allocation.bench_household import Run
-from benchmarks.allocation.bench_makespan import Mended, Public, Size
+from benchmarks.allocation.bench_makespan import Public, Rescheduling, Size
 from benchmarks.allocation.household import CLOCKS, STRATEGIES, scenarios
 from benchmarks.allocation.run import as_json
 
@@ -35,8 +35,8 @@ def test_the_page_has_a_section_for_each_part_with_its_command(tmp_path: Path) -
         "sizes": about([asdict(SIZE)]),
         "coalitions": about([[0.0, 0.4], [0.1, 1.2]]),
         "public": about([asdict(Public("ft06", 55, 55, 55, 0.3, "annealing"))]),
-        "mended": about(
-            [asdict(Mended("lost", False, 600, 20, 9, 9, 610, 605, 30, 604, 800, 0.7))]
+        "rescheduling": about(
+            [asdict(Rescheduling("lost", False, 600, 20, 9, 9, 610, 605, 30, 604, 800, 0.7))]
         ),
         "balanced": about(
             [{"kind": "alike", "s": 0.1, "mb": 3.0, "most": 10, "least": 10, "proven": True}]
@@ -50,7 +50,7 @@ def test_the_page_has_a_section_for_each_part_with_its_command(tmp_path: Path) -
     assert "| 8 x 3 | yes | 1.200 (0.00 s) | 1.000 (0.50 s) | yes |" in page
     assert "| 2 | 1 | 0.80 s | 1.20 s |" in page
     assert "{" not in page
-    for plot in ("idle", "sizes", "mended"):
+    for plot in ("idle", "sizes", "rescheduling"):
         assert f"(allocation-{plot}.png)" in page
         assert (tmp_path / f"allocation-{plot}.png").stat().st_size > 5000
 

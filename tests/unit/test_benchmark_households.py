@@ -20,10 +20,11 @@ from benchmarks.allocation.shops import random_shop
 from fleet.allocators.base import Allocated
 from fleet.allocators.makespan import MakespanAllocator
 from fleet.allocators.round_robin import RoundRobinAllocator
-from fleet.core.checker.plan_checker import check_plan
-from fleet.jobshop.budget import Budget, StepClock
+from fleet.core.checker.checked_plan import check_plan
 from fleet.jobshop.instance import Instance
 from fleet.jobshop.portfolio import solve
+from fleet.jobshop.time_budget import StepClock, TimeBudget
+from tests.household import checked
 
 
 @pytest.mark.parametrize("scenario", scenarios())
@@ -60,7 +61,7 @@ def test_one_list_of_goals_goes_from_goal_to_goal() -> None:
     home = household("3 robots, 5 goals", 1)
     plan = plan_of(home, "monolithic")
     allocator = MakespanAllocator(0.1, exact=False, clock=StepClock())
-    made = allocator.allocate(plan, world_of(home, REAL))
+    made = allocator.allocate(checked(plan, world_of(home, REAL)))
     assert isinstance(made, Allocated)
     start_s, end_s = made.schedule.start_s, made.schedule.end_s
     for one, other in zip(home.goals, home.goals[1:], strict=False):
@@ -84,7 +85,7 @@ def test_idle_time_cannot_be_less_than_at_the_bound() -> None:
 def test_alternatives_are_schedules_and_none_is_below_the_bound(travel: bool) -> None:
     shop = random_shop(12, 3, travel, 0.3 if travel else 0.0)
     ready = Instance(shop)
-    best = solve(shop, Budget(0.5, StepClock()), exact=False)
+    best = solve(shop, TimeBudget(0.5, StepClock()), exact=False)
     assert best is not None
     for choose in (nearest, in_turn, papers_milp):
         machine_of = choose(ready)

@@ -14,7 +14,7 @@ from benchmarks.planning.report import as_markdown, comparable_missions, failure
 from benchmarks.planning.simulated_time import SimulatedLoop, Stuck, run
 from benchmarks.planning.truth import Witness, parse_truth
 from fleet.allocators.makespan import MakespanAllocator
-from fleet.jobshop.budget import StepClock
+from fleet.jobshop.time_budget import StepClock
 from fleet.service.composition import Composition, compose
 from keyexpr_schema.payloads.simulation import Truth
 from keyexpr_schema.payloads.world import Place

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks.allocation.shop_files import INSTANCES, BadInstance, load, read_instance
-from fleet.jobshop.budget import Budget, StepClock
 from fleet.jobshop.cpsat import installed
 from fleet.jobshop.portfolio import solve
+from fleet.jobshop.time_budget import StepClock, TimeBudget
 
 KNOWN = {
     "ft06": 55, "la01": 666, "la02": 655, "la03": 597, "la04": 590, "la05": 593,
@@ -35,7 +35,7 @@ def test_an_instance_says_its_source_and_optimum(name: str) -> None:
 @pytest.mark.parametrize("name", QUICK)
 def test_rules_and_annealing_reach_the_bound(name: str) -> None:
     instance = load(name)
-    found = solve(instance.shop, Budget(20.0, StepClock()), exact=False)
+    found = solve(instance.shop, TimeBudget(20.0, StepClock()), exact=False)
     assert found is not None
     assert found.makespan_s == found.lower_bound_s == KNOWN[name]
 
@@ -49,7 +49,7 @@ def test_the_optimum_is_found_and_proven(name: str) -> None:
 
     The search ends with the proof. How long that takes is measured in the benchmark.
     """
-    found = solve(load(name).shop, Budget(NEVER_S))
+    found = solve(load(name).shop, TimeBudget(NEVER_S))
     assert found is not None
     assert found.makespan_s == KNOWN[name]
     assert found.lower_bound_s == KNOWN[name]

@@ -21,10 +21,10 @@ from keyexpr_schema.keyspace import (
     PLAN_SPEC,
     PLAN_STATUS,
     PLANNER_STATUS,
-    REJECT,
     ROBOT_ALIVE,
     ROBOT_SPEC,
     TASK_RECORD,
+    UNDECODABLE,
 )
 from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanAddress, PlanState, Task
@@ -174,7 +174,7 @@ async def test_what_is_malformed_or_unknown_is_told_and_disturbs_nobody(
         assert "known are cup_1" in status.reason
 
         async def rejected() -> bool:
-            rejects = await session.list(REJECT, component="planner")
+            rejects = await session.list(UNDECODABLE, component="planner")
             return len(rejects) == 3
 
         await until(rejected, "three rejects")

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from keyexpr_schema.errors import NoAnswer
+from keyexpr_schema.errors import NoReply
 from keyexpr_schema.keyspace import SIM_CLOCK, SIM_MOTION, SIM_SCENE, SIM_SENSES, SIM_TRUTH
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState
 from keyexpr_schema.payloads.simulation import MotionCall, SimAddress, SimRobotAddress
@@ -55,9 +55,9 @@ async def ask(session: Session, call: MotionCall) -> MotionOutcome:
     async with asyncio.timeout(10.0):
         while True:
             try:
-                outcome: MotionOutcome = await session.ask(SIM_MOTION, HSR, call, 5.0)
+                outcome: MotionOutcome = await session.query(SIM_MOTION, HSR, call, 5.0)
                 return outcome
-            except NoAnswer:
+            except NoReply:
                 await asyncio.sleep(0.02)
 
 
@@ -201,10 +201,8 @@ async def test_an_unknown_robot_is_named_together_with_those_there_are(
 ) -> None:
     async with served(session_config) as (_, asker):
         await ask(asker, MotionCall(call="c0", incarnation="i1"))
-        with pytest.raises(
-            NoAnswer, match=r"no robot 'r2d2' in this world; there are hsr, locobot"
-        ):
-            await asker.ask(
+        with pytest.raises(NoReply, match=r"no robot 'r2d2' in this world; there are hsr, locobot"):
+            await asker.query(
                 SIM_MOTION, SimRobotAddress("r2d2"), MotionCall(call="c1", incarnation="i1")
             )
 
@@ -235,8 +233,8 @@ async def test_without_a_simulation_the_body_is_unreachable(session_config: Make
 
 async def test_the_process_says_when_it_is_ready_and_ends_on_sigterm(router: Any) -> None:
     code = (
-        "from sim.server.process import run; "
-        f"run('two-cups', ({router.endpoint!r},), backend='kinematic', speed=None)"
+        "from sim.server.process import run_simulation; "
+        f"run_simulation('two-cups', ({router.endpoint!r},), backend='kinematic', speed=None)"
     )
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-c", code, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE

@@ -16,7 +16,7 @@ import pytest
 
 from fleet.timeline import viewer
 from fleet.timeline.errors import UnreadableRecording
-from fleet.timeline.read import Row, rows, summary
+from fleet.timeline.reader import Row, rows, summary
 from keyexpr_schema.keyspace import GOAL_SPEC, SIM_CLOCK, SIM_FRAMES, TASK_RECORD
 from keyexpr_schema.payloads.goals import Goal, GoalAddress
 from keyexpr_schema.payloads.simulation import Frame, Frames, SimAddress, SimClock
@@ -29,8 +29,8 @@ DEADLINE_S = 30.0
 def start(endpoint: str, out: Path, view: bool = False) -> subprocess.Popen[str]:
     """A recorder in a process of its own, on a machine without a screen."""
     code = (
-        "from pathlib import Path; from fleet.timeline.process import run; "
-        f"run(({endpoint!r},), 'robotfleet', Path({str(out)!r}), view={view})"
+        "from pathlib import Path; from fleet.timeline.process import run_recorder; "
+        f"run_recorder(({endpoint!r},), 'robotfleet', Path({str(out)!r}), view={view})"
     )
     env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     return subprocess.Popen(
@@ -172,10 +172,10 @@ async def test_a_viewer_can_look_on_while_it_records(router, session_config, tmp
 
 def test_without_a_router_the_recorder_says_so(tmp_path):
     from fleet.timeline.drawing.sink import free_port
-    from fleet.timeline.process import run
+    from fleet.timeline.process import run_recorder
     from keyexpr_schema.errors import Unreachable
 
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with pytest.raises(Unreachable, match=endpoint):
-        run((endpoint,), "robotfleet", tmp_path / "x.rrd", connect_timeout_s=0.3)
+        run_recorder((endpoint,), "robotfleet", tmp_path / "x.rrd", connect_timeout_s=0.3)
     assert not (tmp_path / "x.rrd").exists()

@@ -23,19 +23,19 @@ from tests.worker_world import DEADLINE_S, Planner
 
 SIM = """
 import sys
-from sim.server.process import run
+from sim.server.process import run_simulation
 endpoint, speed = sys.argv[1], float(sys.argv[2])
-run("two-cups", (endpoint,), backend="kinematic", speed=speed)
+run_simulation("two-cups", (endpoint,), backend="kinematic", speed=speed)
 """
 WORKER = """
 import sys
 from pathlib import Path
 from sim.embodiment import sim_embodiment
 from workers.errors import WorkerError
-from workers.process import run
+from workers.process import run_worker
 endpoint, robot, data = sys.argv[1:]
 try:
-    run(robot, (endpoint,), "robotfleet", Path(data), sim_embodiment)
+    run_worker(robot, (endpoint,), "robotfleet", Path(data), sim_embodiment)
 except WorkerError as error:
     sys.exit(f"robotctl: {error}")
 """

@@ -12,7 +12,7 @@ import pytest
 from msgspec.structs import replace
 
 from keyexpr_schema.facts import NOTHING
-from keyexpr_schema.keyspace import FACT, ORDER, REJECT, REPORT, ROBOT_ALIVE, ROBOT_STATE
+from keyexpr_schema.keyspace import FACT, ORDER, REPORT, ROBOT_ALIVE, ROBOT_STATE, UNDECODABLE
 from keyexpr_schema.payloads.motions import MotionKind
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.payloads.tasks import OrderAddress, Report, ReportAddress, ReportState
@@ -24,7 +24,7 @@ from sim.kinematic.backend import KinematicBackend, MotionModel
 from tests.conftest import RouterProcess
 from tests.worker_world import DEADLINE_S, Fleet, running_fleet
 from workers.context import SkillContext
-from workers.skill import skill
+from workers.skill_registry import skill
 
 MakeFleet = Callable[..., AbstractAsyncContextManager[Fleet]]
 
@@ -264,7 +264,7 @@ async def test_orders_that_make_no_sense_disturb_nobody(fleet_of: MakeFleet) -> 
             fleet.session.link.send_soon(key, data, "application/json", block=True)
         await fleet.session.confirm(ORDER, OrderAddress("hsr", "p", "other"), running)
         reasons: dict[str, str] = {}
-        async with asyncio.timeout(DEADLINE_S), fleet.session.watch(REJECT) as watch:
+        async with asyncio.timeout(DEADLINE_S), fleet.session.watch(UNDECODABLE) as watch:
             async for change in watch:
                 if change.value is not None and change.address.component == "worker-hsr":
                     reasons[change.value.keyexpr] = change.value.reason

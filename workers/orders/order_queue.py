@@ -63,7 +63,7 @@ class OrderQueue:
         if order is None:
             self._withdraw(address)
         elif (wrong := malformed(order)) is not None:
-            self._session.reject(ORDER.build(address), ORDER.encode(order), wrong)
+            self._session.report_undecodable(ORDER.build(address), ORDER.encode(order), wrong)
         elif OrderAddress(order.robot, order.plan, order.task) != address:
             await self._refuse_misplaced(address, order)
         else:

@@ -6,7 +6,7 @@ from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.motions import MotionKind
 from workers.context import SkillContext
 from workers.errors import SkillFailed
-from workers.skill import ParameterKind, skill
+from workers.skill_registry import ParameterKind, skill
 
 DOORWAY_M = 0.6
 """A robot less than this far inside a place's border may stand in a doorway and block it."""

@@ -8,7 +8,7 @@ from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.payloads.motions import Detection, MotionKind
 from workers.context import SkillContext
 from workers.errors import SkillFailed
-from workers.skill import ParameterKind, skill
+from workers.skill_registry import ParameterKind, skill
 from workers.skills.finding import looks
 from workers.skills.viewing import Viewing
 

@@ -8,7 +8,7 @@ from keyexpr_schema.facts import AT, NOTHING
 from keyexpr_schema.payloads.motions import Detection, MotionKind, PointM
 from workers.context import SkillContext
 from workers.errors import SkillFailed
-from workers.skill import ParameterKind, skill
+from workers.skill_registry import ParameterKind, skill
 from workers.skills.spots import away_from, candidates
 
 MOST_SPOTS = 4

@@ -8,7 +8,7 @@ from keyexpr_schema.facts import AT, NOTHING
 from keyexpr_schema.payloads.motions import MotionKind, PointM
 from workers.context import SkillContext
 from workers.errors import SkillFailed
-from workers.skill import ParameterKind, skill
+from workers.skill_registry import ParameterKind, skill
 
 WORD_S = 10.0
 """Wall seconds to wait for the carrier's worker to say where it stands or what it carries."""

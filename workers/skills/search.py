@@ -6,7 +6,7 @@ from contextlib import aclosing
 
 from keyexpr_schema.facts import AT, SEARCHED
 from workers.context import SkillContext
-from workers.skill import ParameterKind, skill
+from workers.skill_registry import ParameterKind, skill
 from workers.skills.finding import looks
 from workers.skills.viewing import Viewing
 

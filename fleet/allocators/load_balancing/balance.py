@@ -4,70 +4,33 @@ Three ways, the first that fits:
 
 1. Every actor has the same load and none must be apart: an optimal semi-matching, at any size.
 2. The relaxation that splits actors into single tasks is an optimal semi-matching again. Its sorted
-   loads are majorized by those of every sharing that splits no actor (ibid., theorem 3.5), so none
-   is lexicographically less: a sharing that has the same loads is proven to be the best one.
+   loads are majorized by those of every assignment that splits no actor (ibid., theorem 3.5), so
+   none is lexicographically less: an assignment with the same loads is proven to be the best one.
 3. With unequal loads the problem holds PARTITION, with pairs apart graph colouring, and is NP-hard:
-   longest tasks first (LPT; Graham, "Bounds on multiprocessing timing anomalies", 1969), then hand
-   over and swap while that helps, then branch and bound within a number of steps. What is not
-   proven then is said, beside the relaxation's maximum, below which nothing can be.
+   longest tasks first (LPT; Graham, "Bounds on multiprocessing timing anomalies", 1969), then move
+   and swap while that helps, then branch and bound within a number of steps. What is not proven
+   then is said, beside the relaxation's maximum, below which nothing can be.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import reduce
 from math import gcd
 
-from fleet.allocators.load_balancing.apart import why_not_apart
-from fleet.allocators.load_balancing.classes import Classes, classes_of
-from fleet.allocators.load_balancing.exact import branch_and_bound
-from fleet.allocators.load_balancing.search import Sharing, improve, longest_first
-from fleet.allocators.load_balancing.semimatching import Shares, loads_of, semi_matching
+from fleet.allocators.load_balancing.branch_and_bound import branch_and_bound
+from fleet.allocators.load_balancing.local_search import PartialAssignment, improve, longest_first
+from fleet.allocators.load_balancing.problem import (
+    BalancedAssignment,
+    LoadBalancingProblem,
+    NoAssignment,
+    overfull_clique,
+)
+from fleet.allocators.load_balancing.robot_sets import classes_of
+from fleet.allocators.load_balancing.semi_matching import loads_of, robots_of, semi_matching
 
 
-@dataclass(frozen=True)
-class LoadProblem:
-    """Actors 0…A-1, robots 0…robots-1.
-
-    `able[a]` is the set of robots that can be actor `a`, `load[a]` (at least 1) its tasks; `apart`
-    holds pairs of actors that must be different robots.
-    """
-
-    able: Sequence[int]
-    load: Sequence[int]
-    robots: int
-    apart: frozenset[tuple[int, int]] = frozenset()
-
-
-@dataclass(frozen=True)
-class Balance:
-    """A robot for every actor.
-
-    `loads` are the robots' loads, the greatest first. No sharing has a maximum load below
-    `least_top`; if `proven`, none has lexicographically lower loads either.
-    """
-
-    robot: Sequence[int]
-    loads: Sequence[int]
-    least_top: int
-    proven: bool
-
-
-@dataclass(frozen=True)
-class Unbalanced:
-    """No sharing was found; there is none, if `proven`.
-
-    `actors` cannot all be different robots: too few can be any of them. Empty if it is not that
-    simple.
-    """
-
-    proven: bool
-    actors: tuple[int, ...] = ()
-
-
-def balance(problem: LoadProblem) -> Balance | Unbalanced:
-    """Share actors among robots so that the sorted loads are lexicographically least.
+def balance(problem: LoadBalancingProblem) -> BalancedAssignment | NoAssignment:
+    """Assign actors to robots so that the sorted loads are lexicographically least.
 
     Raises:
         ValueError: an actor has no able robot, or a load below 1.
@@ -80,48 +43,25 @@ def balance(problem: LoadProblem) -> Balance | Unbalanced:
     classes = classes_of(problem.able, problem.robots)
     members = [len(robots) for robots in classes.robots]
     counts = [sum(problem.load[a] // unit for a in actors) for actors in classes.actors]
-    shares = semi_matching(counts, classes.able, members)
-    relaxed = [unit * load for load in loads_of(shares, members)]
-    least_top = max(relaxed, default=0)
-    alike = all(load == unit for load in problem.load)
-    if alike:
-        robot = spread(classes, shares)
-        if not problem.apart:
-            return Balance(robot, relaxed, least_top, proven=True)
-    if told := why_not_apart(problem.able, problem.apart):
-        return Unbalanced(True, told)
-    best: Sharing | None = None
-    if alike:
-        mended = Sharing.mended(problem.load, problem.robots, problem.apart, robot)
-        best = improve(mended, problem.able, relaxed)
+    flow = semi_matching(counts, classes.able, members)
+    relaxed = [unit * load for load in loads_of(flow, members)]
+    lower_bound = max(relaxed, default=0)
+    equal = all(load == unit for load in problem.load)
+    if equal and not problem.apart:
+        return BalancedAssignment(robots_of(classes, flow), relaxed, lower_bound, optimal=True)
+    if clique := overfull_clique(problem):
+        return NoAssignment(True, clique)
+    best: PartialAssignment | None = None
+    if equal:
+        best = improve(PartialAssignment(problem, robots_of(classes, flow)), relaxed)
     if best is None or best.sorted_loads() != relaxed:
-        greedy = longest_first(problem.able, problem.load, problem.robots, problem.apart)
-        found = [best, greedy and improve(greedy, problem.able, relaxed)]
-        best = min(filter(None, found), key=Sharing.sorted_loads, default=None)
+        greedy = longest_first(problem)
+        found = [best, greedy and improve(greedy, relaxed)]
+        best = min(filter(None, found), key=PartialAssignment.sorted_loads, default=None)
     complete = best is not None and best.sorted_loads() == relaxed
     if not complete:
-        best, complete = branch_and_bound(
-            problem.able, problem.load, problem.robots, problem.apart, best, relaxed
-        )
+        best, complete = branch_and_bound(problem, best, relaxed)
     if best is None:
-        return Unbalanced(complete)
+        return NoAssignment(complete)
     loads = best.sorted_loads()
-    if complete:
-        least_top = max(loads)
-    return Balance(best.robot, loads, least_top, proven=complete)
-
-
-def spread(classes: Classes, shares: Shares) -> list[int]:
-    """A robot for every actor, from the shares of classes of unit tasks.
-
-    The actors of a robot class are dealt to its robots in turn.
-    """
-    robot = [0] * sum(len(actors) for actors in classes.actors)
-    queues = [iter(actors) for actors in classes.actors]
-    for share, members in zip(shares, classes.robots, strict=True):
-        turn = 0
-        for i, count in share.items():
-            for _ in range(count):
-                robot[next(queues[i])] = members[turn]
-                turn = (turn + 1) % len(members)
-    return robot
+    return BalancedAssignment(best.robot, loads, loads[0] if complete else lower_bound, complete)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, known_value, room_left
-from keyexpr_schema.facts import FactKey, Value
+from keyexpr_schema.facts import FactKey, Literal, Value, render_value
 
 Left = tuple[str, Value]
 """A relation and its value, as an actor leaves them of its robot."""
@@ -89,8 +89,8 @@ class Candidates:
             for relation in self._unmet(robot, requirement):
                 value, task = requirement.facts[relation]
                 has = known_value(FactKey(relation, robot), self._world.facts, self._world)
-                told = "unknown" if has is None else has
-                yield f"{task} needs {relation}({robot}) = {value}, and it is {told}"
+                needed = Literal(FactKey(relation, robot), value)
+                yield f"{task} needs {needed}, and it is {render_value(has)}"
                 break
 
     def _fitting(self, requirement: Requirement) -> list[str]:

@@ -1,4 +1,7 @@
-"""The flow of a plan: conditions and effects over every order that its graph allows."""
+"""Causality: whether conditions hold before tasks and at the end, in every order of the graph.
+
+The criterion is that of `fleet.core.checker.checked_plan`.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +9,18 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 
 from fleet.core.checker.actor_requirements import Requirement
+from fleet.core.checker.quantities import BasketLoads
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel, capacity, condition_holds, known_value
-from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
+from keyexpr_schema.facts import FactKey, Literal, Value, render_value
 from keyexpr_schema.ids import actor_arg, actor_in, bare_name
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 
-class PlanFlow:
-    """Conditions and effects over every order that the graph allows."""
+class Causality:
+    """Preconditions, goals and room of one plan; `check` fills `violations` and `requirements`."""
 
     def __init__(
         self, plan: Plan, world: WorldModel, graph: TaskGraph, actions: Mapping[str, Action]
@@ -28,11 +32,7 @@ class PlanFlow:
         for task in graph.order:
             for literal in actions[task].after:
                 self._writers[literal.variable].append((task, literal.value))
-        self._positions = {
-            thing: rows
-            for thing in world.objects
-            if (rows := self._writers.get(FactKey(AT, thing)))
-        }
+        self._baskets = BasketLoads(world, graph, self._writers)
 
     def check(self) -> None:
         """Fill `violations` and `requirements`."""
@@ -85,7 +85,7 @@ class PlanFlow:
                     "condition-undone",
                     task,
                     literal,
-                    f"{task} needs {literal}, and {writer} {verb} it {value} before",
+                    f"{task} needs {literal}, and {writer} {verb} it {render_value(value)} before",
                 )
                 return
         if not restorers:
@@ -103,10 +103,9 @@ class PlanFlow:
             # Who has it must be the actor: something is taken out of a basket, or back.
             self.requirements[str(wanted)].valued.setdefault(variable, task)
         elif has != wanted:
-            told = "that is not known" if has is None else f"it is {has}"
-            self._unmet(
-                "condition-unmet", task, literal, f"{task} needs {literal}, and at the start {told}"
-            )
+            state = "that is not known" if has is None else f"it is {has}"
+            sentence = f"{task} needs {literal}, and at the start {state}"
+            self._unmet("condition-unmet", task, literal, sentence)
 
     def _unmet(self, code: str, task: str, literal: Literal, sentence: str) -> None:
         subject = bare_name(literal.variable.subject)
@@ -125,57 +124,20 @@ class PlanFlow:
         )
 
     def _check_space(self, task: str, carrier: str) -> None:
-        graph = self._graph
-        initial = 0
-        planned = 0
-        own = {
-            literal.variable.subject
-            for literal in self._actions[task].after
-            if literal.variable.relation == AT and literal.value == carrier
-        }
-        for thing in self._world.objects:
-            if thing in own:
-                continue
-            rows = self._positions.get(thing, ())
-            if any(
-                value == carrier
-                and writer != task
-                and not graph.precedes(task, writer)
-                and not any(
-                    other != carrier and graph.precedes(writer, w) and graph.precedes(w, task)
-                    for w, other in rows
-                )
-                for writer, value in rows
-            ):
-                planned += 1
-            elif (
-                self._world.value(AT, thing) == carrier
-                and self._world.value(HOLDING, carrier) != thing
-                and not any(graph.precedes(writer, task) for writer, _ in rows)
-            ):
-                initial += 1
+        at_start, planned = self._baskets.before(task, self._actions[task], carrier)
         if actor_in(carrier) is not None:
             requirement = self.requirements[carrier]
-            freed = sum(self._leaves(variable, task) for variable in requirement.valued)
+            freed = sum(self._baskets.unloaded_before(task, row) for row in requirement.valued)
             requirement.space = max(requirement.space, planned + 1 - freed)
-        elif initial + planned + 1 > capacity(carrier, self._world):
+        elif at_start + planned + 1 > (room := capacity(carrier, self._world)):
             self.violations.append(
                 Violation(
                     code="no-space",
                     sentence=f"{task} puts an object into {carrier}'s basket, which takes "
-                    f"{capacity(carrier, self._world)} and may hold {initial + planned} by then",
+                    f"{room} and may hold {at_start + planned} by then",
                     task=task,
                 )
             )
-
-    def _leaves(self, variable: FactKey, task: str) -> bool:
-        """Whether what an actor has in its basket at the start is out of it before the task."""
-        if variable.relation != AT:
-            return False
-        holder = self._world.value(AT, variable.subject)
-        in_hand = self._world.value(HOLDING, str(holder)) == variable.subject
-        rows = self._positions.get(variable.subject, ())
-        return not in_hand and any(self._graph.precedes(writer, task) for writer, _ in rows)
 
     def _final_facts(self) -> dict[FactKey, Value]:
         """Every variable at the end; unknown where the order of its last writers is open."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from fleet.core.dispatch.ready_tasks import order_if_ready
-from fleet.core.model.preconditions import Skills
+from fleet.core.model.skills import Skills
 from fleet.core.state import State
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import TaskState

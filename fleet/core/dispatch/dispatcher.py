@@ -11,7 +11,7 @@ from fleet.core.dispatch.ready_tasks import order_if_ready
 from fleet.core.dispatch.replan_triggers import new_robots, why_replan
 from fleet.core.handlers.goals import next_stage
 from fleet.core.handlers.requests import plan_waiting_goals
-from fleet.core.model.preconditions import Skills
+from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import PlanEntry, ReplanScope
 from fleet.core.revision.replanning import start_replanning
 from fleet.core.state import State

@@ -5,8 +5,8 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core.dispatch.free_robots import is_free
-from fleet.core.model.preconditions import Skills, action_of, unmet_before
-from fleet.core.model.skills import Action
+from fleet.core.model.preconditions import action_of, unmet_before
+from fleet.core.model.skills import Action, Skills
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
 from fleet.core.state import State
 from fleet.core.updates import give_up, set_entry, set_record

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fleet.core.model.preconditions import Skills, action_of
-from fleet.core.model.skills import Action
+from fleet.core.model.preconditions import action_of
+from fleet.core.model.skills import Action, Skills
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
 from fleet.core.state import State
 from keyexpr_schema.facts import AT

@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
-from fleet.core.model.preconditions import Skills
+from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import ReplanScope
 from fleet.core.state import State, put, without
 from fleet.core.updates import believe, cancel, set_entry, set_goal, without_goal

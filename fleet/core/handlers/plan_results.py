@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.effects import status_of
-from fleet.core.model.preconditions import Skills
+from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanReason
 from fleet.core.revision.reconcile import reconcile
 from fleet.core.state import State, put, without

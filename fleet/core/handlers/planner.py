@@ -5,7 +5,7 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.model.preconditions import Skills
+from fleet.core.model.skills import Skills
 from fleet.core.state import State
 from keyexpr_schema.payloads.goals import ENDED_GOALS
 

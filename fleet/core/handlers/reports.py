@@ -7,8 +7,8 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.model.durations import learn
-from fleet.core.model.preconditions import Skills, action_of, unmet_before
-from fleet.core.model.skills import Action
+from fleet.core.model.preconditions import action_of, unmet_before
+from fleet.core.model.skills import Action, Skills
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
 from fleet.core.state import State, put
 from fleet.core.updates import (

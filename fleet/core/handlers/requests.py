@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.model.preconditions import Skills
+from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanScope
 from fleet.core.state import State, put, without
 from fleet.core.updates import active_plan_of, answer, cancel, mark_goals, set_entry

@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.handlers.world import vocabulary_changed
-from fleet.core.model.preconditions import Skills
+from fleet.core.model.skills import Skills
 from fleet.core.state import State, put, without
 
 

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.dispatch.replan_triggers import contradiction
 from fleet.core.handlers import goals, statements
-from fleet.core.model.preconditions import Skills
+from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import ReplanScope
 from fleet.core.state import State, put, without
 from fleet.core.updates import believe, set_entry

@@ -1,14 +1,13 @@
-"""Tasks as the calls they are: their ground actions, and whether those can start now."""
+"""Tasks as ground actions, and whether those can be applied now."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fleet.core.model.skills import Action, SkillModel
-from fleet.core.model.world import WorldModel, first_unmet, room_left
+from fleet.core.model.skills import Action, Skills
+from fleet.core.model.world import WorldModel, known_value, room_left
+from keyexpr_schema.facts import FactKey, Literal, Value, render_value
 from keyexpr_schema.payloads.tasks import TaskRecord
-
-Skills = Mapping[str, SkillModel]
 
 
 def action_of(record: TaskRecord, skills: Skills) -> Action | None:
@@ -19,13 +18,29 @@ def action_of(record: TaskRecord, skills: Skills) -> Action | None:
     return skill.ground(record.args)
 
 
+def first_unmet(
+    action: Action, facts: Mapping[FactKey, Value], world: WorldModel
+) -> Literal | None:
+    """The first precondition of the action that does not hold in `facts`; baskets aside."""
+    for literal in action.before:
+        if known_value(literal.variable, facts, world) != literal.value:
+            return literal
+    return None
+
+
+def applicable(action: Action, facts: Mapping[FactKey, Value], world: WorldModel) -> bool:
+    """Whether the action's preconditions hold in `facts`, room in baskets included."""
+    return first_unmet(action, facts, world) is None and all(
+        room_left(carrier, facts, world) > 0 for carrier in action.space_in
+    )
+
+
 def unmet_before(action: Action, world: WorldModel) -> str | None:
     """The first precondition that the facts do not grant, as a phrase, or `None`."""
     literal = first_unmet(action, world.facts, world)
     if literal is not None:
-        has = world.value(*literal.variable)
-        told = "unknown" if has is None else f"{has}"
-        return f"{literal.variable} should be {literal.value} and is {told}"
+        has, wanted = world.value(*literal.variable), literal.value
+        return f"{literal.variable} should be {render_value(wanted)} and is {render_value(has)}"
     for carrier in action.space_in:
         if room_left(carrier, world.facts, world) < 1:
             return f"there is no room in {carrier}'s basket"

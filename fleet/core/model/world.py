@@ -8,7 +8,7 @@ from functools import cached_property
 
 from fleet.core.model.durations import pace, work_s
 from fleet.core.model.skills import Action, SkillModel
-from keyexpr_schema.facts import AT, HELD, HOLDING, LOCATED, NOTHING, FactKey, Literal, Value
+from keyexpr_schema.facts import AT, HELD, HOLDING, LOCATED, NOTHING, FactKey, Value
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -112,6 +112,12 @@ class WorldModel:
         """Seconds that a skill takes a robot, without the way to it."""
         return work_s(self._durations(robot), skill)
 
+    def duration_s(self, action: Action, origin: Value, robot: str) -> float:
+        """Seconds that a robot takes for an action, travel from `origin` to it included."""
+        to = action.skill.travel_to
+        travel_s = 0.0 if to is None else self.travel_s(robot, origin, action.args[to])
+        return self.work_s(robot, action.skill) + travel_s
+
     def travel_s(self, robot: str, origin: Value, target: str) -> float:
         """Seconds that a robot takes from one place to another; from anywhere if unknown."""
         return pace(self._durations(robot)) * self.way_s(robot, origin, target)
@@ -189,16 +195,6 @@ def known_value(variable: FactKey, facts: Mapping[FactKey, Value], world: WorldM
     if value is None and variable.relation == HOLDING and variable.subject in world.robots:
         return None if world.capability(variable.subject, "grip") else NOTHING
     return value
-
-
-def first_unmet(
-    action: Action, facts: Mapping[FactKey, Value], world: WorldModel
-) -> Literal | None:
-    """The first precondition of the action that does not hold in `facts`; baskets aside."""
-    for literal in action.before:
-        if known_value(literal.variable, facts, world) != literal.value:
-            return literal
-    return None
 
 
 def room_left(robot: str, facts: Mapping[FactKey, Value], world: WorldModel) -> int:

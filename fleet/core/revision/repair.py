@@ -6,8 +6,7 @@ from collections.abc import Iterable, Set
 
 from msgspec.structs import replace
 
-from fleet.core.checker.plan_checker import CheckedPlan
-from fleet.core.schedule.actor_constraints import able_robots
+from fleet.core.checker.checked_plan import InvalidPlan
 from keyexpr_schema.facts import SEARCHED
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan
@@ -53,17 +52,18 @@ def for_goals(plan: Plan, goals: Iterable[Goal]) -> Plan:
     )
 
 
-def broken_goals(plan: Plan, checked: CheckedPlan, goals: Iterable[Goal]) -> frozenset[str]:
+def broken_goals(invalid: InvalidPlan, goals: Iterable[Goal]) -> frozenset[str]:
     """The goals that the checker's violations are about; none if one is about no goal."""
+    plan = invalid.plan
     goal_of = {task.task: task.goal for task in plan.tasks}
     wants: dict[Condition, list[str]] = {}
     for goal in goals:
         for condition in goal.conditions:
             wants.setdefault(condition, []).append(goal.goal)
-    if checked.graph is None:
+    if invalid.graph is None:
         return frozenset()
     broken: set[str] = set()
-    for violation in checked.violations:
+    for violation in invalid.violations:
         if violation.task is not None:
             served = goal_of[violation.task]
             about = [served] if served is not None else []
@@ -76,7 +76,7 @@ def broken_goals(plan: Plan, checked: CheckedPlan, goals: Iterable[Goal]) -> fro
         if not about:
             return frozenset()
         broken.update(about)
-    for actor, robots in able_robots(plan, checked).items():
+    for actor, robots in invalid.able.items():
         if not robots:
             broken.update(t.goal for t in plan.tasks if t.actor == actor and t.goal is not None)
     return frozenset(broken)

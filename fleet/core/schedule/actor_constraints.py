@@ -1,20 +1,18 @@
-"""Which actors cannot be the same robot, and a quick binding of actors to robots."""
+"""Which actors must be different robots, tasks that nobody can do, and a quick allocation."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fleet.core.checker.plan_checker import CheckedPlan
-from fleet.core.model.world import WorldModel
+from fleet.core.checker.checked_plan import CheckedPlan, InvalidPlan
 from fleet.core.schedule.actor_order import carried_at_end
-from fleet.core.schedule.plan_schedule import actors_of
 from keyexpr_schema.ids import bare_name
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 Pair = tuple[str, str]
 
 
-def actors_apart(plan: Plan, checked: CheckedPlan) -> frozenset[Pair]:
+def actors_apart(checked: CheckedPlan) -> frozenset[Pair]:
     """Pairs of actors that must be different robots, each pair in order of name.
 
     Those that meet in one task; and those that both still have a load when the plan is done: a
@@ -25,7 +23,7 @@ def actors_apart(plan: Plan, checked: CheckedPlan) -> frozenset[Pair]:
         actors = sorted(bare_name(name) for name in action.participants)
         apart.update((a, b) for i, a in enumerate(actors) for b in actors[i + 1 :])
     loaded = sorted(set(carried_at_end(checked).values()))
-    pins = plan.pins
+    pins = checked.plan.pins
     apart.update(
         (a, b)
         for i, a in enumerate(loaded)
@@ -37,30 +35,24 @@ def actors_apart(plan: Plan, checked: CheckedPlan) -> frozenset[Pair]:
     return frozenset(apart)
 
 
-def able_robots(plan: Plan, checked: CheckedPlan) -> dict[str, tuple[str, ...]]:
-    """The robots of the team that can be each actor, in the order of the plan's actors."""
-    return {actor: checked.able[actor] for actor in actors_of(plan)}
-
-
-def tasks_nobody_can_do(
-    plan: Plan, checked: CheckedPlan, world: WorldModel
-) -> tuple[Violation, ...]:
+def tasks_nobody_can_do(invalid: InvalidPlan) -> tuple[Violation, ...]:
     """Tasks with a part that no connected robot can take, each with what is lacking.
 
-    `checked` must have actions: the plan's form is right.
+    None if the plan's form is wrong.
     """
+    world = invalid.world
     found = []
-    for task in plan.tasks:
-        action = checked.actions[task.task]
+    for task in invalid.plan.tasks if invalid.actions else ():
+        action = invalid.actions[task.task]
         for parameter in action.skill.robot_parameters:
             lacks = [world.lacks(robot, action, parameter) for robot in world.team]
             if all(lacks):
-                told = "; ".join(dict.fromkeys(map(str, lacks))) or "no robot is connected"
-                part = "" if parameter == action.skill.actor_parameter else f" (as its {parameter})"
+                reasons = "; ".join(dict.fromkeys(map(str, lacks))) or "no robot is connected"
+                role = "" if parameter == action.skill.actor_parameter else f" (as its {parameter})"
                 found.append(
                     Violation(
                         code="no-robot",
-                        sentence=f"no robot can do task {task.task}, {task.skill}{part}: {told}",
+                        sentence=f"no robot can do task {task.task}, {task.skill}{role}: {reasons}",
                         task=task.task,
                     )
                 )
@@ -69,21 +61,19 @@ def tasks_nobody_can_do(
 
 def task_counts(plan: Plan) -> dict[str, int]:
     """The number of tasks of each actor."""
-    counts = dict.fromkeys(actors_of(plan), 0)
+    counts = dict.fromkeys(plan.actors, 0)
     for task in plan.tasks:
         counts[task.actor] += 1
     return counts
 
 
-def least_loaded(plan: Plan, checked: CheckedPlan, world: WorldModel) -> Mapping[str, str] | None:
+def least_loaded(checked: CheckedPlan) -> Mapping[str, str] | None:
     """Each actor in turn to the able robot with the fewest tasks so far; `None` if one is left.
 
     Actors with the fewest choices come first.
     """
-    able = able_robots(plan, checked)
-    apart = actors_apart(plan, checked)
-    counts = task_counts(plan)
-    load = dict.fromkeys(world.team, 0)
+    able, apart, counts = checked.able, actors_apart(checked), task_counts(checked.plan)
+    load = dict.fromkeys(checked.world.team, 0)
     allocation: dict[str, str] = {}
     for actor in sorted(able, key=lambda name: len(able[name])):
         taken = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fleet.core.checker.plan_checker import CheckedPlan
+from fleet.core.checker.checked_plan import CheckedPlan
 from keyexpr_schema.facts import AT, Value
 from keyexpr_schema.ids import actor_arg, actor_in
 
@@ -13,7 +13,7 @@ def carried_at_end(checked: CheckedPlan) -> dict[str, str]:
     Such actors come last: their robot would carry the object off.
     """
     holder: dict[str, Value] = {}
-    for task in checked.graph.order if checked.graph else ():
+    for task in checked.graph.order:
         for literal in checked.actions[task].after:
             if literal.variable.relation == AT:
                 holder[literal.variable.subject] = literal.value
@@ -26,7 +26,7 @@ def first_actors(checked: CheckedPlan) -> frozenset[str]:
     """Actors that need their robot as it is now, and as some other actor would not leave it."""
     last = {actor_arg(actor) for actor in carried_at_end(checked).values()}
     leaves: dict[str, dict[str, Value]] = {}
-    for task in checked.graph.order if checked.graph else ():
+    for task in checked.graph.order:
         for variable, value in checked.actions[task].after:
             leaves.setdefault(variable.subject, {})[variable.relation] = value
     left: dict[str, set[Value]] = {}
@@ -36,9 +36,8 @@ def first_actors(checked: CheckedPlan) -> frozenset[str]:
                 left.setdefault(relation, set()).add(value)
     return frozenset(
         actor
-        for name, requirement in checked.requirements.items()
-        if (actor := actor_in(name)) is not None
-        and any(
+        for actor, requirement in checked.requirements.items()
+        if any(
             left.get(relation, set()) - {value}
             for relation, (value, _) in requirement.facts.items()
         )

@@ -50,7 +50,7 @@ class Clauses(Tidying):
         found = [place] if (place := where.target or where.source) else []
         while found:
             here = cursor.at
-            if not (cursor.take(",", "and") or cursor.take("and") or cursor.take(",")):
+            if not cursor.take_joint():
                 break
             cursor.preposition()
             if not self.nouns.starts(PLACES):
@@ -92,7 +92,7 @@ class Clauses(Tidying):
         mentions = [self.subjects.resolve(self.subjects.drivers(subject)) for subject in who]
         if len(mentions) != 1 or not mentions[0].single:
             raise NotUnderstood(
-                f"{self.cursor.quote(self.began)!r} does not say which robot goes where: say it of "
+                f"{self.clause!r} does not say which robot goes where: say it of "
                 "one robot at a time, or leave the robots out"
             )
         for i, place in enumerate(self._route()):

@@ -46,6 +46,11 @@ class Moving:
         self.verb = ""
         self.began = 0  # the token at which the clause began
 
+    @property
+    def clause(self) -> str:
+        """The clause as far as it is read, as it was written."""
+        return self.cursor.quote(self.began)
+
     # --- moving ----------------------------------------------------------------------------------
     def move(self, *, tidy: bool = False, give: bool = False, fetch: bool = False) -> None:
         """`bring NP to PLACE`, `give NP to ROBOT`, `give ROBOT NP`, `put NP back`.
@@ -123,9 +128,7 @@ class Moving:
                 break
         placed = any(locative.preposition != "from" for locative in locatives)
         if placed and belongs:
-            raise NotUnderstood(
-                f'{cursor.quote(self.began)!r} names a place and says "home": say one of them'
-            )
+            raise NotUnderstood(f'{self.clause!r} names a place and says "home": say one of them')
         return locatives, home and not placed
 
     def _home(self) -> bool:
@@ -214,13 +217,13 @@ class Moving:
     def _no_target(self) -> NotUnderstood:
         cursor = self.cursor
         if not cursor.at_border() and cursor.word() != "and":
-            shown, before = cursor.quote(*cursor.phrase()), cursor.quote(self.began)
+            shown, before = cursor.quote(*cursor.phrase()), self.clause
             return cursor.refusal(
                 f"{shown!r} is not understood after {before!r}: say where to; known are "
                 f"{listed(cursor.lexicon.known(('place',)))}"
             )
         return NotUnderstood(
-            f"{cursor.quote(self.began)!r} does not say where to: name a place; known are "
+            f"{self.clause!r} does not say where to: name a place; known are "
             f"{listed(cursor.lexicon.known(('place',)))}"
         )
 

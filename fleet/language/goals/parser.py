@@ -165,8 +165,8 @@ class _GoalParser(Sentences):
                 self.there_should_be()
             else:
                 self.declarative(states=True)
-        elif wanting := cursor.take_of(WANTING):
-            self.declarative(wanted=wanting is not None)
+        elif cursor.take_of(WANTING):
+            self.declarative(wanted=True)
         elif cursor.next_of(CAUSATIVES) and not cursor.verb_next():
             cursor.take_of(CAUSATIVES)
             self.declarative(bare_infinitive=True)

@@ -23,6 +23,8 @@ from fleet.language.words.verbs import (
 from fleet.language.words.wordlists import CLOSERS, COPULAR_VERBS, HOME, MODALS, OPENERS, SITUATED
 from keyexpr_schema.facts import HELD, LOCATED, SEARCHED
 
+_RELATIONS = {VerbSense.FIND: LOCATED, VerbSense.PICK: HELD, VerbSense.SEARCH: SEARCHED}
+"""What holds when it has been done: "the book should be found"."""
 _QUESTIONS = frozenset(words_in("is are was were does did has what who why how which whose"))
 
 
@@ -92,7 +94,7 @@ class Sentences(Clauses):
 
     def _check_robots(self, who: Sequence[Subject]) -> None:
         if any(subject.type != "robot" for subject in who):
-            raise NotUnderstood(f"{self.cursor.quote(self.began)!r}: only robots do something")
+            raise NotUnderstood(f"{self.clause!r}: only robots do something")
 
     def _check_who(self, who: Sequence[Subject]) -> None:
         self._check_robots(who)
@@ -155,25 +157,14 @@ class Sentences(Clauses):
 
     def _to_be(self, who: Sequence[Subject]) -> None:
         """What follows "should be": a place, or what should have been done."""
-        cursor = self.cursor
         self.elliptic = "be"
         done = self._done()
-        if done & {VerbSense.FIND, VerbSense.PICK, VerbSense.SEARCH} and not done & {
-            VerbSense.MOVE
-        }:
+        relation = next((name for sense, name in _RELATIONS.items() if sense in done), None)
+        if relation is not None and VerbSense.MOVE not in done:
             self.elliptic = ""
-            relation = next(
-                name
-                for senses, name in (
-                    (VerbSense.FIND, LOCATED),
-                    (VerbSense.PICK, HELD),
-                    (VerbSense.SEARCH, SEARCHED),
-                )
-                if senses in done
-            )
             return self._has_been(who, relation)
         if any(s.type in PLACES for s in who):
-            shown = cursor.quote(self.began)
+            shown = self.clause
             raise NotUnderstood(
                 f"{shown!r} is one place too many for one thing; if one is to come after the "
                 'other, say "then"'
@@ -185,15 +176,14 @@ class Sentences(Clauses):
 
     def _belongs(self, who: Sequence[Subject]) -> None:
         """`NP belongs in PLACE`, after the verb."""
-        cursor = self.cursor
         self.elliptic = "be"
         if any(s.type in PLACES for s in who):
-            raise NotUnderstood(f"{cursor.quote(self.began)!r}: places stay where they are")
+            raise NotUnderstood(f"{self.clause!r}: places stay where they are")
         locatives, home = self.locatives()
         where = self.where(locatives)
         if where.target_type == "robot" or where.source is not None:
             raise NotUnderstood(
-                f"{cursor.quote(self.began)!r} does not say in which place it belongs: {EXAMPLE}"
+                f"{self.clause!r} does not say in which place it belongs: {EXAMPLE}"
             )
         return self.to_target(who, where, home)
 
@@ -221,8 +211,8 @@ class Sentences(Clauses):
         for mention in mentions:
             if mention.type not in wanted:
                 raise NotUnderstood(
-                    f"{self.cursor.quote(self.began)!r}: {relation} is said of "
-                    f"{'places' if relation == 'searched' else 'objects'} only"
+                    f"{self.clause!r}: {relation} is said of "
+                    f"{'places' if relation == SEARCHED else 'objects'} only"
                 )
             self.draft.add(relation, mention, True)
         if relation != SEARCHED:
@@ -232,9 +222,7 @@ class Sentences(Clauses):
     def no_clause(self, start: int | None = None) -> NotUnderstood:
         """What comes next is nothing that a goal could say."""
         cursor = self.cursor
-        here = cursor.at
-        first = here if start is None else start
-        cursor.at = here
+        first = cursor.at if start is None else start
         special = cursor.refusal("")
         cursor.at = first
         if cursor.word() == "another" or cursor.word(1) == "other":

@@ -149,16 +149,16 @@ def _without_implied_travel(stage: Sequence[Wish]) -> list[Wish]:
 
 def _sequenced(stage: Sequence[Wish]) -> list[list[Wish]]:
     """ "Go to the kitchen and pick up the cup" means one after the other."""
-    parts: list[list[Wish]] = [[]]
+    split: list[list[Wish]] = [[]]
     for wish in stage:
-        last = parts[-1][-1] if parts[-1] else None
+        last = split[-1][-1] if split[-1] else None
         if last is not None and last.means and not wish.means:
             if wish.relation == SEARCHED and wish.subjects == (last.value,):
-                parts[-1].pop()
+                split[-1].pop()
             else:
-                parts.append([])
-        parts[-1].append(wish)
-    return parts
+                split.append([])
+        split[-1].append(wish)
+    return split
 
 
 def _consistent(stage: Sequence[Wish]) -> list[Wish]:

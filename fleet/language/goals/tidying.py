@@ -44,13 +44,12 @@ class Tidying(Moving):
 
     def clear(self) -> None:
         """`clear TABLE`, after the verb: what lies on it goes where it belongs."""
-        cursor = self.cursor
         homes = {o.object: o.home for o in self.vocabulary.objects.values() if o.movable and o.home}
         mentions = self.place_mentions() or []
         if not mentions or any(mention.type != "surface" for mention in mentions):
             places = [name for m in mentions for name in m.subjects] or list(self.vocabulary.places)
             raise NotUnderstood(
-                f"{cursor.quote(self.began)!r}: name the things and where to bring them, or say "
+                f"{self.clause!r}: name the things and where to bring them, or say "
                 f'"tidy up {one_of(places)}"'
             )
         self._to_their_homes([n for m in mentions for n in self._lying_on(m, homes)], homes)

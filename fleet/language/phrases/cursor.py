@@ -50,6 +50,10 @@ class Cursor:
             return True
         return False
 
+    def take_joint(self) -> bool:
+        """Go past what joins the items of a list: a comma, "and", or both."""
+        return self.take(",", "and") or self.take("and") or self.take(",")
+
     def next_of(self, phrases: Iterable[Phrase]) -> Phrase | None:
         """The first of the phrases that comes next; nothing is gone past."""
         for phrase in phrases:

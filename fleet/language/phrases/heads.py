@@ -84,7 +84,7 @@ class Heads:
             cursor.at = start if described is None else cursor.at
             raise self.unknown(start, what, types)
         cursor.at = name_end
-        self._remember_kind(named[0], types)
+        self._remember_kind(named[0])
         return self.noun_phrase(named, start, exact=True)
 
     def _described(self, start: int, types: Sequence[EntityType]) -> NounPhrase | None:
@@ -100,7 +100,7 @@ class Heads:
             generic = end - begin == 1 and len(found) == len(kind[1]) and self._is_category(begin)
         cursor.at = end
         found = self._of_what(found)
-        self._remember_kind(found[0], types)
+        self._remember_kind(found[0])
         one = not cursor.ended and cursor.tokens[cursor.at].spoken in ("one", "ones")
         if kind is None and one:
             plural = cursor.tokens[cursor.at].spoken == "ones"
@@ -135,7 +135,7 @@ class Heads:
         found: list[int] = []
         while True:
             before = cursor.at
-            if found and not (cursor.take(",", "and") or cursor.take(",") or cursor.take("and")):
+            if found and not cursor.take_joint():
                 break
             if cursor.take_word(_NUMBER_SIGNS):
                 cursor.take(".")
@@ -159,7 +159,7 @@ class Heads:
             )
         return chosen
 
-    def _remember_kind(self, entity: Entity, types: Sequence[EntityType]) -> None:
+    def _remember_kind(self, entity: Entity) -> None:
         if entity.type in ("object", "robot"):
             self.kind = self.cursor.lexicon.kin(entity)
 

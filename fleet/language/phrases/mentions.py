@@ -1,4 +1,4 @@
-"""NounPhrase phrases as they were read, and who is meant by them."""
+"""Noun phrases as they were read, and who is meant by them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Mention:
 
 @dataclass(frozen=True)
 class NounPhrase:
-    """A noun phrase before it is resolved who is meant; `ordinal` 0 is the last one.
+    """A noun phrase before it is resolved to those meant; `ordinal` 0 is the last one.
 
     `exact`: the words name each of `found`. `generic`: the words say no more than "thing".
     """

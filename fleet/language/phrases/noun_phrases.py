@@ -98,7 +98,7 @@ class NounPhrases(Heads):
         cursor, began, found = self.cursor, self.cursor.at, list[int]()
         while True:
             start = cursor.at
-            joined = cursor.take(",", "and") or cursor.take("and") or cursor.take(",")
+            joined = cursor.take_joint()
             cursor.take_word(DEFINITE)
             ordinal = self._ordinal(types) if joined else None
             if ordinal is None:

@@ -55,9 +55,7 @@ class Subjects:
             if self.cursor.take("or"):
                 found[-1] = self._either(found[-1], self._one(what, types))
                 continue
-            joined = self.cursor.take(",", "and") or self.cursor.take("and")
-            joined = joined or self.cursor.take(",")
-            if not joined or self.cursor.verb_next() or not self._starts(types):
+            if not self.cursor.take_joint() or self.cursor.verb_next() or not self._starts(types):
                 self.cursor.at = start
                 break
             found.append(_determined(self._one(what, types), found[-1]))

@@ -40,8 +40,7 @@ class Claims(Clauses):
         for mention in mentions:
             if mention.open:
                 raise NotUnderstood(
-                    f"{self.cursor.quote(self.began)!r} does not say which of "
-                    f"{one_of(mention.subjects)}: name it"
+                    f"{self.clause!r} does not say which of {one_of(mention.subjects)}: name it"
                 )
             if mention.type == "robot" and target not in self.vocabulary.places:
                 raise NotUnderstood("a robot is at a place, not on a robot: name the place")
@@ -69,9 +68,7 @@ class Claims(Clauses):
         objects = [n for thing in held or () for n in self.subjects.resolve(thing).subjects]
         opened = any(self.subjects.resolve(s).open for s in (*robots, *(held or ())))
         if opened or (held is not None and (len(names) != 1 or (in_hand and len(objects) != 1))):
-            raise NotUnderstood(
-                f"{self.cursor.quote(self.began)!r}: one hand holds one thing; say who holds what"
-            )
+            raise NotUnderstood(f"{self.clause!r}: one hand holds one thing; say who holds what")
         for name in names:
             if in_hand:
                 self.fact(HOLDING, name, objects[0] if objects else NOTHING)
@@ -82,8 +79,7 @@ class Claims(Clauses):
         """Somebody looked around in these places, or nobody did."""
         if not value and len(places) > 1:
             raise NotUnderstood(
-                f"{self.cursor.quote(self.began)!r} could mean all or some of them: "
-                "say it of one place at a time"
+                f"{self.clause!r} could mean all or some of them: say it of one place at a time"
             )
         self.cursor.take("yet")
         for place in places:

@@ -184,7 +184,7 @@ class _StatementParser(Claims):
             raise self._unread()
         where = self.where(locatives)
         if where.source is not None or where.target is None:
-            raise NotUnderstood(f"{cursor.quote(self.began)!r} does not say one place: {_EXAMPLE}")
+            raise NotUnderstood(f"{self.clause!r} does not say one place: {_EXAMPLE}")
         self.put(things, where.target, where.target_surface)
 
     def _of_places(self) -> None:
@@ -228,5 +228,5 @@ class _StatementParser(Claims):
             return NotUnderstood(f"{shown!r} is a goal and not a fact: {_EXAMPLE}")
         if cursor.at == self.began and not (self.nouns.starts((*THINGS, *SPOTS))):
             return cursor.unknown("an object, robot or place", ("object", "robot", "place"))
-        shown = cursor.quote(*cursor.phrase()) or cursor.quote(self.began)
+        shown = cursor.quote(*cursor.phrase()) or self.clause
         return cursor.refusal(f"{shown!r} is not understood as a fact: {_EXAMPLE}")

@@ -81,7 +81,7 @@ class Lexicon:
         ]
 
     def names_in(self, types: Sequence[EntityType]) -> set[str]:
-        """Phrase of all names and kinds of those types, for those who mistyped one."""
+        """Words of all names and kinds of those types, for those who mistyped one."""
         return {
             " ".join(words)
             for e in self.entities
@@ -195,11 +195,7 @@ def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
         )
         for surface in place.surfaces:
             yield Entity(
-                surface.surface,
-                "surface",
-                place.place,
-                _names(surface.surface),
-                frozenset(),
+                surface.surface, "surface", place.place, _names(surface.surface), frozenset()
             )
 
 

@@ -22,68 +22,37 @@ class VerbSense(Enum):
     PATROL = "patrol"  # SEARCH, or going from place to place if a robot is named
 
 
-_VERBS: dict[VerbSense, tuple[str, tuple[str, ...]]] = {
+_VERBS: dict[VerbSense, str] = {
     VerbSense.MOVE: (
-        "bring take deliver carry move transport return get fetch haul transfer relocate shift "
-        "put place set lay stow store leave collect gather retrieve drop deposit load send drive",
-        ("put down", "set down", "lay down", "drop off"),
+        "bring|take|deliver|carry|move|transport|return|get|fetch|haul|transfer|relocate|shift|"
+        "put|place|set|lay|stow|store|leave|collect|gather|retrieve|drop|deposit|load|send|drive|"
+        "put down|set down|lay down|drop off"
     ),
-    VerbSense.FETCH: ("take get fetch collect gather retrieve", ()),
-    VerbSense.GO: ("go navigate head travel proceed come drive move return", ()),
-    VerbSense.FIND: ("find locate seek spot detect", ("look for", "search for", "hunt for")),
+    VerbSense.FETCH: "take|get|fetch|collect|gather|retrieve",
+    VerbSense.GO: "go|navigate|head|travel|proceed|come|drive|move|return",
+    VerbSense.FIND: "find|locate|seek|spot|detect|look for|search for|hunt for",
     VerbSense.SEARCH: (
-        "search inspect check explore patrol survey scan scout examine",
-        (
-            "look around",
-            "look around in",
-            "look around inside",
-            "look round",
-            "look round in",
-            "look in",
-            "look into",
-            "look inside",
-            "look through",
-            "look at",
-            "have a look",
-            "have a look around",
-            "have a look round",
-            "have a look in",
-            "take a look",
-            "take a look around",
-            "take a look round",
-            "take a look in",
-            "check out",
-            "search in",
-            "search through",
-            "patrol through",
-        ),
+        "search|inspect|check|explore|patrol|survey|scan|scout|examine|look around|"
+        "look around in|look around inside|look round|look round in|look in|look into|"
+        "look inside|look through|look at|have a look|have a look around|have a look round|"
+        "have a look in|take a look|take a look around|take a look round|take a look in|"
+        "check out|search in|search through|patrol through"
     ),
-    VerbSense.PATROL: ("patrol", ("patrol through",)),
+    VerbSense.PATROL: "patrol|patrol through",
     VerbSense.PICK: (
-        "grab grasp lift hold pick",
-        ("pick up", "lift up", "take hold of", "get hold of", "grab hold of"),
+        "grab|grasp|lift|hold|pick|pick up|lift up|take hold of|get hold of|grab hold of"
     ),
-    VerbSense.GIVE: ("give hand pass", ("hand over", "give over", "pass over")),
+    VerbSense.GIVE: "give|hand|pass|hand over|give over|pass over",
     VerbSense.TIDY: (
-        "tidy return",
-        (
-            "tidy up",
-            "clean up",
-            "clear up",
-            "put away",
-            "put back",
-            "bring back",
-            "take back",
-            "carry back",
-        ),
+        "tidy|return|tidy up|clean up|clear up|put away|put back|bring back|take back|carry back"
     ),
 }
 
 
 def _forms_of(make: str) -> dict[Phrase, frozenset[VerbSense]]:
     found: dict[Phrase, frozenset[VerbSense]] = {}
-    for senses, (single, several) in _VERBS.items():
-        for verb in (*single.split(), *several):
+    for sense, verbs in _VERBS.items():
+        for verb in verbs.split("|"):
             head, _, rest = verb.partition(" ")
             forms = {
                 "imperative": (head, gerund(head)),
@@ -92,7 +61,7 @@ def _forms_of(make: str) -> dict[Phrase, frozenset[VerbSense]]:
             }[make]
             for form in forms:
                 phrase = tuple(token.word for token in tokens_of(f"{form} {rest}"))
-                found[phrase] = found.get(phrase, frozenset()) | {senses}
+                found[phrase] = found.get(phrase, frozenset()) | {sense}
     return found
 
 
@@ -105,7 +74,5 @@ PARTICIPLES = _forms_of("participle")
 PARTICLES = frozenset({"back", "away", "up", "over", "down", "off"})
 """What may stand behind the thing that a verb is about: "pick it up", "put it back"."""
 EXAMPLE = 'say it like "bring the first cup to the hallway" or "send a robot to the kitchen"'
-BASE_VERBS = frozenset(
-    verb for single, several in _VERBS.values() for verb in (*single.split(), *several)
-)
+BASE_VERBS = frozenset(verb for verbs in _VERBS.values() for verb in verbs.split("|"))
 """What a mistyped verb may have meant."""

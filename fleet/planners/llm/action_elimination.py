@@ -5,11 +5,11 @@ After H. Nakhost and M. Müller, "Action Elimination and Plan Neighborhood Graph
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from msgspec.structs import replace
 
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import check_plan
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import AT, FactKey
@@ -26,33 +26,24 @@ def without_redundant_tasks(plan: Plan, world: WorldModel) -> Plan:
     unlocated = world.with_facts(
         {FactKey(AT, robot): None for robot in world.robots if robot not in mentioned}
     )
-    if not check_plan(plan, unlocated).valid:
+    if check_plan(plan, unlocated).violations:
         unlocated = world
-    for removal in (_with_successors, _alone):
-        plan = _eliminated(plan, unlocated, removal)
+    for with_successors in (True, False):
+        plan = _eliminated(plan, unlocated, with_successors)
     return plan
 
 
-def _eliminated(
-    plan: Plan, world: WorldModel, removal: Callable[[TaskGraph, str], frozenset[str]]
-) -> Plan:
+def _eliminated(plan: Plan, world: WorldModel, with_successors: bool) -> Plan:
     graph = TaskGraph({task.task: task.after for task in plan.tasks})
     for task in graph.order:
         if all(task != row.task for row in plan.tasks):
             continue
-        reduced = _without(plan, removal(graph, task))
-        if check_plan(reduced, world).valid:
+        after = [t for t in graph.order if graph.precedes(task, t)] if with_successors else []
+        reduced = _without(plan, frozenset({task, *after}))
+        if not check_plan(reduced, world).violations:
             plan = reduced
             graph = TaskGraph({row.task: row.after for row in plan.tasks})
     return plan
-
-
-def _with_successors(graph: TaskGraph, task: str) -> frozenset[str]:
-    return frozenset({task, *(other for other in graph.order if graph.precedes(task, other))})
-
-
-def _alone(graph: TaskGraph, task: str) -> frozenset[str]:
-    return frozenset({task})
 
 
 def _without(plan: Plan, removed: frozenset[str]) -> Plan:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from msgspec.structs import replace
 
@@ -11,7 +10,7 @@ from fleet.core.model.skills import SkillModel
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import PlanningProblem
-from fleet.planners.deordering import Strand, tasks_from
+from fleet.planners.deordering import ActionSequence, deordered
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, StepAnswer, TaskAnswer
 from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.ids import actor_arg, actor_in, bare_name
@@ -19,22 +18,18 @@ from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan, Task
 
 
-@dataclass(frozen=True)
-class CandidatePlan:
-    """Tasks as the model named them, and actors that must be certain robots.
-
-    Names are the model's own until the candidate has been checked, so that corrections can speak of
-    its tasks.
-    """
-
-    tasks: tuple[Task, ...]
-    pins: Mapping[str, str]
-
-
 def candidate_of(
-    answer: GraphAnswer | ListAnswer, world: WorldModel, goals: Sequence[Goal]
-) -> CandidatePlan:
-    """The tasks of an answer; those of a flat list wait for one another in its order."""
+    answer: GraphAnswer | ListAnswer,
+    problem: PlanningProblem,
+    goals: Sequence[Goal],
+    world: WorldModel,
+    keep: Sequence[Condition] = (),
+) -> Plan:
+    """The answer as a plan for these goals that leaves alone what `keep` says.
+
+    Tasks are named as the model named them, so that corrections can speak of them; those of a flat
+    list wait for one another in its order.
+    """
     only = goals[0].goal if len(goals) == 1 else None
     rows: Sequence[StepAnswer] = answer.tasks
     tasks: list[Task] = []
@@ -55,7 +50,8 @@ def candidate_of(
         )
     pins = {bare_name(pin.actor): pin.robot for pin in answer.pins}
     actors = {task.actor for task in tasks}
-    return CandidatePlan(tuple(tasks), {actor: pins[actor] for actor in pins if actor in actors})
+    pins = {actor: robot for actor, robot in pins.items() if actor in actors}
+    return _plan(problem, goals, tasks, pins, keep)
 
 
 def _actor_of(skill: SkillModel | None, args: Mapping[str, str]) -> str:
@@ -64,20 +60,20 @@ def _actor_of(skill: SkillModel | None, args: Mapping[str, str]) -> str:
     return bare_name(value) or "a1"
 
 
-def plan_of(
-    candidate: CandidatePlan,
+def _plan(
     problem: PlanningProblem,
     goals: Sequence[Goal],
+    tasks: Sequence[Task],
+    pins: dict[str, str],
     keep: Sequence[Condition] = (),
 ) -> Plan:
-    """The candidate as a plan for these goals that leaves alone what `keep` says."""
     return Plan(
         plan=problem.plan,
         revision=problem.revision,
         goals=tuple(goal.goal for goal in goals),
         conditions=tuple(dict.fromkeys([*conditions_of(goals), *keep])),
-        tasks=candidate.tasks,
-        pins=dict(candidate.pins),
+        tasks=tuple(tasks),
+        pins=pins,
         strategy=problem.strategy,
         made_by="llm",
         allocator=problem.allocator,
@@ -89,14 +85,14 @@ def conditions_of(goals: Sequence[Goal]) -> tuple[Condition, ...]:
     return tuple(condition for goal in goals for condition in goal.conditions)
 
 
-def merged(candidates: Sequence[CandidatePlan], problem: PlanningProblem, keep_order: bool) -> Plan:
+def merged(candidates: Sequence[Plan], problem: PlanningProblem, keep_order: bool) -> Plan:
     """One plan of checked candidates, with names that are unique over the revisions of the plan.
 
     Between candidates there is only the order that deordering leaves; within a candidate the
     model's own order is kept, too, if `keep_order`.
     """
     world = problem.world
-    strands: list[Strand] = []
+    sequences: list[ActionSequence] = []
     rows: list[Task] = []
     for candidate in candidates:
         graph = TaskGraph({task.task: task.after for task in candidate.tasks})
@@ -110,16 +106,16 @@ def merged(candidates: Sequence[CandidatePlan], problem: PlanningProblem, keep_o
             )
             for task in ordered
         )
-        strands.append(Strand("", actions, frozenset(robots.values())))
-    tasks, pins = tasks_from(strands, problem.first_task)
+        sequences.append(ActionSequence("", actions, frozenset(robots.values())))
+    tasks, pins = deordered(sequences, problem.first_task)
     if keep_order:
         tasks = _with_model_order(tasks, rows, candidates)
     tasks = tuple(replace(task, goal=row.goal) for task, row in zip(tasks, rows, strict=True))
-    return plan_of(CandidatePlan(tasks, pins), problem, problem.goals)
+    return _plan(problem, problem.goals, tasks, pins)
 
 
 def _with_model_order(
-    tasks: Sequence[Task], rows: Sequence[Task], candidates: Sequence[CandidatePlan]
+    tasks: Sequence[Task], rows: Sequence[Task], candidates: Sequence[Plan]
 ) -> tuple[Task, ...]:
     """The tasks with the model's order added, in the fewest edges."""
     start = 0
@@ -134,7 +130,7 @@ def _with_model_order(
     return tuple(replace(task, after=reduced[task.task]) for task in tasks)
 
 
-def world_after(candidate: CandidatePlan, world: WorldModel) -> WorldModel:
+def world_after(candidate: Plan, world: WorldModel) -> WorldModel:
     """The world after a checked candidate, as far as that is settled before robots are chosen."""
     graph = TaskGraph({task.task: task.after for task in candidate.tasks})
     by_name = {task.task: task for task in candidate.tasks}

@@ -63,11 +63,6 @@ class LlmInterpreter:
         self._model = model
         self._signatures = _signatures(skills)
 
-    @property
-    def configured(self) -> bool:
-        """Whether there is a model to ask."""
-        return self._model.configured
-
     def interpret(self, sentence: str, vocabulary: Vocabulary) -> Stages | str:
         """What must hold, stage by stage, or a sentence that says why that is not known.
 

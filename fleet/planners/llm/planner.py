@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import replace as changed
+from dataclasses import replace
 
-from msgspec.structs import replace
-
+from fleet.core.checker.checked_plan import CheckedPlan, InvalidPlan
 from fleet.core.model.world import WorldModel
 from fleet.llm.budget import Budget
 from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
@@ -15,16 +14,9 @@ from fleet.llm.structured_output import read_answer
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.llm.action_elimination import without_redundant_tasks
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema
-from fleet.planners.llm.candidate import (
-    CandidatePlan,
-    candidate_of,
-    conditions_of,
-    merged,
-    plan_of,
-    world_after,
-)
+from fleet.planners.llm.candidate import candidate_of, conditions_of, merged, world_after
 from fleet.planners.llm.prompt_text import problem_text, skills_text, team_skills
-from fleet.planners.llm.verification import violations_of
+from fleet.planners.llm.verification import verify
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan
@@ -53,7 +45,7 @@ class LlmPlanner(Planner):
         self._model = model
         self._fallback = fallback
 
-    def _solve(self, problem: PlanningProblem) -> Plan | NoPlan:
+    def _solve(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
         if reason := self._model.config.not_configured:
             return NoPlan(reason)
         budget = self._model.budget()
@@ -63,21 +55,20 @@ class LlmPlanner(Planner):
             # What a model says must never stop the fleet, whatever it is.
             log.exception("planning by language model")
             made = GivenUp(f"reading the answer failed: {error or type(error).__name__}")
-        if isinstance(made, Plan):
-            return replace(made, making=budget.making(self.name))
+        if isinstance(made, CheckedPlan):
+            return made.made_by(budget.making(self.name), problem.strategy)
         return self._fall_back(problem, made, budget)
 
-    def _propose(self, problem: PlanningProblem, budget: Budget) -> Plan | GivenUp:
+    def _propose(self, problem: PlanningProblem, budget: Budget) -> CheckedPlan | GivenUp:
         """The model's plan, verified."""
         goals = _open_goals(problem)
-        if not goals:
-            return merged((), problem, keep_order=True)
         if sought := _not_located(goals, problem.world):
             return GivenUp(f"nobody knows where {sought} is, and only {self._fallback.name} looks")
-        candidates: list[CandidatePlan] = []
+        candidates: list[Plan] = []
         world = problem.world
         # Together, goals that hold already are listed, too: they must still hold at the end.
-        groups = [(goal,) for goal in goals] if problem.strategy == PER_GOAL else [problem.goals]
+        together = [problem.goals] if goals else []
+        groups = [(goal,) for goal in goals] if problem.strategy == PER_GOAL else together
         for group in groups:
             candidate = self._candidate(problem, group, world, budget)
             if isinstance(candidate, GivenUp):
@@ -86,33 +77,32 @@ class LlmPlanner(Planner):
             candidates.append(candidate)
             world = world_after(candidate, world)
         plan = merged(candidates, problem, keep_order=problem.strategy != MONOLITHIC)
-        if violations := violations_of(plan, problem.world):
-            return GivenUp(
-                f"the goals' plans do not go together: {violations[0].sentence}", violations
-            )
-        return plan
+        verified = verify(plan, problem.world)
+        if isinstance(verified, InvalidPlan):
+            sentence = verified.violations[0].sentence
+            return GivenUp(f"the goals' plans do not go together: {sentence}", verified.violations)
+        return verified
 
     def _candidate(
         self, problem: PlanningProblem, goals: Sequence[Goal], world: WorldModel, budget: Budget
-    ) -> CandidatePlan | GivenUp:
+    ) -> Plan | GivenUp:
         """A verified candidate for some goals in `world`, without redundant tasks."""
         flat = problem.strategy == MONOLITHIC
         form: type[GraphAnswer] | type[ListAnswer] = ListAnswer if flat else GraphAnswer
         max_tasks = self._model.config.max_tasks
         keep = [c for c in conditions_of(problem.goals) if world.holds(c)]
 
-        def read(text: str) -> CandidatePlan | Rejected:
+        def read(text: str) -> Plan | Rejected:
             answer = read_answer(text, form)
             if isinstance(answer, str):
                 return Rejected.because("malformed", answer)
             if len(answer.tasks) > max_tasks:
                 sentence = f"the plan has {len(answer.tasks)} tasks; {max_tasks} are allowed"
                 return Rejected.because("too-many-tasks", sentence)
-            plan = plan_of(candidate_of(answer, world, goals), problem, goals, keep)
-            if violations := violations_of(plan, world):
+            plan = candidate_of(answer, problem, goals, world, keep)
+            if violations := verify(plan, world).violations:
                 return Rejected(violations)
-            plan = without_redundant_tasks(plan, world)
-            return CandidatePlan(plan.tasks, plan.pins)
+            return without_redundant_tasks(plan, world)
 
         return self._model.ask(
             system="system",
@@ -130,19 +120,19 @@ class LlmPlanner(Planner):
 
     def _fall_back(
         self, problem: PlanningProblem, failed: GivenUp, budget: Budget
-    ) -> Plan | NoPlan:
+    ) -> CheckedPlan | NoPlan:
         log.warning("planning by language model failed: %s", failed.reason)
         strategies = self._fallback.strategies
         strategy = problem.strategy if problem.strategy in strategies else strategies[0]
-        plan = self._fallback.plan(changed(problem, strategy=strategy))
-        if isinstance(plan, NoPlan):
+        made = self._fallback.plan(replace(problem, strategy=strategy))
+        if isinstance(made, NoPlan):
             return NoPlan(
-                f"{plan.reason} (planner {self._fallback.name}; before that, {failed.reason})",
-                plan.violations or failed.violations,
+                f"{made.reason} (planner {self._fallback.name}; before that, {failed.reason})",
+                made.violations or failed.violations,
             )
         making = budget.making(self._fallback.name, failed.reason)
         # The strategy stays what was asked for: a new revision asks the model again.
-        return replace(plan, making=making, strategy=problem.strategy)
+        return made.made_by(making, problem.strategy)
 
 
 def _open_goals(problem: PlanningProblem) -> list[Goal]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from fleet.core.model.skills import SPACE, SkillModel
@@ -11,6 +11,7 @@ from fleet.language import Vocabulary
 from fleet.llm.quoting import fenced
 from keyexpr_schema.facts import AT, Literal
 from keyexpr_schema.payloads.goals import Condition, Goal
+from keyexpr_schema.payloads.world import Place
 
 
 def skills_text(skills: Iterable[SkillModel]) -> str:
@@ -66,21 +67,13 @@ def problem_text(world: WorldModel, goals: Iterable[Goal], keep: Iterable[Condit
         if not (variable.relation == AT and variable.subject in world.robots)
     ]
     wanted = [
-        {
-            "goal": goal.goal,
-            "text": goal.text,
-            "conditions": [str(condition) for condition in goal.conditions],
-        }
+        {"goal": goal.goal, "text": goal.text, "conditions": [str(c) for c in goal.conditions]}
         for goal in goals
-    ]
-    places = [
-        {**_names(place.label, place.aliases), "place": name}
-        for name, place in world.places.items()
     ]
     return fenced(
         {
             "robots": robots,
-            "places": places,
+            "places": _places(world.places),
             "objects": objects,
             "facts": facts,
             "keep": [str(condition) for condition in keep],
@@ -93,10 +86,7 @@ def vocabulary_text(text: str, vocabulary: Vocabulary) -> str:
     """A sentence and the names that it may use, fenced."""
     return fenced(
         {
-            "places": [
-                {**_names(place.label, place.aliases), "place": name}
-                for name, place in vocabulary.places.items()
-            ],
+            "places": _places(vocabulary.places),
             "objects": [
                 {
                     **_names(thing.label, thing.aliases),
@@ -113,6 +103,10 @@ def vocabulary_text(text: str, vocabulary: Vocabulary) -> str:
             "sentence": text,
         }
     )
+
+
+def _places(places: Mapping[str, Place]) -> list[dict[str, Any]]:
+    return [{**_names(row.label, row.aliases), "place": name} for name, row in places.items()]
 
 
 def _names(label: str, aliases: tuple[str, ...]) -> dict[str, Any]:

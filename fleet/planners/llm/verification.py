@@ -2,39 +2,47 @@
 
 from __future__ import annotations
 
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import (
+    CheckedPlan,
+    InvalidPlan,
+    check_plan,
+)
 from fleet.core.model.world import WorldModel
 from fleet.core.schedule.actor_constraints import least_loaded
-from fleet.core.schedule.plan_schedule import best_schedule
+from fleet.scheduling.plan_schedule import AllocatedPlan
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 
-def violations_of(plan: Plan, world: WorldModel) -> tuple[Violation, ...]:
-    """What the checker says of a plan, or else why no allocation and schedule of it is found."""
+def verify(plan: Plan, world: WorldModel) -> CheckedPlan | InvalidPlan:
+    """The plan, if the checker passes it and some allocation of it can be scheduled."""
     if foreign := _foreign_goals(plan):
-        return foreign
+        return InvalidPlan(plan, world, foreign)
     checked = check_plan(plan, world)
-    if not checked.valid or not plan.tasks:
-        return checked.violations
-    allocation = least_loaded(plan, checked, world)
+    if isinstance(checked, InvalidPlan) or not plan.tasks:
+        return checked
+    allocation = least_loaded(checked)
     if allocation is None:
-        return (
-            Violation(
-                code="too-few-robots",
-                sentence="there are fewer able robots than the plan needs at the same time: "
-                "let the same actor do more of it",
-            ),
+        return _invalid(
+            checked,
+            "too-few-robots",
+            "there are fewer able robots than the plan needs at the same time: "
+            "let the same actor do more of it",
         )
-    found = best_schedule(plan, checked, allocation, world)
+    allocated = AllocatedPlan(checked, allocation)
+    found = next(allocated.schedules(), None)
     if found is None:
-        return (
-            Violation(
-                code="deadlock",
-                sentence="with the robots there are, some would wait for each other for ever: "
-                "let actors that meet do less in between",
-            ),
+        return _invalid(
+            checked,
+            "deadlock",
+            "with the robots there are, some would wait for each other for ever: "
+            "let actors that meet do less in between",
         )
-    return check_plan(plan, world, allocation, found.extra_after).violations
+    violations = allocated.violations(found)
+    return InvalidPlan(plan, world, violations) if violations else checked
+
+
+def _invalid(checked: CheckedPlan, code: str, sentence: str) -> InvalidPlan:
+    return InvalidPlan(checked.plan, checked.world, (Violation(code=code, sentence=sentence),))
 
 
 def _foreign_goals(plan: Plan) -> tuple[Violation, ...]:

@@ -1,4 +1,4 @@
-"""Strands: sequences of actions that make one condition true, or that look for what it needs."""
+"""Action sequences that reach one subgoal, or that look for what it needs."""
 
 from __future__ import annotations
 
@@ -8,27 +8,32 @@ from dataclasses import dataclass
 from msgspec.structs import replace
 
 from fleet.core.model.skills import Action
-from fleet.core.model.world import WorldModel
-from fleet.core.schedule.plan_schedule import predicted_duration_s
+from fleet.core.model.world import WorldModel, condition_holds
 from fleet.planners.base import PlanningProblem
-from fleet.planners.deordering import Strand
-from fleet.planners.symbolic.search import Facts, Found, cheapest, ground_actions, within_reach
+from fleet.planners.deordering import ActionSequence
+from fleet.planners.symbolic.search import (
+    Facts,
+    Solution,
+    ground_actions,
+    relaxed_reachable,
+    uniform_cost_search,
+)
 from keyexpr_schema.facts import AT, HELD, HOLDING, NOTHING, SEARCHED, FactKey, Value
 from keyexpr_schema.payloads.goals import Condition
 
 ALTERNATIVES = 4
-"""Different strands sought for each condition."""
+"""Different sequences sought for each condition."""
 UNLOADING_S = 30.0
 """What it counts for, in seconds, that an object ends in a basket and not on a table: somebody
 still has to take it out, which is about one more task for a hand."""
 MAX_OBJECTS = 8
-"""Objects looked at as possible tools where an aim cannot be reached without one."""
+"""Objects looked at as possible tools where a subgoal cannot be reached without one."""
 REUSE_CHARGE_S = 200.0
-"""What an action costs more for each strand that already uses it; more than any task takes."""
+"""What an action costs more for each sequence that already uses it; more than any task takes."""
 
 
 @dataclass(frozen=True)
-class Aim:
+class Subgoal:
     """One condition of one goal."""
 
     goal: str
@@ -43,80 +48,79 @@ class Aim:
 
 
 @dataclass(frozen=True)
-class Options:
-    """Strands to choose one of, the cheapest first, and the facts after that one."""
+class Alternatives:
+    """Action sequences to choose one of, the cheapest first, and the facts after that one."""
 
-    strands: tuple[Strand, ...]
+    sequences: tuple[ActionSequence, ...]
     facts: Facts
 
 
 @dataclass(frozen=True)
 class Exploration:
-    """Strands that are all needed to find one of `seeks`, and what they make true."""
+    """Action sequences that are all needed to find one of `seeks`, and what they make true."""
 
-    strands: tuple[Strand, ...]
+    sequences: tuple[ActionSequence, ...]
     conditions: tuple[Condition, ...]
     seeks: tuple[str, ...]
 
 
-def aims_in_order(problem: PlanningProblem) -> list[Aim]:
-    """Conditions still to be reached: first those whose object a hand holds already, last those
-    that leave an object in a hand.
+def subgoals_in_order(problem: PlanningProblem, facts: Mapping[FactKey, Value]) -> list[Subgoal]:
+    """Conditions that do not hold in `facts`: first those whose object a hand holds already, last
+    those that leave an object in a hand.
     """
-    world = problem.world
-    held = {world.value(HOLDING, robot) for robot in world.team}
-    aims = [
-        Aim(goal.goal, condition)
+    held = {facts.get(FactKey(HOLDING, robot)) for robot in problem.world.team}
+    subgoals = [
+        Subgoal(goal.goal, condition)
         for goal in sorted(problem.goals, key=lambda g: (-g.priority, g.ordinal, g.goal))
         for condition in goal.conditions
-        if not world.holds(condition)
+        if not condition_holds(facts, condition)
     ]
     return sorted(
-        aims,
-        key=lambda aim: (
-            aim.condition.relation == HELD,
-            held.isdisjoint(aim.condition.subjects),
+        subgoals,
+        key=lambda subgoal: (
+            subgoal.condition.relation == HELD,
+            held.isdisjoint(subgoal.condition.subjects),
         ),
     )
 
 
-def options_for(
-    aim: Aim, facts: Facts, world: WorldModel, settled: frozenset[str] = frozenset()
-) -> Options | None:
-    """Different strands for an aim, or `None` where there is none.
+def alternatives_for(
+    subgoal: Subgoal, facts: Facts, world: WorldModel, settled: frozenset[str] = frozenset()
+) -> Alternatives | None:
+    """Different sequences for a subgoal, or `None` where there is none.
 
     Where a robot stands is left open at the start, so that every actor begins with the way to its
     work, whatever its robot does before; `settled` robots are taken to be where `facts` say.
     """
     found = [
         (result, condition)
-        for condition in aim.subjects()
-        for result in _different(condition, facts, world, settled)
+        for condition in subgoal.subjects()
+        for result in _different_solutions(condition, facts, world, settled)
     ]
     if not found:
         return None
     found.sort(key=lambda pair: pair[0].cost_s + _unloading_s(pair[0], pair[1], world))
-    strands: dict[object, Strand] = {}
+    sequences: dict[object, ActionSequence] = {}
     for result, condition in found:
         # What rides in a basket already rides with a certain robot.
         rides_with = world.value(AT, condition.subject)
         spoken_of = (condition.subject, condition.value, rides_with)
         named = frozenset(robot for robot in world.robots if robot in spoken_of)
         content = tuple(_signature(action) for action in result.actions)
-        strands.setdefault(content, Strand(aim.goal, result.actions, named))
-    return Options(tuple(strands.values())[:ALTERNATIVES], found[0][0].facts)
+        sequences.setdefault(content, ActionSequence(subgoal.goal, result.actions, named))
+    return Alternatives(tuple(sequences.values())[:ALTERNATIVES], found[0][0].facts)
 
 
-def _unloading_s(found: Found, condition: Condition, world: WorldModel) -> float:
+def _unloading_s(found: Solution, condition: Condition, world: WorldModel) -> float:
     """The charge for an object that ends in a basket."""
     where = found.facts.get(FactKey(AT, condition.subject))
     wanted = where == condition.value or condition.relation == HELD
     return 0.0 if wanted or where not in world.robots else UNLOADING_S
 
 
-def _different(
+def _different_solutions(
     condition: Condition, facts: Facts, world: WorldModel, settled: frozenset[str]
-) -> list[Found]:
+) -> list[Solution]:
     """The cheapest sequence, and others made different by charging for what was used before."""
     subject = condition.subject
     robots = _representatives({subject, condition.value}, subject, facts, world)
@@ -155,9 +159,9 @@ def _cheapest_few(
     start: Facts,
     facts: Facts,
     world: WorldModel,
-) -> list[Found]:
+) -> list[Solution]:
     grounded = ground_actions(world, robots, objects, condition)
-    actions = within_reach(grounded, start, condition, world)
+    actions = relaxed_reachable(grounded, start, condition, world)
     if not actions:
         return []  # nothing that these objects are good for makes it true
     used: dict[tuple[str, tuple[str, ...]], int] = {}
@@ -172,14 +176,14 @@ def _cheapest_few(
         where = now.get(stands[number]) or facts.get(stands[number])
         cost = seconds.get((number, where))
         if cost is None:
-            cost = predicted_duration_s(action, where, action.actor, world)
+            cost = world.duration_s(action, where, action.actor)
             cost += REUSE_CHARGE_S * used.get(_signature(action), 0)
             seconds[number, where] = cost
         return cost
 
-    results: list[Found] = []
+    results: list[Solution] = []
     for _ in range(ALTERNATIVES):
-        found = cheapest(actions, start, condition, world, cost_s)
+        found = uniform_cost_search(actions, start, condition, world, cost_s)
         if found is None:
             break
         results.append(_with_true_cost(found, world, facts))
@@ -189,16 +193,16 @@ def _cheapest_few(
     return results
 
 
-def _with_true_cost(found: Found, world: WorldModel, facts: Facts) -> Found:
+def _with_true_cost(found: Solution, world: WorldModel, facts: Facts) -> Solution:
     """The same sequence with its true cost [s], without what was charged to make it different."""
     where: dict[str, Value] = {robot: facts.get(FactKey(AT, robot)) for robot in world.robots}
     seconds = 0.0
     for action in found.actions:
-        seconds += predicted_duration_s(action, where.get(action.actor), action.actor, world)
+        seconds += world.duration_s(action, where.get(action.actor), action.actor)
         for literal in action.after:
             if literal.variable == FactKey(AT, action.actor):
                 where[action.actor] = literal.value
-    return Found(found.actions, seconds, found.facts)
+    return Solution(found.actions, seconds, found.facts)
 
 
 def _signature(action: Action) -> tuple[str, tuple[str, ...]]:
@@ -220,8 +224,8 @@ def _representatives(named: Set[Value], subject: str, facts: Facts, world: World
     return sorted(kinds.values())
 
 
-def exploration_for(aims: Sequence[Aim], problem: PlanningProblem) -> Exploration | None:
-    """Looking around in every place where nobody has looked yet, for all that the aims lack.
+def exploration_for(subgoals: Sequence[Subgoal], problem: PlanningProblem) -> Exploration | None:
+    """Looking around in every place where nobody has looked yet, for all that the subgoals lack.
 
     `None` where nothing is left to look for, or nobody can look.
     """
@@ -229,23 +233,23 @@ def exploration_for(aims: Sequence[Aim], problem: PlanningProblem) -> Exploratio
     seeks = tuple(
         dict.fromkeys(
             subject
-            for aim in aims
-            for subject in aim.condition.subjects
+            for subgoal in subgoals
+            for subject in subgoal.condition.subjects
             if subject in world.objects and world.value(AT, subject) is None
         )
     )
     if not seeks:
         return None
     facts: Facts = dict(world.facts)
-    strands: list[Strand] = []
+    sequences: list[ActionSequence] = []
     conditions: list[Condition] = []
     for place in world.places:
         if place in problem.searched:
             continue
         facts[FactKey(SEARCHED, place)] = False
         condition = Condition(relation=SEARCHED, subject=place, value=True)
-        options = options_for(Aim(aims[0].goal, condition), facts, world)
-        if options is not None:
-            strands.append(options.strands[0])
+        found = alternatives_for(Subgoal(subgoals[0].goal, condition), facts, world)
+        if found is not None:
+            sequences.append(found.sequences[0])
             conditions.append(condition)
-    return Exploration(tuple(strands), tuple(conditions), seeks) if strands else None
+    return Exploration(tuple(sequences), tuple(conditions), seeks) if sequences else None

@@ -1,8 +1,7 @@
 """The symbolic planner: finds plans by search over skill models, with no network.
 
-Every condition of every goal becomes a strand: a sequence of actions that makes it true. Several
-different ones are sought (for instance one with a helper that carries), and chosen as the strategy
-says:
+Every condition of every goal is a subgoal. For each, several different action sequences that reach
+it are sought (for instance one with a helper that carries), and one is chosen as the strategy says:
 
 * `big-dag` chooses for all goals together, by the makespan that they lead to;
 * `per-goal` chooses for each goal alone, as if there were no other, and merges the results;
@@ -14,31 +13,40 @@ all robots that can, in parallel. What is found leads to the next revision.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from heapq import heapify, heappop, heappush
 from itertools import product
+from math import inf, prod
 
-from fleet.core.checker.plan_checker import check_plan
+from fleet.core.checker.checked_plan import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.model.world import WorldModel
 from fleet.core.schedule.actor_constraints import least_loaded
 from fleet.core.schedule.actor_order import carried_at_end
-from fleet.core.schedule.plan_schedule import valid_schedule
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
-from fleet.planners.deordering import Strand, tasks_from
+from fleet.planners.deordering import ActionSequence, deordered
 from fleet.planners.symbolic.action_sequences import (
     UNLOADING_S,
-    Aim,
     Exploration,
-    aims_in_order,
+    Subgoal,
+    alternatives_for,
     exploration_for,
-    options_for,
+    subgoals_in_order,
 )
 from fleet.planners.symbolic.search import Facts
+from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
 from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.plans import Plan
 
 BIG_DAG, PER_GOAL, MONOLITHIC = "big-dag", "per-goal", "monolithic"
 MAX_COMBINATIONS = 64
-"""Up to this many combinations are all tried; beyond, one strand is changed at a time."""
+"""Up to this many combinations are all compared; beyond, one sequence is changed at a time."""
+MAX_RESTORATIONS = 2
+"""How often what the sequences for later subgoals undid is reached again, where no plan does."""
+
+Choice = Sequence[ActionSequence]
+Cost = tuple[float, float]
+"""The makespan [s], with a charge for what is left in baskets, and the work of all robots [s]."""
 
 
 class SymbolicPlanner(Planner):
@@ -47,46 +55,71 @@ class SymbolicPlanner(Planner):
     name = "symbolic"
     strategies = (BIG_DAG, PER_GOAL, MONOLITHIC)
 
-    def _solve(self, problem: PlanningProblem) -> Plan | NoPlan:
+    def _solve(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
         world = problem.world
-        facts: Facts = dict(world.facts)
-        options: list[tuple[Strand, ...]] = []
-        unknown: list[Aim] = []
-        settled: set[str] = set()
-        for aim in aims_in_order(problem):
-            found = options_for(aim, facts, world, frozenset(settled))
-            if found is not None:
-                options.append(found.strands)
-                facts = found.facts
-                if problem.strategy == MONOLITHIC:
-                    for action in found.strands[0].actions:
-                        settled.update(action.participants)
-            elif _where_is_unknown(aim, facts, world):
-                unknown.append(aim)
-            else:
-                return NoPlan(_no_way(aim, world))
-        explored = exploration_for(unknown, problem) if unknown else None
-        if unknown and explored is None:
-            return NoPlan(_not_found(unknown[0], problem))
-        return _choose(problem, options, explored)
+        reached = _Reached(problem, dict(world.facts))
+        unlocated: list[Subgoal] = []
+        for subgoal in subgoals_in_order(problem, world.facts):
+            if reached.add(subgoal):
+                continue
+            if not _needs_locating(subgoal, reached.facts, world):
+                return NoPlan(_no_way(subgoal, world))
+            unlocated.append(subgoal)
+        explored = exploration_for(unlocated, problem) if unlocated else None
+        if unlocated and explored is None:
+            return NoPlan(_not_found(unlocated[0], problem))
+        made = _choose(problem, reached.options, explored)
+        for _ in range(MAX_RESTORATIONS):
+            undone = [s for s in subgoals_in_order(problem, reached.facts) if s not in unlocated]
+            if isinstance(made, CheckedPlan) or not (undone and all(map(reached.add, undone))):
+                break
+            restored = _choose(problem, reached.options, explored)
+            made = restored if isinstance(restored, CheckedPlan) else made
+        return made
 
 
-def _where_is_unknown(aim: Aim, facts: Facts, world: WorldModel) -> bool:
+@dataclass
+class _Reached:
+    """Action sequences for one subgoal after the other, and the facts after the cheapest of each.
+
+    Robots of a flat list are `settled`: they start from where the sequence before left them.
+    """
+
+    problem: PlanningProblem
+    facts: Facts
+    options: list[Choice] = field(default_factory=list)
+    settled: set[str] = field(default_factory=set)
+
+    def add(self, subgoal: Subgoal) -> bool:
+        """Find sequences that reach one more subgoal; whether there are any."""
+        settled = frozenset(self.settled)
+        found = alternatives_for(subgoal, self.facts, self.problem.world, settled)
+        if found is None:
+            return False
+        self.options.append(found.sequences)
+        self.facts = found.facts
+        if self.problem.strategy == MONOLITHIC:
+            for action in found.sequences[0].actions:
+                self.settled.update(action.participants)
+        return True
+
+
+def _needs_locating(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
     return any(
         subject in world.objects and facts.get(FactKey(AT, subject)) is None
-        for subject in aim.condition.subjects
+        for subject in subgoal.condition.subjects
     )
 
 
-def _no_way(aim: Aim, world: WorldModel) -> str:
+def _no_way(subgoal: Subgoal, world: WorldModel) -> str:
     return (
         f"no sequence of skills of the connected robots ({', '.join(world.team)}) "
-        f"leads to {aim.condition}"
+        f"leads to {subgoal.condition}"
     )
 
 
-def _not_found(aim: Aim, problem: PlanningProblem) -> str:
-    things = " or ".join(aim.condition.subjects)
+def _not_found(subgoal: Subgoal, problem: PlanningProblem) -> str:
+    things = " or ".join(subgoal.condition.subjects)
     if problem.searched:
         places = ", ".join(sorted(problem.searched))
         return f"nobody knows where {things} is; looked for in {places}, and not found"
@@ -96,109 +129,160 @@ def _not_found(aim: Aim, problem: PlanningProblem) -> str:
     )
 
 
+@dataclass(frozen=True)
+class _Candidate:
+    """A valid plan for a choice of sequences, and what it costs.
+
+    `allocation` gives each actor the able robot with the least to do. Until `verified`, the cost is
+    that of the shortest schedule, which may not pass the checker with robots for actors.
+    """
+
+    choice: Choice
+    checked: CheckedPlan
+    allocation: Mapping[str, str]
+    cost: Cost
+    verified: bool = False
+
+    def verify(self) -> _Candidate | NoPlan:
+        """The candidate with the cost of its shortest schedule that passes the checker."""
+        found = AllocatedPlan(self.checked, self.allocation).valid_schedule()
+        if isinstance(found, tuple):
+            return NoPlan(found[0].sentence, found)
+        return replace(self, cost=_cost(found, self.checked), verified=True)
+
+
+def _cost(schedule: PlanSchedule, checked: CheckedPlan) -> Cost:
+    unloading_s = UNLOADING_S * len(carried_at_end(checked))
+    return round(schedule.makespan_s + unloading_s, 3), schedule.work_s
+
+
 def _choose(
-    problem: PlanningProblem, options: Sequence[Sequence[Strand]], explored: Exploration | None
-) -> Plan | NoPlan:
+    problem: PlanningProblem, options: Sequence[Choice], explored: Exploration | None
+) -> CheckedPlan | NoPlan:
     if problem.strategy == MONOLITHIC:
-        return _checked(problem, [strands[0] for strands in options], explored)
+        return _plan_of(problem, [alternatives[0] for alternatives in options], explored)
     if problem.strategy == PER_GOAL:
-        choice: list[Strand] = []
-        for goal in dict.fromkeys(strands[0].goal for strands in options):
-            mine = [strands for strands in options if strands[0].goal == goal]
+        choice: list[ActionSequence] = []
+        for goal in dict.fromkeys(alternatives[0].goal for alternatives in options):
+            mine = [alternatives for alternatives in options if alternatives[0].goal == goal]
             alone = _best(problem, mine, None)
             if isinstance(alone, NoPlan):
                 break
-            choice.extend(alone)
+            choice.extend(alone.choice)
         else:
-            merged = _checked(problem, choice, explored)
-            if isinstance(merged, Plan):
+            merged = _plan_of(problem, choice, explored)
+            if isinstance(merged, CheckedPlan):
                 return merged
         # What is best for each goal alone does not fit together, as where two want one helper.
     best = _best(problem, options, explored)
-    return best if isinstance(best, NoPlan) else _plan(problem, best, explored)
+    return best if isinstance(best, NoPlan) else best.checked
 
 
-def _checked(
-    problem: PlanningProblem, choice: Sequence[Strand], explored: Exploration | None
-) -> Plan | NoPlan:
-    plan = _plan(problem, choice, explored)
-    value = _evaluate(plan, problem.world)
-    return value if isinstance(value, NoPlan) else plan
+def _plan_of(
+    problem: PlanningProblem, choice: Choice, explored: Exploration | None
+) -> CheckedPlan | NoPlan:
+    """The plan of one choice, if it can be allocated."""
+    candidate = _candidate(problem, choice, explored)
+    verified = candidate if isinstance(candidate, NoPlan) else candidate.verify()
+    return verified if isinstance(verified, NoPlan) else verified.checked
 
 
 def _best(
-    problem: PlanningProblem,
-    options: Sequence[Sequence[Strand]],
-    explored: Exploration | None,
-) -> list[Strand] | NoPlan:
-    """One strand of each, so that the makespan is small."""
-    best: tuple[tuple[float, float], list[Strand]] | None = None
+    problem: PlanningProblem, options: Sequence[Choice], explored: Exploration | None
+) -> _Candidate | NoPlan:
+    """The cheapest candidate; of few combinations the cheapest of all."""
+
+    def candidate(choice: Choice) -> _Candidate | NoPlan:
+        return _candidate(problem, choice, explored)
+
+    if prod(map(len, options)) <= MAX_COMBINATIONS:
+        return _cheapest([candidate(choice) for choice in product(*options)])
+    return _hill_climbed(options, candidate)
+
+
+def _cheapest(candidates: Sequence[_Candidate | NoPlan]) -> _Candidate | NoPlan:
+    """The cheapest that can be verified, the first of equals; or why the first one cannot be.
+
+    Verifying does not make a plan cheaper, so only those that look cheapest are verified.
+    """
+    open_: dict[int, _Candidate] = {}
+    failed: dict[int, NoPlan] = {}
+    for number, candidate in enumerate(candidates):
+        if isinstance(candidate, NoPlan):
+            failed[number] = candidate
+        else:
+            open_[number] = candidate
+    queue = [(candidate.cost, number) for number, candidate in open_.items()]
+    heapify(queue)
+    while queue:
+        _, number = heappop(queue)
+        if open_[number].verified:
+            return open_[number]
+        verified = open_[number].verify()
+        if isinstance(verified, NoPlan):
+            failed[number] = verified
+        else:
+            open_[number] = verified
+            heappush(queue, (verified.cost, number))
+    return failed[min(failed)]
+
+
+def _hill_climbed(
+    options: Sequence[Choice], candidate: Callable[[Choice], _Candidate | NoPlan]
+) -> _Candidate | NoPlan:
+    """From the cheapest sequence of each, one is changed at a time for as long as that helps."""
+    best: _Candidate | None = None
     failure: NoPlan | None = None
 
-    def consider(choice: Sequence[Strand]) -> bool:
+    def better(choice: Choice) -> bool:
         nonlocal best, failure
-        value = _evaluate(_plan(problem, choice, explored), problem.world)
-        if isinstance(value, NoPlan):
-            failure = failure or value
-            return False
-        if best is None or value < best[0]:
-            best = value, list(choice)
+        found = candidate(choice)
+        if isinstance(found, _Candidate):
+            if best is not None and found.cost >= best.cost:
+                return False
+            found = found.verify()
+        if isinstance(found, NoPlan):
+            failure = failure or found
+        elif best is None or found.cost < best.cost:
+            best = found
             return True
         return False
 
-    combinations = 1
-    for strands in options:
-        combinations *= len(strands)
-    if combinations <= MAX_COMBINATIONS:
-        for choice in product(*options):
-            consider(choice)
-    else:
-        _change_one_at_a_time(options, consider)
-    if best is not None:
-        return best[1]
-    return failure or NoPlan("no combination of action sequences passes the checker")
-
-
-def _change_one_at_a_time(
-    options: Sequence[Sequence[Strand]], consider: Callable[[Sequence[Strand]], bool]
-) -> None:
-    current = [strands[0] for strands in options]
-    consider(current)
+    current = [alternatives[0] for alternatives in options]
+    better(current)
     improved = True
     while improved:
         improved = False
-        for place, strands in enumerate(options):
-            for strand in strands:
-                changed = [*current[:place], strand, *current[place + 1 :]]
-                if changed != current and consider(changed):
+        for number, alternatives in enumerate(options):
+            for sequence in alternatives:
+                changed = [*current[:number], sequence, *current[number + 1 :]]
+                if changed != current and better(changed):
                     current, improved = changed, True
+    return best or failure or NoPlan("no combination of action sequences passes the checker")
 
 
-def _evaluate(plan: Plan, world: WorldModel) -> tuple[float, float] | NoPlan:
-    """How good the plan is, less is better: its makespan [s], with a charge for what is left in
-    baskets, and its work [s], if each actor takes the able robot with the least to do.
-    """
-    checked = check_plan(plan, world)
-    if not checked.valid:
+def _candidate(
+    problem: PlanningProblem, choice: Choice, explored: Exploration | None
+) -> _Candidate | NoPlan:
+    checked = check_plan(_plan(problem, choice, explored), problem.world)
+    if isinstance(checked, InvalidPlan):
         return NoPlan(checked.violations[0].sentence, checked.violations)
-    allocation = least_loaded(plan, checked, world)
+    allocation = least_loaded(checked)
     if allocation is None:
         return NoPlan("there are fewer robots than the plan needs at the same time")
-    found = valid_schedule(plan, checked, allocation, world)
-    if isinstance(found, tuple):
-        return NoPlan(found[0].sentence, found)
-    unloading_s = UNLOADING_S * len(carried_at_end(checked))
-    return round(found.makespan_s + unloading_s, 3), found.work_s
+    schedule = next(AllocatedPlan(checked, allocation).schedules(), None)
+    cost = (inf, inf) if schedule is None else _cost(schedule, checked)
+    return _Candidate(choice, checked, allocation, cost)
 
 
-def _plan(problem: PlanningProblem, choice: Sequence[Strand], explored: Exploration | None) -> Plan:
-    """The plan of these strands; it promises the conditions of goals that it has strands for."""
-    strands = [*choice, *(explored.strands if explored else ())]
-    tasks, pins = tasks_from(
-        strands, problem.first_task, one_actor_each=problem.strategy == MONOLITHIC
+def _plan(problem: PlanningProblem, choice: Choice, explored: Exploration | None) -> Plan:
+    """The plan of these sequences; it promises the conditions of goals that have one."""
+    sequences = [*choice, *(explored.sequences if explored else ())]
+    tasks, pins = deordered(
+        sequences, problem.first_task, one_actor_each=problem.strategy == MONOLITHIC
     )
     seeks = frozenset(explored.seeks if explored else ())
-    served = {strand.goal for strand in choice}
+    served = {sequence.goal for sequence in choice}
     conditions = tuple(
         condition
         for goal in problem.goals

@@ -1,4 +1,4 @@
-"""Cheapest sequence of ground actions to a condition: A* over the variables that matter.
+"""The cheapest sequence of ground actions to a condition, by uniform-cost search (Dijkstra 1959).
 
 State variables that no relevant action writes keep their value and are left out of the state.
 """
@@ -10,14 +10,9 @@ from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count, product
 
+from fleet.core.model.preconditions import applicable
 from fleet.core.model.skills import Action
-from fleet.core.model.world import (
-    WorldModel,
-    condition_holds,
-    first_unmet,
-    known_value,
-    room_left,
-)
+from fleet.core.model.world import WorldModel, condition_holds, known_value
 from keyexpr_schema.facts import AT, HELD, HOLDING, LOCATED, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 
@@ -30,7 +25,7 @@ Facts = dict[FactKey, Value]
 
 
 @dataclass(frozen=True)
-class Found:
+class Solution:
     """A sequence of actions, its cost [s], and the facts it leads to."""
 
     actions: tuple[Action, ...]
@@ -131,7 +126,7 @@ def _making_room(action: Action, makers: Mapping[Literal, list[int]]) -> list[Li
     ]
 
 
-def within_reach(
+def relaxed_reachable(
     actions: Iterable[Action], start: Facts, goal: Condition, world: WorldModel
 ) -> tuple[Action, ...]:
     """Those actions that can ever be done from `start`; none if the goal is out of reach for them.
@@ -180,13 +175,13 @@ def _may_hold_for(
     )
 
 
-def cheapest(
+def uniform_cost_search(
     actions: Iterable[Action],
     start: Facts,
     goal: Condition,
     world: WorldModel,
     cost_s: Callable[[Action, Mapping[FactKey, Value]], float],
-) -> Found | None:
+) -> Solution | None:
     """The cheapest sequence of `actions` from `start` to a state in which `goal` holds."""
     actions = tuple(actions)
     variables = tuple(
@@ -219,7 +214,7 @@ def cheapest(
         closed.add(state)
         facts = {**start, **dict(zip(variables, state, strict=True))}
         if condition_holds(facts, goal):
-            return Found(_path(state, came), spent, facts)
+            return Solution(_path(state, came), spent, facts)
         for action, needs in moves:
             if not all(state[i] == value for i, value in needs):
                 continue
@@ -235,13 +230,6 @@ def cheapest(
                 came[reached] = state, action
                 heappush(queue, (total, next(ticket), reached))
     return None
-
-
-def applicable(action: Action, facts: Mapping[FactKey, Value], world: WorldModel) -> bool:
-    """Whether the action's preconditions hold in `facts`, room in baskets included."""
-    return first_unmet(action, facts, world) is None and all(
-        room_left(carrier, facts, world) > 0 for carrier in action.space_in
-    )
 
 
 def _path(

@@ -9,7 +9,7 @@ from keyexpr_schema.facts import render_value
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus
 from keyexpr_schema.payloads.robots import RobotActivity, RobotSpec, RobotState
-from keyexpr_schema.payloads.service import Reject
+from keyexpr_schema.payloads.service import UndecodableValue
 from keyexpr_schema.payloads.simulation import Truth
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskRecord, TaskState, Try
 from keyexpr_schema.payloads.world import Fact
@@ -160,7 +160,7 @@ def truth(now: Truth, before: Truth | None) -> Iterator[Line]:
     )
 
 
-def reject(now: Reject, before: Reject | None) -> Iterator[Line]:
+def reject(now: UndecodableValue, before: UndecodableValue | None) -> Iterator[Line]:
     """A value could not be read."""
     if before is None or before.reason != now.reason:
         yield ERROR, f"{now.component} could not read {now.keyexpr}: {now.reason}"

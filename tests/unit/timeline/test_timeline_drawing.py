@@ -17,7 +17,7 @@ from fleet.timeline.drawing.sink import Sink, open_stream
 from fleet.timeline.drawing.text import DRAWN, drawable
 from fleet.timeline.drawing.trails import CORNERS, Trail
 from fleet.timeline.drawing.utilisation import Utilisation
-from fleet.timeline.read import rows
+from fleet.timeline.reader import rows
 from keyexpr_schema.payloads.tasks import TaskState
 from tests.timeline_mission import STEPS, record
 

@@ -10,12 +10,12 @@ import pytest
 
 from fleet.timeline.drawing.sink import open_stream
 from fleet.timeline.errors import UnreadableRecording, UnwritableRecording
-from fleet.timeline.read import rows, summary
+from fleet.timeline.reader import rows, summary
 from fleet.timeline.recorder import Recorder
 from keyexpr_schema import keyspace as keys
 from keyexpr_schema.payloads.plans import PlanAddress
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
-from keyexpr_schema.payloads.service import Reject, RejectAddress
+from keyexpr_schema.payloads.service import UndecodableAddress, UndecodableValue
 from keyexpr_schema.payloads.simulation import Frame, Frames, SimAddress, SimClock
 from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState, TaskAddress, TaskState
 from keyexpr_schema.payloads.world import Fact, FactAddress
@@ -281,9 +281,9 @@ def test_odd_orders_are_drawn_as_far_as_they_can_be(tmp_path: Path) -> None:
             37.0,
         ),
         put(
-            keys.REJECT,
-            RejectAddress(component="planner", digest="d"),
-            Reject(component="planner", keyexpr="goals/x/spec", reason="it is no goal"),
+            keys.UNDECODABLE,
+            UndecodableAddress(component="planner", digest="d"),
+            UndecodableValue(component="planner", keyexpr="goals/x/spec", reason="it is no goal"),
             38.0,
         ),
         put(keys.SIM_CLOCK, SimAddress(), restarted, 39.0),

@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from keyexpr_schema.errors import NoAnswer
+from keyexpr_schema.errors import NoReply
 from keyexpr_schema.payloads.tasks import ReportState
 from workers.errors import SkillFailed
 from workers.retry import AttemptResult, run_attempt
@@ -144,7 +144,7 @@ async def test_a_driver_that_does_not_answer_is_tried_again() -> None:
     bench = Bench()
 
     async def once() -> None:
-        raise NoAnswer("nobody serves sim/robots/hsr/motion")
+        raise NoReply("nobody serves sim/robots/hsr/motion")
 
     ended = await bench.run(once)
     assert len(ended.tries) == 3 and ended.retryable

@@ -10,7 +10,7 @@ from keyexpr_schema.payloads.world import Object, ObjectAddress, Place, PlaceAdd
 from keyexpr_schema.transport.session import Change
 from workers.context import SkillContext
 from workers.errors import BadArguments, BadSkill, UnknownSkill
-from workers.skill import ParameterKind, Skill, SkillRegistry, skill
+from workers.skill_registry import ParameterKind, Skill, SkillRegistry, skill
 from workers.skills.household import HOUSEHOLD
 from workers.world_cache import WorldCache
 
@@ -118,7 +118,7 @@ def test_installed_skills_come_from_entry_points_and_broken_ones_are_left_out(
 ) -> None:
     site = tmp_path_factory.mktemp("site")
     (site / "their_skills.py").write_text(
-        "from workers.skill import skill\n"
+        "from workers.skill_registry import skill\n"
         "@skill('wave')\n"
         "async def wave(ctx):\n"
         "    '''Wave.'''\n"

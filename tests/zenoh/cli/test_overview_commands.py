@@ -16,11 +16,11 @@ import zenoh
 from keyexpr_schema.keyspace import (
     GOAL_SPEC,
     GOAL_STATUS,
-    REJECT,
+    UNDECODABLE,
 )
 from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState, GoalStatus
+from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from keyexpr_schema.transport.wire import zenoh_config
 from tests.robotctl import Robotctl
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -65,10 +65,10 @@ async def test_status_tells_what_is_unreadable_as_long_as_it_is(
             foreign.put("goals/g1/spec", b"{}")
             foreign.put("goals/g2/spec", b"{}")
             foreign.put("planner/status", b"nonsense")
-        async with session.watch(GOAL_SPEC, REJECT) as watch:
+        async with session.watch(GOAL_SPEC, UNDECODABLE) as watch:
             seen: set[str] = set()
             async for change in watch:
-                if change.key is REJECT and change.value is not None:
+                if change.key is UNDECODABLE and change.value is not None:
                     seen.add(change.value.keyexpr)
                 if {"goals/g1/spec", "goals/g2/spec"} <= seen:
                     break

@@ -1,0 +1,163 @@
+"""The plan checker: every plan passes through it, whoever made it, and `CheckedPlan` is the proof.
+
+It is exact for the conditions it knows: a plan passes if and only if every precondition of every
+task holds in every order that the DAG allows. For ground plans that is decided variable by
+variable (the modal truth criterion, Chapman 1987): a condition holds before a task if something
+necessarily before it establishes it and every task that could undo it comes later, or is followed,
+still before the task, by one that restores it. Counts (room in a basket) are checked against the
+worst order.
+
+Robots are actors until the plan is allocated. What an actor's first tasks need of it and nothing
+in the plan provides (an empty hand, a cup already in it) becomes a *requirement* on the robot that
+will be it. The same check on the allocated plan takes robots for actors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+import msgspec
+
+from fleet.core.checker.actor_requirements import Candidates, Left, Requirement
+from fleet.core.checker.causality import Causality
+from fleet.core.checker.form import PlanForm
+from fleet.core.model.skills import Action
+from fleet.core.model.task_graph import Cycle, TaskGraph
+from fleet.core.model.world import WorldModel
+from keyexpr_schema.facts import Value
+from keyexpr_schema.ids import actor_arg, actor_in
+from keyexpr_schema.payloads.plans import Making, Plan, Violation
+
+
+@dataclass(frozen=True)
+class CheckedPlan:
+    """A plan that is valid in `world`, with what its check found; `check_plan` alone makes one.
+
+    `actions` are by task. By actor, `requirements` say what it needs of its robot, and `able` which
+    robots of the team can be it.
+    """
+
+    plan: Plan
+    world: WorldModel
+    graph: TaskGraph
+    actions: Mapping[str, Action]
+    requirements: Mapping[str, Requirement]
+    able: Mapping[str, tuple[str, ...]]
+    violations: ClassVar[tuple[Violation, ...]] = ()
+
+    def made_by(self, making: Making, strategy: str) -> CheckedPlan:
+        """The same plan, saying how it was made; no check depends on that."""
+        return replace(
+            self, plan=msgspec.structs.replace(self.plan, making=making, strategy=strategy)
+        )
+
+
+@dataclass(frozen=True)
+class InvalidPlan:
+    """Why a plan is not valid in `world`; `violations` has at least one reason.
+
+    `graph`, `actions` and `able` are there if the plan's form is right; see `CheckedPlan`.
+    """
+
+    plan: Plan
+    world: WorldModel
+    violations: tuple[Violation, ...]
+    graph: TaskGraph | None = None
+    actions: Mapping[str, Action] = field(default_factory=dict)
+    able: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+def check_plan(plan: Plan, world: WorldModel) -> CheckedPlan | InvalidPlan:
+    """Check a plan whose robots are still actors."""
+    read = _read(plan, world)
+    if isinstance(read, InvalidPlan):
+        return read
+    graph, actions = read
+    causality = Causality(plan, world, graph, actions)
+    causality.check()
+    for pinned, robot in plan.pins.items():
+        causality.requirements[actor_arg(pinned)].pinned_to = robot
+    requirements = {
+        actor: each
+        for name, each in causality.requirements.items()
+        if (actor := actor_in(name)) is not None
+    }
+    candidates = Candidates(requirements, _leaves(graph, actions), world)
+    violations = (*causality.violations, *_actors_without_robot(candidates))
+    able = {actor: candidates.able[actor] for actor in plan.actors}
+    if violations:
+        return InvalidPlan(plan, world, violations, graph, actions, able)
+    return CheckedPlan(plan, world, graph, actions, requirements, able)
+
+
+def check_allocation(
+    plan: Plan,
+    world: WorldModel,
+    allocation: Mapping[str, str],
+    extra_after: Mapping[str, Iterable[str]] | None = None,
+) -> tuple[Violation, ...]:
+    """What speaks against a plan with actors bound to robots; nothing if it is valid so.
+
+    `extra_after` adds dependencies: task to tasks that it also waits for.
+    """
+    read = _read(plan, world, allocation, extra_after or {})
+    if isinstance(read, InvalidPlan):
+        return read.violations
+    graph, actions = read
+    causality = Causality(plan, world, graph, actions)
+    causality.check()
+    return (*causality.violations, *_unable_robots(plan, allocation, actions, world))
+
+
+def _read(
+    plan: Plan,
+    world: WorldModel,
+    allocation: Mapping[str, str] | None = None,
+    extra_after: Mapping[str, Iterable[str]] = {},
+) -> tuple[TaskGraph, dict[str, Action]] | InvalidPlan:
+    """The plan's graph and ground actions, if its form is right."""
+    form = PlanForm(plan, world, allocation)
+    if form.violations:
+        return InvalidPlan(plan, world, tuple(form.violations))
+    after = {task.task: {*task.after, *extra_after.get(task.task, ())} for task in plan.tasks}
+    try:
+        return TaskGraph(after), form.actions
+    except Cycle as cycle:
+        sentence = f"tasks {', '.join(cycle.tasks)} wait for each other in a circle"
+        violation = Violation(code="cycle", sentence=sentence, task=cycle.tasks[0])
+        return InvalidPlan(plan, world, (violation,))
+
+
+def _leaves(graph: TaskGraph, actions: Mapping[str, Action]) -> dict[str, frozenset[Left]]:
+    """What each actor leaves of its robot: its tasks have an order, and the last one holds."""
+    last: dict[str, dict[str, Value]] = {}
+    for task in graph.order:
+        for variable, value in actions[task].after:
+            if (actor := actor_in(variable.subject)) is not None:
+                last.setdefault(actor, {})[variable.relation] = value
+    return {actor: frozenset(rows.items()) for actor, rows in last.items()}
+
+
+def _actors_without_robot(candidates: Candidates) -> Iterable[Violation]:
+    for actor, able in candidates.able.items():
+        if not able:
+            reasons = "; ".join(dict.fromkeys(candidates.reasons(actor)))
+            sentence = f"no robot can be actor {actor}: {reasons or 'no robot is connected'}"
+            yield Violation(code="no-robot", sentence=sentence)
+
+
+def _unable_robots(
+    plan: Plan, allocation: Mapping[str, str], actions: Mapping[str, Action], world: WorldModel
+) -> Iterable[Violation]:
+    for actor, robot in plan.pins.items():
+        if allocation.get(actor) != robot:
+            yield Violation(
+                code="no-robot",
+                sentence=f"actor {actor} must be {robot}, and is {allocation.get(actor)}",
+            )
+    for task, action in actions.items():
+        for parameter in action.skill.robot_parameters:
+            if reason := world.lacks(action.args[parameter], action, parameter):
+                yield Violation(code="no-robot", sentence=f"{task}: {reason}", task=task)

@@ -1,0 +1,66 @@
+"""How long a search may go on, by a clock that is given: seconds, or steps that are the same
+everywhere.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+Clock = Callable[[], float]
+"""Seconds since some moment."""
+
+
+class StepClock:
+    """A clock that goes on by `step_s` each time it is read, and stands still otherwise.
+
+    Searches read their clock every so many iterations, so that with this one their results do not
+    depend on the machine.
+    """
+
+    def __init__(self, step_s: float = 2.0**-8) -> None:
+        """A power of two adds up without rounding, whenever a budget begins."""
+        self._step_s = step_s
+        self._now_s = 0.0
+
+    def __call__(self) -> float:
+        """The next step."""
+        self._now_s += self._step_s
+        return self._now_s
+
+
+class TimeBudget:
+    """So many seconds by `clock`, from now on."""
+
+    def __init__(self, seconds: float, clock: Clock = time.perf_counter) -> None:
+        self._seconds = seconds
+        self._clock = clock
+        self._began_s = clock()
+
+    @property
+    def spent(self) -> float:
+        """The share that is used up: 1 or more when it is over."""
+        if self._seconds <= 0.0:
+            return 1.0
+        return (self._clock() - self._began_s) / self._seconds
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing is left."""
+        return self.spent >= 1.0
+
+    @property
+    def left_s(self) -> float:
+        """What is left, s."""
+        return max(0.0, self._seconds * (1.0 - self.spent))
+
+    def until(self, share: float) -> TimeBudget:
+        """The same budget, over as soon as `share` of it is spent."""
+        part = TimeBudget(share * self._seconds, self._clock)
+        part._began_s = self._began_s
+        return part
+
+    def part(self, share: float, least_s: float = 0.0) -> TimeBudget:
+        """From now on, `share` of what is left, and no less than `least_s` where so much is."""
+        left_s = self.left_s
+        return TimeBudget(min(max(share * left_s, least_s), left_s), self._clock)

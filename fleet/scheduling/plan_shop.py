@@ -1,0 +1,227 @@
+"""A plan and a fleet as a shop: tasks are operations, actors blocks, robots machines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import inf
+
+from fleet.core.checker.checked_plan import CheckedPlan
+from fleet.core.model.skills import Action
+from fleet.core.model.task_graph import TaskGraph
+from fleet.core.model.world import WorldModel
+from fleet.core.schedule.actor_order import carried_at_end, first_actors
+from fleet.jobshop.problem import Block, Machine, Operation, Position, Shop
+from keyexpr_schema.facts import AT, FactKey, Value
+from keyexpr_schema.ids import actor_arg
+from keyexpr_schema.payloads.plans import Plan
+
+MOST_PRIORITY = 8
+"""Priorities beyond this count as this: weights double with each step."""
+ANYWHERE = 0
+"""The site that stands for wherever a robot may be."""
+ANY = Position.ANYWHERE
+
+
+@dataclass(frozen=True)
+class AllocationContext:
+    """What counts in an allocation besides plan and world.
+
+    `ready_s` says from when on a robot is free [s from now]; `priority` of a goal decides between
+    equal makespans (each step up counts twice); `due_s` says when a goal should be done
+    [s from now]. `home` is the robot of each actor in the plan that this is the rest of, and
+    `sequence` the order in which they were to begin: few actors should change hands. Actors that
+    are `under_way` go on at once.
+    """
+
+    ready_s: Mapping[str, float] = field(default_factory=dict)
+    priority: Mapping[str, int] = field(default_factory=dict)
+    due_s: Mapping[str, float] = field(default_factory=dict)
+    home: Mapping[str, str] = field(default_factory=dict)
+    sequence: tuple[str, ...] = ()
+    under_way: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class PlanShop:
+    """The shop, with the names of its blocks, machines and operations."""
+
+    shop: Shop
+    actors: tuple[str, ...]
+    """Of each block; robots that the plan names itself have a block of their own behind these."""
+    robots: tuple[str, ...]
+    tasks: tuple[str, ...]
+
+    def actors_only(self) -> PlanShop:
+        """The same, but robots that the plan names take part in any number of tasks at once, and
+        any actor may come first or last."""
+        count, shop = len(self.actors), self.shop
+        if len(shop.blocks) == count and all(b.position == ANY for b in shop.blocks):
+            return self
+        blocks = tuple(replace(block, position=ANY) for block in shop.blocks[:count])
+        operations = tuple(
+            replace(operation, blocks=tuple(b for b in operation.blocks if b < count))
+            for operation in shop.operations
+        )
+        return replace(self, shop=replace(shop, blocks=blocks, operations=operations))
+
+
+def plan_shop(
+    checked: CheckedPlan,
+    able: Mapping[str, Sequence[str]],
+    apart: frozenset[tuple[str, str]] = frozenset(),
+    context: AllocationContext | None = None,
+) -> PlanShop:
+    """The plan in numbers. Durations are the skill models', at each kind of robot's speed.
+
+    `able` has the robots that each actor may be, `apart` the pairs that must be different ones.
+
+    Raises:
+        BadShop: some actor has no robot that can be it.
+    """
+    context = context or AllocationContext()
+    world, graph = checked.world, checked.graph
+    robots = tuple(world.team)
+    block_of = {actor_arg(actor): i for i, actor in enumerate(able)}
+    number = {task: i for i, task in enumerate(graph.order)}
+    numbers = _Numbers(world, robots)
+    weights, dues_s = _weights_and_dues(checked.plan, graph, context)
+    operations: list[Operation] = []
+    members: list[list[int]] = [[] for _ in able]
+    for i, task in enumerate(graph.order):
+        action = checked.actions[task]
+        blocks: dict[int, None] = {}
+        for participant in action.participants:
+            if participant not in block_of:
+                block_of[participant] = len(members)
+                members.append([])
+            blocks[block_of[participant]] = None
+        for block in blocks:
+            members[block].append(i)
+        target, arrives = numbers.sites(action)
+        operations.append(
+            Operation(
+                blocks=tuple(blocks),
+                duration_s=numbers.durations_s(action),
+                after=tuple(sorted(number[before] for before in graph.predecessors[task])),
+                target=target,
+                arrives=arrives,
+                weight=weights.get(task, 0.0),
+                due_s=dues_s.get(task, inf),
+            )
+        )
+    machine = {robot: i for i, robot in enumerate(robots)}
+    able_of = {actor_arg(actor): rows for actor, rows in able.items()}
+    positions = _positions(checked, able, context)
+    kept_apart: dict[str, set[int]] = {}
+    for pair in apart:
+        one, other = map(actor_arg, pair)
+        if one in block_of and other in block_of:
+            kept_apart.setdefault(one, set()).add(block_of[other])
+            kept_apart.setdefault(other, set()).add(block_of[one])
+    blocks_ = tuple(
+        Block(
+            operations=tuple(members[block]),
+            machines=tuple(machine[robot] for robot in able_of.get(name, (name,))),
+            position=positions.get(name, ANY),
+            apart=frozenset(kept_apart.get(name, ())),
+        )
+        for name, block in block_of.items()
+    )
+    machines = tuple(
+        Machine(numbers.kind_of[r], numbers.site(world.value(AT, r)), context.ready_s.get(r, 0.0))
+        for r in robots
+    )
+    shop = Shop(tuple(operations), blocks_, machines, numbers.travel_s())
+    return PlanShop(shop, tuple(able), robots, graph.order)
+
+
+class _Numbers:
+    """Kinds of robots, sites, and how long things take."""
+
+    def __init__(self, world: WorldModel, robots: tuple[str, ...]) -> None:
+        self._world = world
+        kinds: dict[tuple[str, float | None], int] = {}
+        self.kind_of = {}
+        self._samples: list[str] = []
+        for robot in robots:
+            # What a robot's durations depend on; the first of a kind stands for all.
+            what = (world.robots[robot].model, world.capability(robot, "drive"))
+            if what not in kinds:
+                kinds[what] = len(kinds)
+                self._samples.append(robot)
+            self.kind_of[robot] = kinds[what]
+        self._sites: dict[Value, int] = {None: ANYWHERE}
+        """Those that the plan or a robot is at; `travel_s` is for these."""
+        self._durations_s: dict[str, tuple[float, ...]] = {}
+
+    def site(self, place: Value) -> int:
+        """Its number."""
+        if place not in self._world.places:
+            return ANYWHERE
+        return self._sites.setdefault(place, len(self._sites))
+
+    def sites(self, action: Action) -> tuple[int | None, int | None]:
+        """Where the action's robot drives first, and where it is afterwards, if that is said."""
+        travel_to = action.skill.travel_to
+        target = ANYWHERE if travel_to is None else self.site(action.args[travel_to])
+        place = FactKey(AT, action.actor)
+        moved = [value for variable, value in action.after if variable == place]
+        return target or None, self.site(moved[-1]) if moved else None
+
+    def durations_s(self, action: Action) -> tuple[float, ...]:
+        """By kind of robot, without the travel."""
+        skill = action.skill
+        if skill.name not in self._durations_s:
+            self._durations_s[skill.name] = tuple(
+                self._world.work_s(robot, skill) for robot in self._samples
+            )
+        return self._durations_s[skill.name]
+
+    def travel_s(self) -> tuple[tuple[tuple[float, ...], ...], ...]:
+        """By kind, origin and target."""
+        return tuple(
+            tuple(
+                tuple(
+                    self._world.travel_s(robot, origin, target) if isinstance(target, str) else 0.0
+                    for target in self._sites
+                )
+                for origin in self._sites
+            )
+            for robot in self._samples
+        )
+
+
+def _positions(
+    checked: CheckedPlan, actors: Mapping[str, object], context: AllocationContext
+) -> dict[str, Position]:
+    """Actors that have a load at the end come last; those that are under way, or need their robot
+    as it is now and as others would not leave it, come first."""
+    last = set(carried_at_end(checked).values())
+    first = first_actors(checked)
+    positions: dict[str, Position] = {}
+    for actor in actors:
+        if actor in first:
+            positions[actor_arg(actor)] = Position.FIRST
+        elif actor in last:
+            positions[actor_arg(actor)] = Position.LAST
+        elif actor in context.under_way:
+            positions[actor_arg(actor)] = Position.FIRST
+    return positions
+
+
+def _weights_and_dues(
+    plan: Plan, graph: TaskGraph, context: AllocationContext
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Weight and due time of the tasks with which goals end, s from now."""
+    goal_of = {task.task: task.goal for task in plan.tasks}
+    weights: dict[str, float] = {}
+    dues_s: dict[str, float] = {}
+    for task, goal in goal_of.items():
+        if any(goal_of[later] == goal for later in graph.successors[task]):
+            continue
+        priority = context.priority.get(goal, 0) if goal else 0
+        weights[task] = 2.0 ** max(-MOST_PRIORITY, min(priority, MOST_PRIORITY))
+        if goal is not None and goal in context.due_s:
+            dues_s[task] = context.due_s[goal]
+    return weights, dues_s

@@ -1,0 +1,141 @@
+"""What travels on a Zenoh link, in plain Python: samples, their timestamps, their encodings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import zenoh
+
+from keyexpr_schema.errors import UndecodablePayload
+from keyexpr_schema.key import SCHEMA_PREFIX, Key, P, Payload, decode_payload
+
+ENCODING_PREFIX = "application/json;"
+_REPLY_VERSION = 1
+_ID_BITS = 128
+_ID_MASK = (1 << _ID_BITS) - 1
+
+
+def stamp_of_text(text: str) -> int:
+    """The integer that orders a Zenoh timestamp `<NTP64 decimal>/<id hexadecimal>`.
+
+    Time in the upper 64 bits, id in the lower 128: comparing these integers is comparing the
+    timestamps as Zenoh does, which a float or a datetime cannot (they lose the lowest bits).
+    Zenoh prints an id as a little-endian number and orders ids by their bytes, hence the swap.
+
+    Raises:
+        ValueError: `text` is not such a timestamp.
+    """
+    time, _, source = text.partition("/")
+    try:
+        return int(time) << _ID_BITS | _swap(int(source, 16))
+    except OverflowError:
+        raise ValueError(f"{text!r} is not a timestamp") from None
+
+
+def text_of_stamp(stamp: int) -> str:
+    """The timestamp whose integer is `stamp`, as Zenoh prints it."""
+    return f"{stamp >> _ID_BITS}/{_swap(stamp & _ID_MASK):x}"
+
+
+def timestamp_of_stamp(stamp: int) -> zenoh.Timestamp:
+    """A Zenoh timestamp near `stamp`: at most 5 ns older, never newer.
+
+    Zenoh's Python API cannot set the lowest bits of a timestamp, so exact stamps travel as text
+    in the attachment of a stored reply (see `read_sample`). Rounding down means that a reader that
+    knows only the timestamp never prefers the stored value to a newer live one.
+    """
+    time = stamp >> _ID_BITS
+    seconds, fraction = time >> 32, time & 0xFFFF_FFFF
+    nanos = max(0, fraction * 1_000_000_000 // (1 << 32) - 1)
+    return zenoh.Timestamp(zenoh.NTP64(seconds, nanos), (stamp & _ID_MASK or 1).to_bytes(16, "big"))
+
+
+def _swap(source: int) -> int:
+    return int.from_bytes(source.to_bytes(16, "little"), "big")
+
+
+@dataclass(frozen=True)
+class Encoded:
+    """Bytes as they came over the link, on which key, and what they say they are."""
+
+    keyexpr: str
+    data: bytes
+    encoding: str
+
+
+@dataclass(frozen=True)
+class Sample(Encoded):
+    """A value or a deletion. `stamp` 0: it carried no timestamp."""
+
+    stamp: int
+    deleted: bool
+
+
+def read_sample(sample: zenoh.Sample) -> Sample:
+    """Copy `sample` out of Zenoh.
+
+    The stamp is the one in the attachment where there is one (replies of the embedded store,
+    which cannot rebuild a timestamp exactly after a restart), else the sample's timestamp (live
+    puts, and replies of a zenohd storage).
+    """
+    stamp = 0
+    if sample.attachment is not None:
+        try:
+            stamp = stamp_of_text(sample.attachment.to_string())
+        except (ValueError, UnicodeDecodeError, zenoh.ZError):
+            stamp = 0
+    if not stamp and sample.timestamp is not None:
+        stamp = stamp_of_text(str(sample.timestamp))
+    deleted = sample.kind == zenoh.SampleKind.DELETE
+    return Sample(
+        str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding), stamp, deleted
+    )
+
+
+def encoding_of(key: Key[Any, Any]) -> str:
+    """The Zenoh encoding of values of `key`, e.g. `application/json;robotfleet/fact/1`."""
+    return ENCODING_PREFIX + key.schema
+
+
+def reply_encoding_of(key: Key[Any, Any]) -> str:
+    """The Zenoh encoding of replies on `key`, e.g. `…;robotfleet/store_journal_reply/1`."""
+    return f"{ENCODING_PREFIX}{SCHEMA_PREFIX}/{key.name}_reply/{_REPLY_VERSION}"
+
+
+def decode_value(key: Key[Any, P], found: Encoded) -> P:
+    """The payload in `found`, of the version of `key` or an older one.
+
+    Bytes without a schema in their encoding (somebody put them by hand) are taken at their word.
+
+    Raises:
+        UndecodablePayload: another schema, a newer version, or not a payload of this type.
+    """
+    return _decode(found, key.payload, key.name, key.version)
+
+
+def decode_reply(key: Key[Any, Any], found: Encoded) -> Payload:
+    """The reply in `found`, of type `key.reply`.
+
+    Raises:
+        UndecodablePayload: as `decode_value`.
+    """
+    assert key.reply is not None
+    return _decode(found, key.reply, f"{key.name}_reply", _REPLY_VERSION)
+
+
+def _decode(found: Encoded, kind: type[P], name: str, version: int) -> P:
+    _, _, schema = found.encoding.partition(";")
+    if schema:
+        parts = schema.split("/")
+        if len(parts) != 3 or parts[:2] != [SCHEMA_PREFIX, name] or not parts[2].isdecimal():
+            raise UndecodablePayload(
+                f"the value at {found.keyexpr} says it is {schema!r}, but this key carries "
+                f"'{SCHEMA_PREFIX}/{name}/{version}'"
+            )
+        if int(parts[2]) > version:
+            raise UndecodablePayload(
+                f"the value at {found.keyexpr} is version {parts[2]} of {name}, but this program "
+                f"knows versions up to {version}: update it"
+            )
+    return decode_payload(kind, found.data, found.keyexpr)

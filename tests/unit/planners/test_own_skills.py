@@ -1,0 +1,139 @@
+"""Skills that a user adds: asked for by name, planned with, checked; nothing of ours changes."""
+
+from __future__ import annotations
+
+import pytest
+from msgspec.structs import replace
+
+from fleet.core.checker.checked_plan import CheckedPlan
+from fleet.core.model.skill_file import skills_from_data
+from fleet.core.model.skill_phrases import phrases_of
+from fleet.core.model.world import WorldModel
+from fleet.errors import NotUnderstood
+from fleet.language import Vocabulary, read_goal
+from fleet.planners.base import PlanningProblem
+from fleet.planners.symbolic.planner import SymbolicPlanner
+from keyexpr_schema.ids import bare_name
+from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.plans import Plan
+from keyexpr_schema.payloads.world import Fact
+from tests.household import (
+    PLACES,
+    SKILLS,
+    UNLOAD,
+    at,
+    bring,
+    carrier,
+    checked,
+    cup,
+    fact,
+    manipulator,
+)
+from tests.language_house import WORDS, shown
+
+OWN = {
+    "vacuum": {
+        "parameters": {"robot": "robot", "place": "place"},
+        "needs": {"robot": ["drive"]},
+        "before": ["at(robot) = place", "tidy(place) = true"],
+        "after": ["clean(place) = true"],
+    },
+    "tidy_floor": {
+        "parameters": {"robot": "robot", "place": "place"},
+        "before": ["at(robot) = place", "holding(robot) = nothing"],
+        "after": ["tidy(place) = true"],
+    },
+    "water": {
+        "parameters": {"robot": "robot", "object": "object", "place": "place"},
+        "before": ["at(robot) = place", "at(object) = place"],
+        "after": ["watered(object) = true"],
+    },
+    "unload": UNLOAD,
+}
+ALL = {**SKILLS, **skills_from_data({"skills": OWN}, "mine.yaml")}
+PHRASES = phrases_of(ALL)
+STRATEGIES = ("big-dag", "per-goal", "monolithic")
+
+
+def words() -> Vocabulary:
+    return Vocabulary(WORDS.places, WORDS.objects, WORDS.robots, skill_phrases=PHRASES)
+
+
+def world(*facts: Fact) -> WorldModel:
+    robots = (manipulator("hsr"), carrier("locobot"), carrier("other"))
+    robots = tuple(replace(spec, skills=(*spec.skills, *OWN)) for spec in robots)
+    known = (fact("hsr", "holding", "nothing"), fact("cup_1", "at", "kitchen"))
+    return WorldModel.of(ALL, PLACES, (cup(1),), robots, (*known, *facts))
+
+
+def planned(strategy: str, model: WorldModel, *goals: Goal) -> Plan:
+    problem = PlanningProblem("p", goals, model, strategy=strategy)
+    made = SymbolicPlanner().plan(problem)
+    assert isinstance(made, CheckedPlan), made
+    return checked(made.plan, model).plan
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("Vacuum the hallway", "clean(hallway)"),
+        ("Please vacuum the kitchen and the lounge", "clean(kitchen); clean(living_room)"),
+        ("vacuum every room", "clean(hallway); clean(kitchen); clean(living_room)"),
+        ("tidy floor kitchen", "tidy(kitchen)"),
+        (
+            "Bring the book to the hallway, then vacuum the kitchen",
+            "at(book) = hallway > clean(kitchen)",
+        ),
+        ("Water the red book", "watered(book)"),
+        ("water a cup", "watered(cup_1|cup_2)"),
+        ("Tidy up the cups", "at(cup_1) = kitchen; at(cup_2) = kitchen"),
+    ],
+)
+def test_a_skill_is_asked_for_by_its_name(text: str, expected: str) -> None:
+    assert shown(read_goal(text, words())) == expected
+
+
+def test_what_it_cannot_be_done_to_is_refused() -> None:
+    for text in ("Vacuum the dragon", "Vacuum the book", "Vacuum"):
+        with pytest.raises(NotUnderstood, match="known are hallway, kitchen, living_room"):
+            read_goal(text, words())
+    with pytest.raises(NotUnderstood, match="'Vacuum the hallway' is not understood"):
+        read_goal("Vacuum the hallway", WORDS)
+
+
+def test_what_moves_things_has_sentences_of_its_own() -> None:
+    assert [phrase.verb for phrase in phrases_of(SKILLS)] == ["search"]
+    assert [phrase.verb for phrase in PHRASES] == ["search", "tidy floor", "vacuum", "water"]
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_a_need_of_ones_own_is_met_first(strategy: str) -> None:
+    stages = read_goal("Vacuum the hallway", words()).stages
+    goal = Goal(goal="g", text="", conditions=stages[0])
+    plan = planned(strategy, world(), goal)
+    assert [task.skill for task in plan.tasks] == ["navigate", "tidy_floor", "vacuum"]
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_what_rides_in_a_basket_is_driven_on(strategy: str) -> None:
+    model = world(fact("cup_1", "at", "locobot"))
+    plan = planned(strategy, replace_skills(model), bring(1, "living_room"))
+    assert [task.skill for task in plan.tasks] == ["navigate"]
+    assert list(plan.pins.values()) == ["locobot"]
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_what_lies_in_a_basket_is_taken_out_of_that_one(strategy: str) -> None:
+    model = world(fact("cup_1", "at", "locobot"))
+    goal = Goal(goal="g", text="", conditions=(at("cup_1", "hsr"),))
+    plan = planned(strategy, model, goal)
+    assert plan.tasks[-1].skill == "unload"
+    taken_from = bare_name(plan.tasks[-1].args["carrier"])
+    assert plan.pins.get(taken_from, taken_from) == "locobot"
+
+
+def replace_skills(model: WorldModel) -> WorldModel:
+    """The same world with the household's skills only."""
+    return WorldModel(
+        SKILLS, model.places, model.objects, model.robots, model.available, model.facts
+    )

@@ -1,0 +1,78 @@
+"""Tokens come and go; losing the own link is not the death of everybody else."""
+
+from __future__ import annotations
+
+from contextlib import AsyncExitStack
+
+import pytest
+
+from keyexpr_schema.keyspace import GOAL_SPEC, ROBOT_ALIVE
+from keyexpr_schema.payloads.goals import GoalAddress
+from keyexpr_schema.payloads.robots import AliveAddress
+from keyexpr_schema.transport.session import open_session
+from tests.session_values import goal, not_connected, take, until
+
+
+async def test_tokens_come_and_go_and_survive_the_watchers_lost_link(router, session_config):
+    a, b = AliveAddress("r1", "a"), AliveAddress("r2", "b")
+    async with (
+        open_session(session_config()) as planner,
+        open_session(session_config()) as one,
+        open_session(session_config()) as two,
+        one.token(ROBOT_ALIVE, a),
+        planner.watch_tokens(ROBOT_ALIVE, 0.3) as watch,
+    ):
+        await watch.synced()
+        assert [(c.address, c.alive) for c in await take(watch, 1)] == [(a, True)]
+        async with two.token(ROBOT_ALIVE, b):
+            assert [(c.address, c.alive) for c in await take(watch, 1)] == [(b, True)]
+        assert [(c.address, c.alive) for c in await take(watch, 1)] == [(b, False)]
+        router.restart()
+        with pytest.raises(TimeoutError):
+            await take(watch, 1, 4.0)
+
+
+async def test_a_frozen_router_is_noticed_and_nobody_is_declared_lost(router, session_config):
+    a = AliveAddress("r1", "a")
+    async with (
+        open_session(session_config(lease_s=1.0)) as planner,
+        open_session(session_config()) as worker,
+        worker.token(ROBOT_ALIVE, a),
+        planner.watch_tokens(ROBOT_ALIVE, 0.2) as watch,
+    ):
+        assert (await take(watch, 1))[0].alive
+        router.freeze()
+        await until(lambda: not_connected(planner))
+        router.thaw()
+        await planner.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"), 20)
+        with pytest.raises(TimeoutError):
+            await take(watch, 1, 3.0)
+
+
+async def test_a_token_lost_while_the_watcher_was_cut_off_is_reported(router, session_config):
+    a = AliveAddress("r1", "a")
+    async with (
+        open_session(session_config()) as planner,
+        planner.watch_tokens(ROBOT_ALIVE, 0.3) as watch,
+    ):
+        async with open_session(session_config()) as worker, worker.token(ROBOT_ALIVE, a):
+            assert (await take(watch, 1))[0].alive
+            router.kill()
+            await until(lambda: not_connected(planner))
+        router.restart()
+        [change] = await take(watch, 1)
+        assert (change.address, change.alive) == (a, False)
+
+
+async def test_more_tokens_than_a_channel_holds(session_config):
+    async with (
+        open_session(session_config()) as planner,
+        open_session(session_config()) as worker,
+        planner.watch_tokens(ROBOT_ALIVE, 0.3) as watch,
+    ):
+        async with AsyncExitStack() as stack:
+            for number in range(300):
+                address = AliveAddress(f"r{number}", "a")
+                await stack.enter_async_context(worker.token(ROBOT_ALIVE, address))
+            assert len({c.address for c in await take(watch, 300) if c.alive}) == 300
+        assert len({c.address for c in await take(watch, 300) if not c.alive}) == 300

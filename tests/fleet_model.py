@@ -140,12 +140,13 @@ class FleetModel:
     def _check_order(self, order: Any) -> None:
         assert isinstance(order, Order)
         attempt = (order.plan, order.task, order.attempt)
+        new = attempt not in self.given
         assert self.given.setdefault(attempt, order.robot) == order.robot, (
             "an attempt changed hands"
         )
         entry = self.state.plans[order.plan]
         record = entry.records[order.task]
-        if order.attempt == 1 and record.state is TaskState.ORDERED and not order.cancelled:
+        if new:
             assert record.goal in (None, *self.state.goals), "ordered for a goal that is no more"
         for before in (*record.after, *record.behind):
             if before in entry.records:

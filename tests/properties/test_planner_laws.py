@@ -38,18 +38,18 @@ class Undisturbed(RuleBasedStateMachine):
     """Robots do what they are told; people, crashes and the clock come in between."""
 
     reaches_everything = True
+    late = False
     met: Counter[str] = Counter()
 
     @initialize(
         second=st.booleans(),
         together=st.booleans(),
-        cups=st.integers(1, 3),
+        cups=st.sampled_from([3, 2, 1]),
         rooms=st.lists(st.sampled_from(["hallway", "living_room"]), min_size=3, max_size=3),
-        late=st.booleans(),
     )
-    def begin(self, second: bool, together: bool, cups: int, rooms: list[str], late: bool) -> None:
+    def begin(self, second: bool, together: bool, cups: int, rooms: list[str]) -> None:
         robots = (manipulator(), carrier(), *((manipulator("r2"),) if second else ()))
-        self.model = FleetModel(robots, cups, late)
+        self.model = FleetModel(robots, cups, self.late)
         self.away: set[str] = set()
         self.a_plan_was_cancelled = False
         self.finished: set[tuple[str, str]] = set()
@@ -101,10 +101,10 @@ class Undisturbed(RuleBasedStateMachine):
         request = ReplanRequest(request=f"again-{number}", plan="plan-1", reason="because")
         self.model.receive(events.ReplanRequested, request=request)
 
-    @rule()
-    def a_person_cancels_a_plan_that_is_being_made(self) -> None:
-        state = self.model.state
-        for plan in [name for name, entry in state.plans.items() if entry.job is not None]:
+    @rule(plan=st.sampled_from(["plan-1", "plan-2", "plan-3"]))
+    def a_person_cancels_a_plan_that_is_being_made(self, plan: str) -> None:
+        entry = self.model.state.plans.get(plan)
+        if entry is not None and entry.job is not None:
             number = len(self.model.state.answers)
             request = ControlRequest(request=f"stop-{number}", control=Control.CANCEL, plan=plan)
             self.model.receive(events.ControlRequested, request=request)
@@ -219,18 +219,19 @@ class Disturbed(Undisturbed):
         self.model.learn(f"cup_{cup}", "at", room)
 
 
-LATE = {"in another order", "a second time", "superseded", "work ended meanwhile",
-        "another reason meanwhile"}  # fmt: skip
+@pytest.mark.parametrize(("machine", "examples"), [(Undisturbed, 30), (Disturbed, 60)])
+def test_the_laws_hold_whatever_comes(machine: type[Undisturbed], examples: int) -> None:
+    how = settings(max_examples=examples, stateful_step_count=25, deadline=None)
+    run_state_machine_as_test(machine, settings=how)
 
 
-@pytest.mark.parametrize(("machine", "examples"), [(Undisturbed, 60), (Disturbed, 100)])
-def test_the_laws_hold_whatever_comes_when(
+@pytest.mark.parametrize(("machine", "examples"), [(Undisturbed, 40), (Disturbed, 50)])
+def test_the_laws_hold_when_planning_jobs_are_answered_late_and_in_any_order(
     machine: type[Undisturbed], examples: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     met: Counter[str] = Counter()
     monkeypatch.setattr(machine, "met", met)
-    run_state_machine_as_test(
-        machine,
-        settings=settings(max_examples=examples, stateful_step_count=25, deadline=None),
-    )
-    assert met.keys() >= LATE and all(met[way] >= 5 for way in LATE), met
+    monkeypatch.setattr(machine, "late", True)
+    how = settings(max_examples=examples, stateful_step_count=25, deadline=None)
+    run_state_machine_as_test(machine, settings=how)
+    assert len(met) == 5 and all(met.values()), met

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.demo_process import left_behind
+from tests.support.demo_process import left_behind
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(300)]
 

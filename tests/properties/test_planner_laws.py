@@ -25,8 +25,8 @@ from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalStat
 from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
 from keyexpr_schema.payloads.tasks import ReportState, TaskState
-from tests.fleet_model import FleetModel
-from tests.household import bring, carrier, manipulator
+from tests.support.fleet_model import FleetModel
+from tests.support.household import bring, carrier, manipulator
 
 PICK = st.integers(0, 10)
 MOST_GOALS = 4

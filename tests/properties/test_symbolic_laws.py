@@ -12,7 +12,7 @@ from fleet.planners.base import PlanningProblem
 from fleet.service.composition import compose
 from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.payloads.goals import Goal
-from tests.household import bring, carrier, home, manipulator
+from tests.support.household import bring, carrier, home, manipulator
 
 PARTS = compose()
 PLACES = ("kitchen", "hallway", "living_room")
@@ -65,11 +65,25 @@ def undone_by_a_helper() -> tuple[WorldModel, tuple[Goal, ...]]:
     return world, tuple(bring(number, "kitchen") for number in (1, 2, 3))
 
 
+def done_by_a_helper() -> tuple[WorldModel, tuple[Goal, ...]]:
+    """On its way to help, the helper takes what is in its basket where that is wanted."""
+    facts = {
+        FactKey("at", "hsr"): "hallway",
+        FactKey("holding", "hsr"): "cup_2",
+        FactKey("at", "cup_1"): "hallway",
+        FactKey("at", "cup_2"): "hsr",
+        FactKey("at", "cup_3"): "locobot",
+    }
+    world = home((manipulator(), carrier()), 3).with_facts(facts)
+    return world, (bring(1, "kitchen"), bring(3, "hallway"))
+
+
 @settings(max_examples=60, deadline=None)
 @given(missions(), st.sampled_from(STRATEGIES))
 @example(undone_by_a_helper(), "monolithic")
 @example(undone_by_a_helper(), "big-dag")
 @example(undone_by_a_helper(), "per-goal")
+@example(done_by_a_helper(), "monolithic")
 def test_what_can_be_done_is_planned_and_allocated(
     mission: tuple[WorldModel, tuple[Goal, ...]], strategy: str
 ) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from fleet.core import events
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.world import Statement
-from tests.fleet_model import FleetModel
-from tests.household import manipulator
+from tests.support.fleet_model import FleetModel
+from tests.support.household import manipulator
 
 
 def say(model: FleetModel, text: str) -> GoalStatus:

@@ -15,8 +15,8 @@ from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState, Task
 from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
 from keyexpr_schema.payloads.tasks import Order, ReportState, TaskState
-from tests.fleet_model import FleetModel
-from tests.household import bring, carrier, cup, manipulator
+from tests.support.fleet_model import FleetModel
+from tests.support.household import bring, carrier, cup, manipulator
 
 ROOMS = ("hallway", "living_room")
 

@@ -13,8 +13,8 @@ from keyexpr_schema.payloads.goals import Goal, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanChange, PlanState, Task
 from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
 from keyexpr_schema.payloads.tasks import ReportState, TaskState
-from tests.fleet_model import FleetModel
-from tests.household import SKILLS, at, bring, carrier, manipulator
+from tests.support.fleet_model import FleetModel
+from tests.support.household import SKILLS, at, bring, carrier, manipulator
 
 BOTH = (bring(1, "hallway"), bring(2, "living_room"))
 

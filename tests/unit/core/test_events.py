@@ -19,7 +19,7 @@ from keyexpr_schema.payloads.requests import (
 )
 from keyexpr_schema.payloads.tasks import Report, ReportState
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement
-from tests.household import carrier
+from tests.support.household import carrier
 
 AT = {"time_s": 1.5, "wall_time_s": 2.5}
 PLAN = Plan(plan="p", goals=("g",), conditions=(), tasks=())

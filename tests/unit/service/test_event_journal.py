@@ -15,9 +15,9 @@ from fleet.core.state import Policy, State
 from fleet.core.step import replay, step
 from fleet.service import event_journal
 from fleet.service.event_journal import SNAPSHOT_FORMAT, EventJournal, JournalInUse
-from tests.fleet_model import FleetModel
-from tests.household import SKILLS, bring, carrier, manipulator
 from tests.replay.journal_files import HERE, events_in
+from tests.support.fleet_model import FleetModel
+from tests.support.household import SKILLS, bring, carrier, manipulator
 
 
 def mission() -> FleetModel:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tests.fleet_model import FleetModel
-from tests.household import bring, carrier, manipulator
+from tests.support.fleet_model import FleetModel
+from tests.support.household import bring, carrier, manipulator
 
 
 def test_a_waiting_task_that_is_so_already_counts_once() -> None:

@@ -25,7 +25,7 @@ from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskState
 from keyexpr_schema.payloads.world import Fact
-from tests.household import PLACES, SKILLS, cup
+from tests.support.household import PLACES, SKILLS, cup
 
 Answer = events.PlanningSucceeded | events.PlanningFailed
 _ALL = compose()

@@ -25,7 +25,7 @@ from fleet.planners.symbolic.planner import SymbolicPlanner
 from fleet.scheduling.plan_shop import AllocationContext
 from keyexpr_schema.ids import actor_arg, bound
 from keyexpr_schema.payloads.plans import Plan, Task
-from tests.household import bring, carrier, checked, home, manipulator
+from tests.support.household import bring, carrier, checked, home, manipulator
 
 QUICK = MakespanAllocator(deadline_s=0.2, exact=False, clock=StepClock())
 

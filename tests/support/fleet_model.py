@@ -20,12 +20,12 @@ from fleet.service.composition import Composition, compose
 from fleet.service.planning_job import run_planning_job
 from keyexpr_schema.facts import Value
 from keyexpr_schema.keyspace import ORDER
-from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.goals import Goal, GoalState
 from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskState
 from keyexpr_schema.payloads.world import Fact
-from tests.support.household import PLACES, SKILLS, cup
+from tests.support.household import PLACES, SKILLS, bring, carrier, cup, manipulator
 
 Answer = events.PlanningSucceeded | events.PlanningFailed
 _ALL = compose()
@@ -34,6 +34,9 @@ COMPOSITION: Composition = replace(
     # What is searched for as long as there is time would differ from run to run.
     allocators={**_ALL.allocators, "makespan": MakespanAllocator(deadline_s=0.0, exact=False)},
 )
+
+
+BOTH = (bring(1, "hallway"), bring(2, "living_room"))
 
 
 class FleetModel:
@@ -181,6 +184,10 @@ class FleetModel:
         """Orders that stand, in a fixed order."""
         return [d for _, d in sorted(self.documents.items()) if isinstance(d, Order)]
 
+    def goal_state(self, goal: str) -> GoalState:
+        """How a goal stands."""
+        return self.state.goal_states[goal].state
+
     def report(self, order: Order, state: ReportState, **more: Any) -> None:
         """A worker reports on an order."""
         report = Report(
@@ -273,6 +280,11 @@ class FleetModel:
         self.state = state
         self.receive(events.PlannerStarted, epoch=state.epoch + 1, incarnation="again")
         self._take(effects_of(self.state))
+
+
+def fleet() -> FleetModel:
+    """One robot with a hand, one with a basket, and two cups in the kitchen."""
+    return FleetModel((manipulator(), carrier()), cups=2)
 
 
 def check_revision(old: PlanEntry, new: PlanEntry) -> None:

@@ -23,8 +23,11 @@ NEEDS: dict[MotionKind, tuple[str, ...]] = {
 class Backend(ABC):
     """One shared simulated world. Synchronous, single-threaded, knows no clock but its own.
 
-    The public methods check what they are told and call the abstract ones. What a robot is told
-    that it cannot do becomes a failed outcome with a sentence, never an exception.
+    The public methods check their arguments and call the abstract ones. What a robot cannot do
+    becomes a failed outcome with a sentence, never an exception.
+
+    Raises:
+        KeyError: any method, for a robot that is not one of `robots`.
     """
 
     time_s: float
@@ -37,11 +40,7 @@ class Backend(ABC):
         self._refused: dict[str, str] = {}
 
     def begin(self, robot: str, motion: Motion) -> None:
-        """Start `motion`; what the robot was doing is stopped first.
-
-        Raises:
-            KeyError: there is no such robot (see `robots`).
-        """
+        """Start `motion`; what the robot was doing is stopped first."""
         self._check_robot(robot)
         self._stop(robot)
         reason = self._objection(robot, motion)
@@ -52,11 +51,7 @@ class Backend(ABC):
             self._refused[robot] = reason
 
     def stop(self, robot: str) -> None:
-        """Halt the robot. The outcome of what it was doing, if it still was, becomes `stopped`.
-
-        Raises:
-            KeyError: there is no such robot (see `robots`).
-        """
+        """Halt the robot. The outcome of what it was doing, if it still was, becomes `stopped`."""
         self._check_robot(robot)
         if robot not in self._refused:
             self._stop(robot)
@@ -66,11 +61,7 @@ class Backend(ABC):
         self._advance()
 
     def outcome(self, robot: str) -> MotionOutcome | None:
-        """How the robot's latest motion stands or ended; `None` if it never moved.
-
-        Raises:
-            KeyError: there is no such robot (see `robots`).
-        """
+        """How the robot's latest motion stands or ended; `None` if it never moved."""
         self._check_robot(robot)
         if robot in self._refused:
             return MotionOutcome(
@@ -79,11 +70,7 @@ class Backend(ABC):
         return self._outcome(robot)
 
     def senses(self, robot: str) -> Senses:
-        """What the robot knows of itself.
-
-        Raises:
-            KeyError: there is no such robot (see `robots`).
-        """
+        """What the robot knows of itself."""
         self._check_robot(robot)
         return self._senses(robot)
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-from contextlib import AbstractAsyncContextManager, AsyncExitStack, suppress
-from types import TracebackType
+from contextlib import AbstractAsyncContextManager, suppress
 
 from keyexpr_schema.errors import NoReply
 from keyexpr_schema.keyspace import SIM_CLOCK, SIM_MOTION
@@ -38,31 +37,21 @@ class SimEmbodiment(AbstractAsyncContextManager["SimEmbodiment"]):
         self._incarnation = incarnation
         self._patience_s = patience_s
         self._time_s = 0.0
-        self._stack = AsyncExitStack()
 
     async def __aenter__(self) -> SimEmbodiment:
-        following = asyncio.create_task(self._follow_clock())
-        self._stack.push_async_callback(_ended, following)
+        self._following = asyncio.create_task(self._follow_clock())
         return self
 
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        await self._stack.aclose()
+    async def __aexit__(self, *_: object) -> None:
+        self._following.cancel()
+        await asyncio.gather(self._following, return_exceptions=True)
 
     def now_s(self) -> float:
         """Simulated seconds, as last heard."""
         return self._time_s
 
     async def perform(self, motion: Motion) -> MotionOutcome:
-        """Carry out `motion` once; see `workers.embodiment.Embodiment.perform`.
-
-        Raises:
-            RobotUnreachable: the simulation did not answer for `patience_s`.
-        """
+        """Carry out `motion` once; see `workers.embodiment.Embodiment.perform`."""
         call = self._call(motion)
         try:
             outcome = await self._ask(call)
@@ -75,31 +64,26 @@ class SimEmbodiment(AbstractAsyncContextManager["SimEmbodiment"]):
         return outcome
 
     async def senses(self) -> Senses:
-        """What the robot knows of itself.
-
-        Raises:
-            RobotUnreachable: the simulation did not answer for `patience_s`.
-        """
+        """What the robot knows of itself."""
         return (await self._ask(self._call(None))).senses
 
     async def stop(self) -> None:
-        """Bring the robot to rest, whatever it does.
+        """Bring the robot to rest, whatever it does."""
+        await self._ask(self._call(None, stop=True))
 
-        Raises:
-            RobotUnreachable: the simulation did not answer for `patience_s`.
-        """
-        await self._ask(
-            MotionCall(call=_name(), incarnation=self._incarnation, stop=True, wait_s=POLL_S)
+    def _call(self, motion: Motion | None, name: str = "", stop: bool = False) -> MotionCall:
+        return MotionCall(
+            call=name or f"c{secrets.token_hex(8)}",
+            incarnation=self._incarnation,
+            motion=motion,
+            stop=stop,
+            wait_s=POLL_S,
         )
 
-    def _call(self, motion: Motion | None) -> MotionCall:
-        return MotionCall(call=_name(), incarnation=self._incarnation, motion=motion, wait_s=POLL_S)
-
     async def _halt(self, call: MotionCall) -> None:
-        stop = MotionCall(call=call.call, incarnation=self._incarnation, stop=True, wait_s=POLL_S)
         with suppress(RobotUnreachable, TimeoutError):
             async with asyncio.timeout(2 * POLL_S):
-                await self._ask(stop)
+                await self._ask(self._call(None, call.call, stop=True))
 
     async def _ask(self, call: MotionCall) -> MotionOutcome:
         """The answer to `call`, asked again while router or simulation are away."""
@@ -130,12 +114,3 @@ class SimEmbodiment(AbstractAsyncContextManager["SimEmbodiment"]):
 def sim_embodiment(session: Session, spec: RobotSpec, incarnation: str) -> SimEmbodiment:
     """An `EmbodimentFactory`: the simulated robot that `spec` describes."""
     return SimEmbodiment(session, spec.robot, incarnation)
-
-
-def _name() -> str:
-    return f"c{secrets.token_hex(8)}"
-
-
-async def _ended(task: asyncio.Task[None]) -> None:
-    task.cancel()
-    await asyncio.gather(task, return_exceptions=True)

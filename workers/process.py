@@ -5,15 +5,15 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
-import signal
 import sys
 from collections.abc import Iterable
-from contextlib import AbstractAsyncContextManager, AsyncExitStack, suppress
+from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from pathlib import Path
 
 from keyexpr_schema.ids import check_id
 from keyexpr_schema.keyspace import ROBOT_SPEC
 from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.signals import run_until_signal
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from workers.embodiment import Embodiment, EmbodimentFactory
 from workers.orders.journal import Journal
@@ -59,22 +59,7 @@ def run_worker(
     )
     registry = SkillRegistry.installed(skills)
     with Journal(data_dir / f"{robot}.journal") as journal:
-        asyncio.run(_main(robot, config, journal, registry, embodiment_factory))
-
-
-async def _main(
-    robot: str,
-    config: SessionConfig,
-    journal: Journal,
-    registry: SkillRegistry,
-    embodiment_factory: EmbodimentFactory,
-) -> None:
-    loop = asyncio.get_running_loop()
-    working = asyncio.create_task(_work(robot, config, journal, registry, embodiment_factory))
-    for name in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(name, working.cancel)
-    with suppress(asyncio.CancelledError):
-        await working
+        run_until_signal(_work(robot, config, journal, registry, embodiment_factory))
 
 
 async def _work(

@@ -9,7 +9,6 @@ from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.motions import Motion, MotionKind, Senses
 from keyexpr_schema.payloads.tasks import Order, ReportState
-from keyexpr_schema.payloads.world import Fact
 from workers.context import SkillContext
 from workers.embodiment import Embodiment
 from workers.errors import RobotUnreachable, SkillFailed
@@ -76,8 +75,8 @@ def was_interrupted(ledger: Ledger) -> bool:
     return last is not None and last.state is ReportState.INTERRUPTED
 
 
-async def observe_after_crash(ctx: SkillContext, order: Order) -> tuple[Fact, ...]:
-    """The facts that can be observed after a crash in the middle of `order`.
+async def observe_after_crash(ctx: SkillContext, order: Order) -> None:
+    """Observe what one can after a crash in the middle of `order`.
 
     The order's object is where the hand or the eyes say; if neither does, it is unknown.
     """
@@ -96,4 +95,3 @@ async def observe_after_crash(ctx: SkillContext, order: Order) -> tuple[Fact, ..
         known = ctx.world.value_of(AT, thing)
         if known == ctx.robot or known == senses.place:
             ctx.observe(AT, thing, None)
-    return ctx.observed

@@ -1,7 +1,7 @@
 """The retry machine: up to three tries of a skill in an attempt, under a deadline, cancellable.
 
-It knows nothing of Zenoh, of orders or of robots: it is given one try to run, a clock, and a way
-to bring the robot to a safe state.
+It knows nothing of Zenoh or of robots: it is given one try to run, a clock, and a way to bring the
+robot to a safe state.
 """
 
 from __future__ import annotations
@@ -11,27 +11,17 @@ import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
+from msgspec.structs import replace
+
 from keyexpr_schema.errors import SchemaError
-from keyexpr_schema.payloads.tasks import ReportState, Try
+from keyexpr_schema.payloads.tasks import Report, ReportState, Try
 from workers.errors import RobotUnreachable, SkillFailed
 
 MOST_TRIES = 3
 CLOCK_S = 0.05
-"""Wall seconds between two looks at the fleet's clock, of which nobody tells us that it ticks."""
+"""Wall seconds between two looks at the fleet's clock, whose ticks nobody announces."""
 
 _log = logging.getLogger("robotfleet.worker.retry")
-
-
-@dataclass(frozen=True)
-class AttemptResult:
-    """How an attempt ended. Times on the fleet's clock; `reason` is `None` where it succeeded."""
-
-    state: ReportState
-    tries: tuple[Try, ...]
-    reason: str | None
-    retryable: bool
-    started_s: float
-    ended_s: float
 
 
 @dataclass(frozen=True)
@@ -44,6 +34,7 @@ class _TryFailure:
 
 
 async def run_attempt(
+    report: Report,
     name: str,
     once: Callable[[], Awaitable[None]],
     *,
@@ -52,9 +43,8 @@ async def run_attempt(
     deadline_s: float,
     cancelled: asyncio.Event,
     on_failure: Callable[[SkillFailed], None] = lambda failure: None,
-    most_tries: int = MOST_TRIES,
-) -> AttemptResult:
-    """Run `once` until it returns, but at most `most_tries` times.
+) -> Report:
+    """Run `once` until it returns, but at most `MOST_TRIES` times; `report` with how it ended.
 
     A try ends by returning (success), by `SkillFailed`, by any other exception (a bug in the
     skill: no further try), at the deadline (`deadline_s` fleet seconds after the start of the
@@ -64,7 +54,6 @@ async def run_attempt(
     Being cancelled itself, it stops the try and passes `CancelledError` on.
     """
     started_s = now_s()
-    due_s = started_s + deadline_s
     tries: list[Try] = []
     while True:
         began_s = now_s()
@@ -72,29 +61,28 @@ async def run_attempt(
             name,
             once,
             now_s=now_s,
-            due_s=due_s,
+            due_s=started_s + deadline_s,
             deadline_s=deadline_s,
             cancelled=cancelled,
             on_failure=on_failure,
         )
-        ended_s = now_s()
-        tries.append(
-            Try(
-                number=len(tries) + 1,
-                started_s=began_s,
-                ended_s=ended_s,
-                reason=None if failure is None else failure.reason,
-            )
+        ended_s, reason = now_s(), None if failure is None else failure.reason
+        number = len(tries) + 1
+        tries.append(Try(number=number, started_s=began_s, ended_s=ended_s, reason=reason))
+        if failure is not None:
+            await make_safe()
+            ended_s = now_s()
+            if failure.again and number < MOST_TRIES:
+                continue
+        return replace(
+            report,
+            state=ReportState.SUCCEEDED if failure is None else failure.state,
+            tries=tuple(tries),
+            reason=reason,
+            retryable=failure is None or failure.retryable,
+            started_s=started_s,
+            ended_s=ended_s,
         )
-        if failure is None:
-            return AttemptResult(
-                ReportState.SUCCEEDED, tuple(tries), None, True, started_s, ended_s
-            )
-        await make_safe()
-        if not failure.again or len(tries) >= most_tries:
-            return AttemptResult(
-                failure.state, tuple(tries), failure.reason, failure.retryable, started_s, now_s()
-            )
 
 
 async def _one_try(

@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import logging
 
+from msgspec.structs import replace
+
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.keyspace import ORDER, ROBOT_ALIVE
 from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotSpec
 from keyexpr_schema.payloads.tasks import Order, OrderAddress, Report, ReportState
-from keyexpr_schema.payloads.world import Fact
 from keyexpr_schema.transport.session import Session, Watch
 from workers.context import SkillContext
 from workers.embodiment import Embodiment
@@ -139,9 +140,10 @@ class Worker:
         self._journal.send(*ctx.observed)
         for attempt in ledger.in_phase(Phase.STARTED):
             ctx = self._context()
-            facts = await observe_after_crash(ctx, attempt.order)
+            await observe_after_crash(ctx, attempt.order)
             reason = f"the worker of {self.spec.robot} went down while it did this"
-            self._interrupted(attempt.order, reason, facts)
+            report = make_report(attempt.order, self.incarnation, ReportState.STARTED)
+            self._end(attempt.order, self._interrupted(report, reason, ctx))
         self._outbox.wake()
 
     def _context(self) -> SkillContext:
@@ -151,19 +153,14 @@ class Worker:
         """The robot's spec as it is registered now: somebody may have changed it."""
         return self._world.specs.get(self.spec.robot, self.spec)
 
-    def _interrupted(
-        self, order: Order, reason: str, facts: tuple[Fact, ...], started_s: float | None = None
-    ) -> None:
-        report = make_report(
-            order,
-            self.incarnation,
-            ReportState.INTERRUPTED,
+    def _interrupted(self, report: Report, reason: str, ctx: SkillContext) -> Report:
+        return replace(
+            report,
+            state=ReportState.INTERRUPTED,
             reason=reason,
-            facts=facts,
-            started_s=started_s,
+            facts=ctx.observed,
             ended_s=self._embodiment.now_s(),
         )
-        self._end(order, report, facts)
 
     async def _execute(self) -> None:
         while True:
@@ -175,23 +172,19 @@ class Worker:
             skill = self._registry.get(order.skill, self._latest_spec().skills)
             arguments = skill.bind(order.args, self.spec.robot, self._world)
         except (UnknownSkill, BadArguments) as error:
-            refusal = make_report(
-                order,
-                self.incarnation,
-                ReportState.REFUSED,
-                reason=str(error),
-                retryable=False,
-            )
-            self._end(order, refusal)
+            refused, reason = ReportState.REFUSED, str(error)
+            self._end(order, make_report(order, self.incarnation, refused, reason, retryable=False))
             return
         ctx = self._context()
-        started_s = self._embodiment.now_s()
-        start = make_report(order, self.incarnation, ReportState.STARTED, started_s=started_s)
-        self._journal.started(order, start)  # before anything moves
+        report = make_report(
+            order, self.incarnation, ReportState.STARTED, started_s=self._embodiment.now_s()
+        )
+        self._journal.started(order, report)  # before anything moves
         self._outbox.wake()
         self._state_publisher.set_activity(RobotActivity.BUSY, order)
         try:
             ended = await run_attempt(
+                report,
                 order.skill,
                 lambda: skill(ctx, **arguments),
                 now_s=self._embodiment.now_s,
@@ -202,28 +195,17 @@ class Worker:
             )
         except asyncio.CancelledError:
             reason = f"the worker of {self.spec.robot} was stopped while it did this"
-            self._interrupted(order, reason, ctx.observed, started_s)
+            self._end(order, self._interrupted(report, reason, ctx))
             raise
-        report = make_report(
-            order,
-            self.incarnation,
-            ended.state,
-            tries=ended.tries,
-            facts=ctx.observed,
-            reason=ended.reason,
-            retryable=ended.retryable,
-            started_s=ended.started_s,
-            ended_s=ended.ended_s,
-        )
         try:
             # Others may go by the robot's state as soon as they have the report.
             await self._state_publisher.read_senses()
         finally:
-            self._end(order, report, ctx.observed)
+            self._end(order, replace(ended, facts=ctx.observed))
 
-    def _end(self, order: Order, report: Report, facts: tuple[Fact, ...] = ()) -> None:
+    def _end(self, order: Order, report: Report) -> None:
         """Write the end of an attempt into the journal; its facts and report go out from there."""
-        self._journal.ended(order, report, facts)
+        self._journal.ended(order, report)
         self._outbox.wake()
 
 

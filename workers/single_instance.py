@@ -10,7 +10,6 @@ import asyncio
 from contextlib import suppress
 
 from keyexpr_schema.keyspace import ROBOT_ALIVE
-from keyexpr_schema.payloads.robots import AliveAddress
 from keyexpr_schema.transport.session import Session
 from workers.errors import RobotTaken
 
@@ -26,26 +25,13 @@ async def ensure_single_worker(session: Session, robot: str) -> None:
     Raises:
         RobotTaken: one still is after `GONE_S`.
     """
-    others: set[AliveAddress] = set()
     async with session.watch_tokens(ROBOT_ALIVE, robot=robot) as watch:
-
-        async def follow() -> None:
-            async for change in watch:
-                (others.add if change.alive else others.discard)(change.address)
-                if not others:
-                    return
-
-        following = asyncio.create_task(follow())
-        try:
-            await watch.synced()
-            await asyncio.sleep(0)  # what lies ready reaches `others`
-            if others:
-                with suppress(TimeoutError):
-                    async with asyncio.timeout(GONE_S):
-                        await asyncio.shield(following)
-        finally:
-            following.cancel()
-            await asyncio.gather(following, return_exceptions=True)
+        await watch.synced()
+        with suppress(TimeoutError):
+            async with asyncio.timeout(GONE_S):
+                while watch.alive:
+                    await anext(watch)
+        others = watch.alive
     if others:
         names = ", ".join(sorted(other.incarnation for other in others))
         raise RobotTaken(

@@ -86,7 +86,7 @@ class Robot:
             arguments = skill.bind(order.args, self.spec.robot, self._world)
         except (UnknownSkill, BadArguments) as error:
             refusal = make_report(
-                order, INCARNATION, ReportState.REFUSED, reason=str(error), retryable=False
+                order, INCARNATION, ReportState.REFUSED, str(error), retryable=False
             )
             self._say((), refusal)
             return
@@ -95,6 +95,7 @@ class Robot:
         started = make_report(order, INCARNATION, ReportState.STARTED, started_s=started_s)
         self._say((), started)
         ended = await run_attempt(
+            started,
             order.skill,
             lambda: skill(ctx, **arguments),
             now_s=self._body.now_s,
@@ -103,18 +104,7 @@ class Robot:
             cancelled=self._cancelled,
             on_failure=ctx.observe_failure,
         )
-        report = make_report(
-            order,
-            INCARNATION,
-            ended.state,
-            tries=ended.tries,
-            facts=ctx.observed,
-            reason=ended.reason,
-            retryable=ended.retryable,
-            started_s=ended.started_s,
-            ended_s=ended.ended_s,
-        )
-        self._say(ctx.observed, report)
+        self._say(ctx.observed, replace(ended, facts=ctx.observed))
 
 
 def _cancelled(order: Order) -> Order:

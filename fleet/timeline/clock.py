@@ -43,9 +43,9 @@ class Clock:
             self._fleet.clear()
         self._ticks = True
         self.now_s = fleet_s
-        self.learn(wall_s, fleet_s)
+        self.anchor(wall_s, fleet_s)
 
-    def learn(self, wall_s: float, fleet_s: float) -> None:
+    def anchor(self, wall_s: float, fleet_s: float) -> None:
         """A value of fleet time `fleet_s` was written at `wall_s`."""
         at = bisect_left(self._wall, wall_s)
         before = at > 0

@@ -1,4 +1,4 @@
-"""The recorder as a process: watches keys of a realm until it is told to stop."""
+"""The recorder as a process: watches keys of a realm until a signal ends it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import asyncio
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,7 @@ BACKLOG_S = 2.0
 IDLE_S = 0.05
 
 
-def say(sentence: str) -> None:
+def print_line(sentence: str) -> None:
     """Write a line to standard output, at once."""
     sys.stdout.write(f"{sentence}\n")
     sys.stdout.flush()
@@ -44,7 +44,6 @@ def run_recorder(
     out: Path,
     view: bool = False,
     connect_timeout_s: float | None = 3.0,
-    tell: Callable[[str], None] = say,
 ) -> None:
     """Record a realm to `out` until SIGTERM or SIGINT; then close the file.
 
@@ -54,24 +53,16 @@ def run_recorder(
         Unreachable: no router answers at the endpoints.
         UnwritableRecording: the file cannot be written.
     """
-    asyncio.run(record(endpoints, realm, out, view, connect_timeout_s, tell))
-
-
-async def record(
-    endpoints: Sequence[str],
-    realm: str,
-    out: Path,
-    view: bool = False,
-    connect_timeout_s: float | None = 3.0,
-    tell: Callable[[str], None] = say,
-) -> None:
-    """The same as `run_recorder`, in a running loop; ends at a signal or when it is cancelled."""
     config = SessionConfig(
         endpoints=tuple(endpoints),
         realm=realm,
         component="recorder",
         connect_timeout_s=connect_timeout_s,
     )
+    asyncio.run(_record(config, out, view))
+
+
+async def _record(config: SessionConfig, out: Path, view: bool) -> None:
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT):
@@ -80,13 +71,13 @@ async def record(
     try:
         async with open_session(config) as session:
             port = free_port() if view else None
-            stream = open_stream(out, f"{realm} · {out.stem}", port)
+            stream = open_stream(out, f"{config.realm} · {out.stem}", port)
             recorder = Recorder(stream)
             if port is not None:
-                shown = _show(port, tell)
+                shown = _show(port)
             try:
                 async with session.watch(*RECORDED) as watch:
-                    tell(f"recording to {out}")
+                    print_line(f"recording to {out}")
                     await _follow(watch, recorder, stop, view)
             finally:
                 recorder.close()
@@ -143,14 +134,14 @@ async def _next(watch: Watch) -> Change[Any, Any]:
     return await anext(watch)
 
 
-def _show(port: int, tell: Callable[[str], None]) -> subprocess.Popen[bytes] | None:
+def _show(port: int) -> subprocess.Popen[bytes] | None:
     """Open the viewer on the live stream, or say in a sentence why not."""
     url = f"rerun+http://127.0.0.1:{port}/proxy"
     if not viewer.has_screen():
-        tell(f"there is no screen here; look on with: rerun --connect {url}")
+        print_line(f"there is no screen here; look on with: rerun --connect {url}")
         return None
     try:
         return viewer.start(["--port", "auto", "--connect", url])
     except NoPicture as error:
-        tell(f"{error}; recording goes on")
+        print_line(f"{error}; recording goes on")
         return None

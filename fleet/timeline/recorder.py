@@ -66,7 +66,7 @@ RECORDED: tuple[Key[Any, Any], ...] = (
 POSES = 64
 """So many poses of one body are worth a piece of the file of their own."""
 
-_TELL: dict[str, tuple[str, Callable[[Any, Any], Iterator[event_log.Line]]]] = {
+_SENTENCES: dict[str, tuple[str, Callable[[Any, Any], Iterator[event_log.Line]]]] = {
     GOAL_SPEC.name: ("goals", event_log.goal),
     GOAL_STATUS.name: ("goals", event_log.goal_status),
     PLAN_SPEC.name: ("plans", event_log.plan),
@@ -135,7 +135,7 @@ class Recorder:
             wall_s = wall_of(change.timestamp)
             own_s = _own_time(change)
             if wall_s is not None and own_s:
-                self._clock.learn(wall_s, own_s)
+                self._clock.anchor(wall_s, own_s)
         for change in backlog:
             self.record(change)
 
@@ -157,7 +157,7 @@ class Recorder:
             return
         own_s = _own_time(change)
         if own_s:
-            self._clock.learn(wall_s, own_s)
+            self._clock.anchor(wall_s, own_s)
         at_s = own_s if own_s else self._clock.fleet_at(wall_s)
         if value is None:
             del self._known[name]
@@ -165,7 +165,7 @@ class Recorder:
         else:
             self._known[name] = value
             self._show(key, value, at_s, wall_s)
-            self._tell(key, value, before, at_s, wall_s)
+            self._log_event(key, value, before, at_s, wall_s)
         self._graphs.draw(max(at_s, self._clock.now_s))
 
     def flush(self, whole: bool = True) -> None:
@@ -245,15 +245,15 @@ class Recorder:
             del self._doing[record.robot]
             self._world.robot_label(record.robot, None, at_s, None)
 
-    def _tell(self, key: str, value: Any, before: Any, at_s: float, wall_s: float) -> None:
+    def _log_event(self, key: str, value: Any, before: Any, at_s: float, wall_s: float) -> None:
         if key == REPORT.name:
             what = self._call(value)
             for ended_s, line in event_log.tries(value, before, what):
                 self._log("reports", line, ended_s, None)
             topic, lines = "reports", event_log.report(value, before, what)
-        elif key in _TELL:
-            topic, tell = _TELL[key]
-            lines = tell(value, before)
+        elif key in _SENTENCES:
+            topic, sentences = _SENTENCES[key]
+            lines = sentences(value, before)
         else:
             return
         for line in lines:

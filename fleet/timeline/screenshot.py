@@ -39,7 +39,7 @@ def save_screenshot(
     else:
         summary(recording)
     port = free_port()
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as output:
         shown = viewer.start(
             [
                 "--headless",
@@ -49,10 +49,10 @@ def save_screenshot(
                 "--port",
                 str(port),
             ],
-            output=said.fileno(),
+            output=output.fileno(),
         )
         try:
-            picture = _take(shown, said, port, recording, at_s)
+            picture = _take(shown, output, port, recording, at_s)
         finally:
             viewer.end(shown)
     try:
@@ -63,7 +63,7 @@ def save_screenshot(
 
 
 def _take(
-    shown: subprocess.Popen[bytes], said: IO[bytes], port: int, recording: Path, at_s: float
+    shown: subprocess.Popen[bytes], output: IO[bytes], port: int, recording: Path, at_s: float
 ) -> bytes:
     from rerun.experimental import ViewerClient
 
@@ -73,7 +73,7 @@ def _take(
     trouble: Exception | None = None
     while client is None:
         if shown.poll() is not None:
-            raise NoPicture(_why(said))
+            raise NoPicture(_why(output))
         if time.monotonic() > deadline:
             raise NoPicture(f"Rerun's viewer does not answer after {START_S:.0f} s: {trouble}")
         try:
@@ -97,16 +97,16 @@ def _take(
                 break
             last = picture
     except Exception as error:
-        why = error if shown.poll() is None else _why(said)
+        why = error if shown.poll() is None else _why(output)
         raise NoPicture(f"Rerun's viewer could not show {recording}: {why}") from None
     if not picture.startswith(b"\x89PNG"):
         raise NoPicture(f"Rerun's viewer gave no picture of {recording}")
     return picture
 
 
-def _why(said: IO[bytes]) -> str:
-    said.seek(0)
-    text = said.read().decode(errors="replace")
+def _why(output: IO[bytes]) -> str:
+    output.seek(0)
+    text = output.read().decode(errors="replace")
     if any(word in text.lower() for word in _NO_DRIVER):
         return (
             "Rerun's viewer finds no graphics driver: install one that draws in software "

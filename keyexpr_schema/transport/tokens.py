@@ -42,6 +42,11 @@ class TokenWatch(ChangeStream[TokenChange[A]], Generic[A]):
         self._doubted_until_s: dict[A, float] = {}
         self._generation = link.router.generation
 
+    @property
+    def alive(self) -> frozenset[A]:
+        """The tokens that are there, whatever was handed to the iterator so far."""
+        return frozenset(self._alive)
+
     @asynccontextmanager
     async def running(self) -> AsyncIterator[TokenWatch[A]]:
         """Subscribe and look, until the block ends."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-import signal
-from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from keyexpr_schema.signals import run_until_signal
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.backend import Backend
 from sim.errors import SimError
@@ -71,15 +70,7 @@ def run_simulation(
             )
             await serving
 
-    async def main() -> None:
-        loop = asyncio.get_running_loop()
-        working = asyncio.create_task(serve())
-        for name in (signal.SIGTERM, signal.SIGINT):
-            loop.add_signal_handler(name, working.cancel)
-        with suppress(asyncio.CancelledError):
-            await working
-
-    asyncio.run(main())
+    run_until_signal(serve())
 
 
 def make_backend(

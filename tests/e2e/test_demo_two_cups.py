@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from tests.demo_process import demo, left_behind
+from tests.support.demo_process import demo, left_behind
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(300)]
 

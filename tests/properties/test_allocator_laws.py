@@ -17,7 +17,7 @@ from fleet.allocators.base import AllocationProblem, Assignment, NotAllocated
 from fleet.allocators.cost_based import assign_in_rounds
 from fleet.allocators.min_max_load import assign_balanced, assign_with_least_travel
 from fleet.allocators.round_robin import assign_in_turn
-from tests.household import checked, drives, fact, home, manipulator
+from tests.support.household import checked, drives, fact, home, manipulator
 
 ROBOTS = {"r0": "kitchen", "r1": "hallway", "r2": "living_room"}
 WORLD = home(

@@ -13,7 +13,7 @@ from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel, condition_holds, room_left
 from keyexpr_schema.ids import bare_name
 from keyexpr_schema.payloads.plans import Plan
-from tests.random_plans import ALLOCATION, plans
+from tests.support.random_plans import ALLOCATION, plans
 
 
 def orders(graph: TaskGraph, done: tuple[str, ...] = ()) -> list[tuple[str, ...]]:

@@ -11,9 +11,9 @@ from fleet.errors import NotUnderstood
 from fleet.language import Reading, Vocabulary, read_goal, statement_facts
 from fleet.language.words.tokens import words_in
 from keyexpr_schema.payloads.world import Object, Place
-from tests.household import carrier, manipulator
-from tests.language_house import WORDS as NAMES
-from tests.language_house import shown
+from tests.support.household import carrier, manipulator
+from tests.support.language_house import WORDS as NAMES
+from tests.support.language_house import shown
 
 WORDS = Vocabulary(NAMES.places, NAMES.objects, NAMES.robots, {"book": "kitchen"})
 KNOWN = {*WORDS.places, *WORDS.objects, *WORDS.robots}

@@ -19,7 +19,7 @@ from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema
 from fleet.planners.llm.candidate import candidate_of, merged
 from fleet.planners.llm.verification import verify
 from keyexpr_schema.payloads.plans import Plan
-from tests.household import bring, home, manipulator
+from tests.support.household import bring, home, manipulator
 
 WORLD = home((manipulator("r1"), manipulator("r2")))
 GOALS = (bring(1, "hallway"), bring(2, "living_room"))

@@ -17,7 +17,7 @@ from fleet.core.events import Event, decode_event, encode_event
 from fleet.core.state import State
 from fleet.core.step import step
 from fleet.service.event_journal import EventJournal
-from tests.household import SKILLS
+from tests.support.household import SKILLS
 
 HERE = Path(__file__).parent
 TOLD = ("state", "revision", "robot", "attempt", "epoch", "cancelled", "accepted", "value")

@@ -7,8 +7,8 @@ import pytest
 from fleet.core.events import decode_event, encode_event
 from fleet.core.state import State
 from fleet.core.step import replay
-from tests.household import SKILLS
 from tests.replay.journal_files import HERE, effects_of, events_in
+from tests.support.household import SKILLS
 
 JOURNALS = sorted(path.name.removesuffix(".events.jsonl") for path in HERE.glob("*.events.jsonl"))
 

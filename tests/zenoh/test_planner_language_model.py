@@ -10,8 +10,9 @@ import pytest
 from keyexpr_schema.keyspace import GOAL_STATUS, PLAN_STATUS
 from keyexpr_schema.payloads.goals import GoalAddress, GoalState
 from keyexpr_schema.payloads.plans import PlanAddress
-from tests.llm_server import LlmServer, Reply
-from tests.planner_process import ask_for_plan, finish, person, planner, value
+from tests.support.llm_server import LlmServer, Reply
+from tests.support.planner_process import ask_for_plan, finish, person, planner, value
+from tests.support.router_process import RouterProcess
 
 pytestmark = pytest.mark.slow
 
@@ -45,7 +46,9 @@ GOOD = {
 UNCHECKED = {"tasks": [GOOD["tasks"][3]], "pins": []}
 
 
-async def test_a_models_plan_is_repaired_and_carried_out(router: Any, tmp_path: Path) -> None:
+async def test_a_models_plan_is_repaired_and_carried_out(
+    router: RouterProcess, tmp_path: Path
+) -> None:
     with LlmServer(Reply(UNCHECKED), Reply(GOOD)) as server:
         options = configured(server, tmp_path)
         async with (
@@ -62,7 +65,7 @@ async def test_a_models_plan_is_repaired_and_carried_out(router: Any, tmp_path: 
 
 
 async def test_a_hopeless_model_is_replaced_by_the_symbolic_planner(
-    router: Any, tmp_path: Path
+    router: RouterProcess, tmp_path: Path
 ) -> None:
     with LlmServer(Reply("I would rather not.")) as server:
         options = configured(server, tmp_path)
@@ -79,7 +82,7 @@ async def test_a_hopeless_model_is_replaced_by_the_symbolic_planner(
 
 
 async def test_a_sentence_that_the_grammar_refuses_is_read_by_the_model(
-    router: Any, tmp_path: Path
+    router: RouterProcess, tmp_path: Path
 ) -> None:
     wanted = {"relation": "at", "subject": "cup_1", "value": "hallway", "any_of": []}
     read = Reply({"stages": [[wanted]], "reason": ""})

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import shutil
 from pathlib import Path
-from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -34,9 +33,8 @@ from keyexpr_schema.payloads.service import PlannerAddress
 from keyexpr_schema.payloads.tasks import OrderAddress
 from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from tests.household import fact, manipulator
-from tests.planner_process import (
-    DEADLINE_S,
+from tests.support.household import fact, manipulator
+from tests.support.planner_process import (
     PlannerProcess,
     ask_for_plan,
     carry_out,
@@ -44,20 +42,23 @@ from tests.planner_process import (
     next_order,
     person,
     planner,
-    until,
     value,
 )
-from tests.robotctl import Robotctl
+from tests.support.polling import DEADLINE_S, until
+from tests.support.robotctl import Robotctl
+from tests.support.router_process import RouterProcess
 
 
-async def test_a_goal_is_planned_ordered_and_reached(router: Any, tmp_path: Path) -> None:
+async def test_a_goal_is_planned_ordered_and_reached(router: RouterProcess, tmp_path: Path) -> None:
     async with planner(router.endpoint, tmp_path), person(router.endpoint) as session:
         await ask_for_plan(session)
         await finish(session, set())
         assert await session.list(ORDER) == {}
 
 
-async def test_kill_9_in_the_middle_gives_no_attempt_twice(router: Any, tmp_path: Path) -> None:
+async def test_kill_9_in_the_middle_gives_no_attempt_twice(
+    router: RouterProcess, tmp_path: Path
+) -> None:
     async with person(router.endpoint) as session, planner(router.endpoint, tmp_path) as first:
         await ask_for_plan(session)
         before = await next_order(session, set())
@@ -72,7 +73,7 @@ async def test_kill_9_in_the_middle_gives_no_attempt_twice(router: Any, tmp_path
         await finish(session, done)
 
 
-async def test_a_router_that_is_killed_loses_nothing(router: Any, tmp_path: Path) -> None:
+async def test_a_router_that_is_killed_loses_nothing(router: RouterProcess, tmp_path: Path) -> None:
     async with person(router.endpoint) as session, planner(router.endpoint, tmp_path):
         await ask_for_plan(session)
         order = await next_order(session, set())
@@ -82,7 +83,9 @@ async def test_a_router_that_is_killed_loses_nothing(router: Any, tmp_path: Path
         await finish(session, {order.task})
 
 
-async def test_a_planner_that_lost_its_journal_repeats_nothing(router: Any, tmp_path: Path) -> None:
+async def test_a_planner_that_lost_its_journal_repeats_nothing(
+    router: RouterProcess, tmp_path: Path
+) -> None:
     async with person(router.endpoint) as session:
         async with planner(router.endpoint, tmp_path / "one"):
             await ask_for_plan(session)
@@ -97,7 +100,7 @@ async def test_a_planner_that_lost_its_journal_repeats_nothing(router: Any, tmp_
 
 
 async def test_durations_are_learned_and_outlive_the_planners_journal(
-    router: Any, tmp_path: Path
+    router: RouterProcess, tmp_path: Path
 ) -> None:
     robotctl = Robotctl(router.endpoint, tmp_path, realm="test")
     async with person(router.endpoint) as session:
@@ -120,7 +123,9 @@ async def test_durations_are_learned_and_outlive_the_planners_journal(
             assert [task.duration_s for task in tasks if task.skill == "pick"] == [50.0]
 
 
-async def test_what_a_lost_robot_was_to_do_goes_to_another(router: Any, tmp_path: Path) -> None:
+async def test_what_a_lost_robot_was_to_do_goes_to_another(
+    router: RouterProcess, tmp_path: Path
+) -> None:
     async with (
         person(router.endpoint) as session,
         planner(router.endpoint, tmp_path, "--lost-after", "0.5"),
@@ -143,7 +148,7 @@ async def test_what_a_lost_robot_was_to_do_goes_to_another(router: Any, tmp_path
 
 
 async def test_a_second_planner_takes_charge_and_the_first_stops(
-    router: Any, tmp_path: Path
+    router: RouterProcess, tmp_path: Path
 ) -> None:
     async with planner(router.endpoint, tmp_path / "one") as first:
         async with planner(router.endpoint, tmp_path / "two"):
@@ -152,7 +157,9 @@ async def test_a_second_planner_takes_charge_and_the_first_stops(
             assert "took charge" in first.end()
 
 
-async def test_two_planners_on_one_journal_are_refused(router: Any, tmp_path: Path) -> None:
+async def test_two_planners_on_one_journal_are_refused(
+    router: RouterProcess, tmp_path: Path
+) -> None:
     async with planner(router.endpoint, tmp_path):
         second = PlannerProcess(router.endpoint, tmp_path)
         with pytest.raises(AssertionError):
@@ -161,7 +168,7 @@ async def test_two_planners_on_one_journal_are_refused(router: Any, tmp_path: Pa
 
 
 async def test_what_is_malformed_or_unknown_is_told_and_disturbs_nobody(
-    router: Any, tmp_path: Path
+    router: RouterProcess, tmp_path: Path
 ) -> None:
     async with planner(router.endpoint, tmp_path), person(router.endpoint) as session:
         for keyexpr in ("goals/bad/spec", "requests/plan/bad", "world/facts/cup_1/colour"):
@@ -183,7 +190,7 @@ async def test_what_is_malformed_or_unknown_is_told_and_disturbs_nobody(
 
 
 async def test_a_goal_deleted_while_no_planner_is_there_is_forgotten(
-    router: Any, tmp_path: Path
+    router: RouterProcess, tmp_path: Path
 ) -> None:
     async with person(router.endpoint) as session:
         async with planner(router.endpoint, tmp_path):
@@ -200,7 +207,7 @@ async def test_a_goal_deleted_while_no_planner_is_there_is_forgotten(
 
 
 async def test_a_proposal_is_taken_when_a_planner_starts_and_a_spec_of_nobody_goes(
-    router: Any, tmp_path: Path
+    router: RouterProcess, tmp_path: Path
 ) -> None:
     task = Task(task="t1", skill="navigate", args={"robot": "?a1", "to": "hallway"}, actor="a1")
     plan = Plan(plan="mine", goals=(), conditions=(), tasks=(task,), autostart=False)
@@ -219,8 +226,6 @@ async def test_a_proposal_is_taken_when_a_planner_starts_and_a_spec_of_nobody_go
 
 
 async def test_a_planner_may_start_before_its_router(tmp_path: Path) -> None:
-    from tests.conftest import RouterProcess
-
     router = RouterProcess(tmp_path / "router")
     router.kill()
     process = PlannerProcess(router.endpoint, tmp_path / "planner")

@@ -16,8 +16,8 @@ from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.mission_file import load_mission
 from sim.kinematic.backend import KinematicBackend
 from sim.server.sim_server import SimServer
-from tests.conftest import RouterProcess
-from tests.worker_world import DEADLINE_S, Planner
+from tests.support.router_process import RouterProcess
+from tests.support.worker_world import DEADLINE_S, Planner
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "custom_skill.py"
 

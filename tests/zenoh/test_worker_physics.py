@@ -12,7 +12,7 @@ from keyexpr_schema.transport.session import SessionConfig
 from sim.backend import Backend
 from sim.files.mission_file import Mission
 from sim.mujoco_world import MujocoBackend
-from tests.worker_world import Fleet, running_fleet
+from tests.support.worker_world import Fleet, running_fleet
 
 
 def physics(mission: Mission) -> Backend:

@@ -18,8 +18,8 @@ from keyexpr_schema.payloads.robots import RobotActivity
 from keyexpr_schema.payloads.tasks import ReportState
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.mission_file import load_mission
-from tests.conftest import RouterProcess
-from tests.worker_world import DEADLINE_S, Planner
+from tests.support.router_process import RouterProcess
+from tests.support.worker_world import DEADLINE_S, Planner
 
 SIM = """
 import sys

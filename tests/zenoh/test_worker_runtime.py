@@ -21,8 +21,8 @@ from keyexpr_schema.transport.session import SessionConfig
 from sim.backend import Backend
 from sim.files.mission_file import Mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
-from tests.conftest import RouterProcess
-from tests.worker_world import DEADLINE_S, Fleet, running_fleet
+from tests.support.router_process import RouterProcess
+from tests.support.worker_world import DEADLINE_S, Fleet, running_fleet
 from workers.context import SkillContext
 from workers.skill_registry import skill
 

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import msgspec
@@ -112,12 +111,7 @@ class Journal:
         self._db = db
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._db is not None:
             self._db.close()
             self._db = None
@@ -145,11 +139,11 @@ class Journal:
             self._write(Attempt(order=order, phase=Phase.STARTED))
             self._send(report)
 
-    def ended(self, order: Order, report: Report, facts: tuple[Fact, ...] = ()) -> None:
+    def ended(self, order: Order, report: Report) -> None:
         """The attempt has ended; its facts, then its report, wait to be sent."""
         with self._transaction():
             self._write(Attempt(order=order, phase=Phase.ENDED, report=report))
-            for fact in facts:
+            for fact in report.facts:
                 self._send(fact)
             self._send(report)
 

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from keyexpr_schema.payloads.tasks import Order, Report, ReportAddress, ReportState, Try
-from keyexpr_schema.payloads.world import Fact
+from keyexpr_schema.payloads.tasks import Order, Report, ReportAddress, ReportState
 
 
 def make_report(
     order: Order,
     incarnation: str,
     state: ReportState,
-    *,
     reason: str | None = None,
+    *,
     retryable: bool = True,
-    tries: tuple[Try, ...] = (),
-    facts: tuple[Fact, ...] = (),
     started_s: float | None = None,
-    ended_s: float | None = None,
 ) -> Report:
-    """What the run `incarnation` of a worker says of the attempt that `order` asks for."""
+    """What the run `incarnation` of a worker reports of the attempt that `order` asks for."""
     return Report(
         robot=order.robot,
         plan=order.plan,
@@ -28,12 +24,9 @@ def make_report(
         epoch=order.epoch,
         incarnation=incarnation,
         state=state,
-        tries=tries,
-        facts=facts,
         reason=reason,
         retryable=retryable,
         started_s=started_s,
-        ended_s=ended_s,
     )
 
 

@@ -12,8 +12,8 @@ from fleet.timeline.drawing.lanes import call_text
 from fleet.timeline.drawing.palette import TASK_STATES
 from fleet.timeline.drawing.sink import Sink, entity
 from fleet.timeline.drawing.text import drawable
-from keyexpr_schema.ids import actor_arg, actor_in
-from keyexpr_schema.payloads.plans import Plan, PlanStatus
+from keyexpr_schema.ids import actor_in
+from keyexpr_schema.payloads.plans import Plan, PlanStatus, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 ROW_PX = 58.0
@@ -67,19 +67,13 @@ class Drawing:
             if name in self.records:
                 continue
             robot = self.status.allocation.get(task.actor) if self.status else None
-            nodes.append(
-                _node(name, task.skill, task.args, task.actor, robot, TaskState.WAITING, task.after)
-            )
+            nodes.append(_node(task, robot, TaskState.WAITING, task.after))
         for name, record in self.records.items():
             kept = record.state in (TaskState.SUCCEEDED, TaskState.RUNNING)
             if name not in wanted and record.revision < revision and not kept:
                 continue
             after = (*(wanted[name].after if name in wanted else record.after), *record.behind)
-            nodes.append(
-                _node(
-                    name, record.skill, record.args, record.actor, record.robot, record.state, after
-                )
-            )
+            nodes.append(_node(record, record.robot, record.state, after))
         return nodes
 
 
@@ -108,23 +102,25 @@ class Graphs:
                 self._clear(drawing, now_s)
                 continue
             nodes = drawing.nodes()
-            places = layout(nodes)
-            depth = 1 + max((row for _, row in places.values()), default=0.0) / ROW_PX
+            positions = layout(nodes)
+            depth = 1 + max((row for _, row in positions.values()), default=0.0) / ROW_PX
             big = len(nodes) > EAGER and not final
             late = now_s - drawing.drawn_s >= len(nodes) / EAGER or now_s < drawing.drawn_s
             if not big or late:
-                self._log(drawing, nodes, {t: (x, y + top) for t, (x, y) in places.items()}, now_s)
+                self._log(
+                    drawing, nodes, {t: (x, y + top) for t, (x, y) in positions.items()}, now_s
+                )
             top += (depth + 0.5) * ROW_PX if nodes else 0.0
 
     def _log(
         self,
         drawing: Drawing,
         nodes: list[Node],
-        places: dict[str, tuple[float, float]],
+        positions: dict[str, tuple[float, float]],
         now_s: float,
     ) -> None:
         drawing.dirty = False
-        now = (tuple(nodes), tuple(places.items()))
+        now = (tuple(nodes), tuple(positions.items()))
         if now == drawing.drawn:
             return
         drawing.drawn, drawing.drawn_s = now, now_s
@@ -135,7 +131,7 @@ class Graphs:
         edges = [(first, node.task) for node in nodes for first in node.after if first in names]
         drawn = rr.GraphNodes(
             node_ids=[node.task for node in nodes],
-            positions=[places[node.task] for node in nodes],
+            positions=[positions[node.task] for node in nodes],
             labels=[node.label for node in nodes],
             colors=[TASK_STATES[node.state] for node in nodes],
             show_labels=True,
@@ -165,16 +161,16 @@ def layout(nodes: list[Node]) -> dict[str, tuple[float, float]]:
         below = [row[first] + 1 for first in node.after if first in row]
         row[node.task] = max([free.get(node.lane, 0), *below])
         free[node.lane] = row[node.task] + 1
-    places: dict[str, tuple[float, float]] = {}
+    positions: dict[str, tuple[float, float]] = {}
     left = 0.0
     for lane in sorted(free, key=lambda lane: (actor_in(lane) is not None, _natural(lane))):
         mine = [node for node in nodes if node.lane == lane]
         width = max(GLYPH_PX * len(line) for node in mine for line in node.label.split("\n"))
         width += GAP_PX
         for node in mine:
-            places[node.task] = (left + width / 2, row[node.task] * ROW_PX)
+            positions[node.task] = (left + width / 2, row[node.task] * ROW_PX)
         left += width
-    return places
+    return positions
 
 
 def _natural(name: str) -> list[tuple[int, str]]:
@@ -202,14 +198,9 @@ def _ranks(after: dict[str, tuple[str, ...]]) -> dict[str, int]:
 
 
 def _node(
-    name: str,
-    skill: str,
-    args: dict[str, str],
-    actor: str,
-    robot: str | None,
-    state: TaskState,
-    after: tuple[str, ...],
+    task: Task | TaskRecord, robot: str | None, state: TaskState, after: tuple[str, ...]
 ) -> Node:
-    who = robot or actor_arg(actor)
-    label = f"{GLYPHS[state]} {name}: {call_text(skill, args, robot)}\n{who} · {state.value}"
-    return Node(task=name, label=drawable(label), state=state, lane=who, after=after)
+    lane = robot or f"?{task.actor}"
+    what = call_text(task.skill, task.args, robot)
+    label = drawable(f"{GLYPHS[state]} {task.task}: {what}\n{lane} · {state.value}")
+    return Node(task=task.task, label=label, state=state, lane=lane, after=after)

@@ -125,7 +125,7 @@ class Lanes:
                 self._configure(lane)
 
     def drop(self, plan: str, task: str, now_s: float) -> None:
-        """The planner deleted its books on a task: what still ran there ended."""
+        """The planner deleted its record of a task: what still ran there ended."""
         before = self._last.pop((plan, task), None)
         if before is not None:
             self._close(*before, now_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import rerun as rr
 
@@ -47,41 +48,20 @@ def log_shapes(sink: Sink, path: str, shapes: Sequence[Shape]) -> None:
         turns = [[x, y, z, w] for w, x, y, z in (shape.quaternion_wxyz for shape in some)]
         colours = [[round(255 * min(1.0, max(0.0, part))) for part in s.rgba] for s in some]
         sizes = [shape.size_m for shape in some]
+        look: dict[str, Any] = {"quaternions": turns, "colors": colours, "fill_mode": solid}
+        radii, lengths = [size[0] for size in sizes], [2 * size[1] for size in sizes]
         what: object
         if kind is ShapeKind.BOX:
-            what = rr.Boxes3D(
-                half_sizes=sizes,
-                centers=centres,
-                quaternions=turns,
-                colors=colours,
-                fill_mode=solid,
-            )
+            what = rr.Boxes3D(half_sizes=sizes, centers=centres, **look)
         elif kind is ShapeKind.CYLINDER:
-            what = rr.Cylinders3D(
-                lengths=[2 * size[1] for size in sizes],
-                radii=[size[0] for size in sizes],
-                centers=centres,
-                quaternions=turns,
-                colors=colours,
-                fill_mode=solid,
-            )
+            what = rr.Cylinders3D(lengths=lengths, radii=radii, centers=centres, **look)
         elif kind is ShapeKind.SPHERE:
             what = rr.Ellipsoids3D(
-                half_sizes=[(size[0],) * 3 for size in sizes],
-                centers=centres,
-                quaternions=turns,
-                colors=colours,
-                fill_mode=solid,
+                half_sizes=[(radius,) * 3 for radius in radii], centers=centres, **look
             )
         else:
-            what = rr.Capsules3D(
-                lengths=[2 * size[1] for size in sizes],
-                radii=[size[0] for size in sizes],
-                translations=[_cap(shape) for shape in some],
-                quaternions=turns,
-                colors=colours,
-                fill_mode=solid,
-            )
+            starts = [_cap(shape) for shape in some]
+            what = rr.Capsules3D(lengths=lengths, radii=radii, translations=starts, **look)
         sink.fix(f"{path}/{kind.value}", what)
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from fleet.allocators.base import Allocated, AllocationProblem, Assignment
 from fleet.allocators.cost_based import CostBasedAllocator, assign_in_rounds
-from tests.household import checked, drives, fact, home, manipulator
+from tests.support.household import checked, drives, fact, home, manipulator
 
 TEAM = (manipulator("r1"), manipulator("r2"), manipulator("r3"))
 

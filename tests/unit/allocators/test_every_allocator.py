@@ -13,7 +13,7 @@ from fleet.core.model.world import WorldModel
 from fleet.planners.base import PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from keyexpr_schema.payloads.plans import Plan, Task
-from tests.household import bring, carrier, checked, drives, home, manipulator
+from tests.support.household import bring, carrier, checked, drives, home, manipulator
 
 PLAIN = (
     MinMaxLoadAllocator(TieBreak.NEXT_LOADS),

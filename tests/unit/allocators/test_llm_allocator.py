@@ -12,8 +12,8 @@ from fleet.allocators.round_robin import RoundRobinAllocator
 from fleet.llm.client import ModelAnswer, ModelClient
 from fleet.llm.configuration import LlmConfig
 from fleet.llm.conversation import LanguageModel
-from tests.household import checked, drives, home, manipulator
-from tests.llm_server import LlmServer, Reply
+from tests.support.household import checked, drives, home, manipulator
+from tests.support.llm_server import LlmServer, Reply
 
 TEAM = (manipulator("r1"), manipulator("r2"))
 

@@ -21,7 +21,7 @@ from fleet.allocators.min_max_load_program import MinMaxLoadProgram, Status, max
 from fleet.core.model.world import WorldModel
 from fleet.service.composition import compose
 from keyexpr_schema.payloads.plans import Violation
-from tests.household import checked, drives, fact, home, manipulator
+from tests.support.household import checked, drives, fact, home, manipulator
 
 PLACES = ("kitchen", "hallway", "living_room")
 

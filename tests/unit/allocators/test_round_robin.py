@@ -6,7 +6,7 @@ from fleet.allocators.base import Allocated
 from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.allocators.round_robin import RoundRobinAllocator
 from keyexpr_schema.payloads.plans import Plan
-from tests.household import carrier, checked, drives, home, manipulator
+from tests.support.household import carrier, checked, drives, home, manipulator
 
 TEAM = (manipulator("r1"), manipulator("r2"), manipulator("r3"), carrier("c1"), carrier("c2"))
 

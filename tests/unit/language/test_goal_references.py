@@ -10,7 +10,7 @@ from msgspec import structs
 from fleet.errors import NotUnderstood
 from fleet.language import Vocabulary, read_goal
 from keyexpr_schema.payloads.world import Object
-from tests.language_house import OBJECTS, PLACES, ROBOTS, WORDS, shown
+from tests.support.language_house import OBJECTS, PLACES, ROBOTS, WORDS, shown
 
 
 @pytest.mark.parametrize(

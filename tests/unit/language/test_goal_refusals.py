@@ -6,7 +6,7 @@ import pytest
 
 from fleet.errors import NotUnderstood
 from fleet.language import Vocabulary, read_goal
-from tests.language_house import WORDS
+from tests.support.language_house import WORDS
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fleet.language import read_goal
-from tests.language_house import WORDS, shown
+from tests.support.language_house import WORDS, shown
 
 
 @pytest.mark.parametrize(

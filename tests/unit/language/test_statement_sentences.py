@@ -7,7 +7,7 @@ import pytest
 from fleet.errors import NotUnderstood
 from fleet.language import statement_facts
 from keyexpr_schema.facts import Value
-from tests.language_house import WORDS
+from tests.support.language_house import WORDS
 
 
 @pytest.mark.parametrize(

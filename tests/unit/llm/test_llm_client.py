@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from fleet.llm.client import ModelClient
-from tests.llm_server import LlmServer, Reply
+from tests.support.llm_server import LlmServer, Reply
 
 KEY = "sk-very-secret"
 

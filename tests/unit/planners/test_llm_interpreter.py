@@ -12,8 +12,8 @@ from fleet.llm.configuration import LlmConfig
 from fleet.llm.conversation import LanguageModel
 from fleet.planners.llm.interpreter import LlmInterpreter
 from keyexpr_schema.payloads.goals import Condition
-from tests.household import SKILLS, at, home
-from tests.llm_server import LlmServer, Reply
+from tests.support.household import SKILLS, at, home
+from tests.support.llm_server import LlmServer, Reply
 
 WORLD = home()
 WORDS = Vocabulary(WORLD.places, WORLD.objects, WORLD.robots, {"cup_1": "kitchen"})

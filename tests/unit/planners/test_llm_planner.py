@@ -12,9 +12,9 @@ from fleet.planners.base import PlanningProblem
 from fleet.planners.llm.answers import GraphAnswer
 from fleet.planners.llm.candidate import candidate_of, merged
 from keyexpr_schema.payloads.goals import Goal
-from tests.household import at, bring, fact, home
-from tests.llm_plans import GOOD, WRONG, carry, fell_back, flat, graph, solve, task
-from tests.llm_server import LlmServer, Reply
+from tests.support.household import at, bring, fact, home
+from tests.support.llm_plans import GOOD, WRONG, carry, fell_back, flat, graph, solve, task
+from tests.support.llm_server import LlmServer, Reply
 
 
 # --- answers that are right ----------------------------------------------------------------------

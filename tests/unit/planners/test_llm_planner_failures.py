@@ -14,9 +14,9 @@ from fleet.llm.conversation import LanguageModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.llm.planner import LlmPlanner
 from fleet.planners.symbolic.planner import SymbolicPlanner
-from tests.household import carrier, fact, home
-from tests.llm_plans import GOALS, GOOD, WRONG, config, fell_back, graph, solve
-from tests.llm_server import LlmServer, Reply
+from tests.support.household import carrier, fact, home
+from tests.support.llm_plans import GOALS, GOOD, WRONG, config, fell_back, graph, solve
+from tests.support.llm_server import LlmServer, Reply
 
 
 # --- answers that are none -----------------------------------------------------------------------

@@ -17,7 +17,7 @@ from keyexpr_schema.ids import bare_name
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.payloads.world import Fact
-from tests.household import (
+from tests.support.household import (
     PLACES,
     SKILLS,
     UNLOAD,
@@ -29,7 +29,7 @@ from tests.household import (
     fact,
     manipulator,
 )
-from tests.language_house import WORDS, shown
+from tests.support.language_house import WORDS, shown
 
 OWN = {
     "vacuum": {

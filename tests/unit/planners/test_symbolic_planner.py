@@ -21,7 +21,17 @@ from keyexpr_schema.facts import FactKey
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.payloads.world import Surface
-from tests.household import PLACES, SKILLS, at, bring, carrier, checked, fact, home, manipulator
+from tests.support.household import (
+    PLACES,
+    SKILLS,
+    at,
+    bring,
+    carrier,
+    checked,
+    fact,
+    home,
+    manipulator,
+)
 
 
 def solve(world: WorldModel, *goals: Goal, **more: object) -> Plan:

@@ -11,8 +11,8 @@ from fleet.core.checker.form import PlanForm
 from fleet.core.model.world import WorldModel
 from fleet.planners.symbolic.action_sequences import ALTERNATIVES
 from keyexpr_schema.payloads.plans import Plan
-from tests.fleet_model import FleetModel
-from tests.household import bring, carrier, manipulator
+from tests.support.fleet_model import FleetModel
+from tests.support.household import bring, carrier, manipulator
 
 
 def test_every_candidate_is_checked_once_and_the_best_once_more_and_once_allocated(

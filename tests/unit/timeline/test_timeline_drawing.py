@@ -19,7 +19,7 @@ from fleet.timeline.drawing.trails import CORNERS, Trail
 from fleet.timeline.drawing.utilisation import Utilisation
 from fleet.timeline.reader import rows
 from keyexpr_schema.payloads.tasks import TaskState
-from tests.timeline_mission import STEPS, record
+from tests.support.timeline_mission import STEPS, record
 
 
 def test_a_zenoh_timestamp_gives_its_wall_time() -> None:
@@ -46,7 +46,7 @@ def test_the_clock_places_a_value_between_its_neighbours() -> None:
 
 def test_without_a_published_clock_time_goes_on() -> None:
     clock = Clock()
-    clock.learn(100.0, 10.0)
+    clock.anchor(100.0, 10.0)
     assert clock.fleet_at(104.0) == 14.0
 
 
@@ -56,7 +56,7 @@ def test_the_clock_never_runs_backwards_whatever_it_learns(
 ) -> None:
     clock = Clock()
     for wall_s, fleet_s in pairs:
-        clock.learn(wall_s, fleet_s)
+        clock.anchor(wall_s, fleet_s)
     known = [clock.fleet_at(wall_s) for wall_s in sorted(wall for wall, _ in pairs)]
     assert all(a <= b + 1e-6 for a, b in pairwise(known))
 

@@ -19,7 +19,17 @@ from keyexpr_schema.payloads.service import UndecodableAddress, UndecodableValue
 from keyexpr_schema.payloads.simulation import Frame, Frames, SimAddress, SimClock
 from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState, TaskAddress, TaskState
 from keyexpr_schema.payloads.world import Fact, FactAddress
-from tests.timeline_mission import END_S, STEPS, WALL_S, Put, mission, plan, put, record, script
+from tests.support.timeline_mission import (
+    END_S,
+    STEPS,
+    WALL_S,
+    Put,
+    mission,
+    plan,
+    put,
+    record,
+    script,
+)
 
 
 def written(path: Path, changes: list[Put], backlog: bool = False) -> Path:

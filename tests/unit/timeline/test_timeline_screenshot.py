@@ -14,7 +14,7 @@ from fleet.timeline.recorder import Recorder
 from fleet.timeline.screenshot import DRIVER, main
 from keyexpr_schema.keyspace import GOAL_SPEC
 from keyexpr_schema.payloads.goals import Goal, GoalAddress
-from tests.timeline_mission import mission, put
+from tests.support.timeline_mission import mission, put
 
 
 def driver_is_installed() -> bool:

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState
 from keyexpr_schema.payloads.world import Fact
@@ -47,8 +48,8 @@ def test_facts_go_out_before_the_report_and_a_start_is_overtaken_by_its_end(tmp_
     with Journal(tmp_path / "hsr.journal") as journal:
         journal.queued(order())
         journal.started(order(), make_report(order(), "r1", ReportState.STARTED))
-        end = make_report(order(), "r1", ReportState.SUCCEEDED)
-        journal.ended(order(), end, (fact("kitchen"),))
+        end = replace(make_report(order(), "r1", ReportState.SUCCEEDED), facts=(fact("kitchen"),))
+        journal.ended(order(), end)
         assert words(journal) == [fact("kitchen"), end]
 
 
@@ -58,6 +59,7 @@ def test_a_killed_process_leaves_started_attempts_and_unsent_words(tmp_path: Pat
 import os, signal, sys
 sys.path.insert(0, {str(Path(__file__).parent)!r})
 from pathlib import Path
+from msgspec.structs import replace
 from test_order_journal import fact, order
 from keyexpr_schema.payloads.tasks import ReportState
 from workers.orders.journal import Journal
@@ -65,7 +67,7 @@ from workers.orders.reports import make_report
 journal = Journal(Path({str(path)!r})).__enter__()
 journal.queued(order("t1")); journal.queued(order("t2")); journal.queued(order("t3"))
 end = make_report(order("t1"), "r1", ReportState.SUCCEEDED)
-journal.ended(order("t1"), end, (fact("hallway"),))
+journal.ended(order("t1"), replace(end, facts=(fact("hallway"),)))
 journal.started(order("t2"), make_report(order("t2"), "r1", ReportState.STARTED))
 os.kill(os.getpid(), signal.SIGKILL)
 """

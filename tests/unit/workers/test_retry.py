@@ -9,9 +9,20 @@ from collections.abc import Awaitable, Callable
 import pytest
 
 from keyexpr_schema.errors import NoReply
-from keyexpr_schema.payloads.tasks import ReportState
+from keyexpr_schema.payloads.tasks import Report, ReportState
 from workers.errors import SkillFailed
-from workers.retry import AttemptResult, run_attempt
+from workers.retry import run_attempt
+
+REPORT = Report(
+    robot="hsr",
+    plan="p",
+    revision=1,
+    task="t1",
+    attempt=1,
+    epoch=1,
+    incarnation="i1",
+    state=ReportState.STARTED,
+)
 
 
 class Bench:
@@ -25,10 +36,9 @@ class Bench:
     async def make_safe(self) -> None:
         self.done.append("safe")
 
-    async def run(
-        self, once: Callable[[], Awaitable[None]], deadline_s: float = 60.0
-    ) -> AttemptResult:
+    async def run(self, once: Callable[[], Awaitable[None]], deadline_s: float = 60.0) -> Report:
         return await run_attempt(
+            REPORT,
             "pick",
             once,
             now_s=lambda: self.time_s,

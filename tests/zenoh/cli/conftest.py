@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Protocol
 
 import pytest
 
-from tests.robotctl import Robotctl
-
-
-class Router(Protocol):
-    endpoint: str
+from tests.support.robotctl import Robotctl
+from tests.support.router_process import RouterProcess
 
 
 @pytest.fixture
-def robotctl(router: Router, tmp_path: Path) -> Robotctl:
+def robotctl(router: RouterProcess, tmp_path: Path) -> Robotctl:
     return Robotctl(router.endpoint, tmp_path)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cli.command import CONNECT_TIMEOUT_S
-from tests.robotctl import Robotctl
+from tests.support.robotctl import Robotctl
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 ROBOTS = sorted(str(file) for file in (CONFIGS / "robots").glob("*.yaml"))

@@ -15,7 +15,7 @@ from keyexpr_schema.keyspace import (
 from keyexpr_schema.payloads.goals import GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.payloads.service import PlannerAliveAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
-from tests.robotctl import Robotctl
+from tests.support.robotctl import Robotctl
 
 MakeConfig = Callable[..., SessionConfig]
 

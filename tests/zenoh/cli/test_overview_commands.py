@@ -8,7 +8,6 @@ import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
 
 import pytest
 import zenoh
@@ -21,15 +20,12 @@ from keyexpr_schema.keyspace import (
 from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState, GoalStatus
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from tests.robotctl import Robotctl
+from tests.support.robotctl import Robotctl
+from tests.support.router_process import RouterProcess
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 ROBOTS = sorted(str(file) for file in (CONFIGS / "robots").glob("*.yaml"))
 MakeConfig = Callable[..., SessionConfig]
-
-
-class Router(Protocol):
-    endpoint: str
 
 
 def test_empty_lists_are_lists(robotctl: Robotctl) -> None:
@@ -57,7 +53,7 @@ def test_the_journal_tells_what_was_stored_in_order(robotctl: Robotctl) -> None:
 
 
 async def test_status_tells_what_is_unreadable_as_long_as_it_is(
-    robotctl: Robotctl, router: Router, session_config: MakeConfig
+    robotctl: Robotctl, router: RouterProcess, session_config: MakeConfig
 ) -> None:
     async with open_session(session_config(component="planner")) as session:
         bad = zenoh_config("client", connect=[router.endpoint], namespace="robotfleet")

@@ -18,7 +18,7 @@ from keyexpr_schema.payloads.requests import Answer, RequestAddress
 from keyexpr_schema.payloads.service import PlannerAliveAddress
 from keyexpr_schema.payloads.tasks import TaskAddress, TaskRecord, TaskState
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
-from tests.robotctl import Robotctl
+from tests.support.robotctl import Robotctl
 
 MakeConfig = Callable[..., SessionConfig]
 

@@ -6,7 +6,7 @@ import json
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import msgspec
 import pytest
@@ -24,8 +24,9 @@ from keyexpr_schema.keyspace import (
 from keyexpr_schema.payloads.goals import GoalAddress, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanAddress, Task
 from keyexpr_schema.transport.session import Session
-from tests.planner_process import carry_out, next_order, person, planner, value
-from tests.robotctl import Robotctl
+from tests.support.planner_process import carry_out, next_order, person, planner, value
+from tests.support.robotctl import Robotctl
+from tests.support.router_process import RouterProcess
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 WORLD = str(CONFIGS / "worlds" / "home.yaml")
@@ -34,17 +35,13 @@ LOCOBOT = str(CONFIGS / "robots" / "locobot.yaml")
 TEXT = "Bring cup 1 to the hallway"
 
 
-class Router(Protocol):
-    endpoint: str
-
-
 @pytest.fixture
-def robotctl(router: Router, tmp_path: Path) -> Robotctl:
+def robotctl(router: RouterProcess, tmp_path: Path) -> Robotctl:
     return Robotctl(router.endpoint, tmp_path, "test")
 
 
 @asynccontextmanager
-async def fleet(router: Router, data: Path, *options: str) -> AsyncIterator[Session]:
+async def fleet(router: RouterProcess, data: Path, *options: str) -> AsyncIterator[Session]:
     """A household with a manipulator that the test plays, and a planner."""
     async with person(router.endpoint) as session, planner(router.endpoint, data, *options):
         yield session
@@ -59,7 +56,7 @@ async def dry_run(robotctl: Robotctl, out: Path) -> Plan:
 
 
 async def test_a_dry_run_shows_the_plan_and_leaves_nothing_behind(
-    router: Router, robotctl: Robotctl, tmp_path: Path
+    router: RouterProcess, robotctl: Robotctl, tmp_path: Path
 ) -> None:
     out = tmp_path / "plan.yaml"
     async with fleet(router, tmp_path / "planner") as session:
@@ -98,7 +95,7 @@ async def test_a_dry_run_shows_the_plan_and_leaves_nothing_behind(
 
 
 async def test_a_plan_is_edited_checked_and_proposed(
-    router: Router, robotctl: Robotctl, tmp_path: Path
+    router: RouterProcess, robotctl: Robotctl, tmp_path: Path
 ) -> None:
     out = tmp_path / "plan.yaml"
     async with fleet(router, tmp_path / "planner") as session:
@@ -149,7 +146,7 @@ async def test_a_plan_is_edited_checked_and_proposed(
 
 
 async def test_plans_and_their_revisions_are_compared(
-    router: Router, robotctl: Robotctl, tmp_path: Path
+    router: RouterProcess, robotctl: Robotctl, tmp_path: Path
 ) -> None:
     out = tmp_path / "plan.yaml"
     async with fleet(router, tmp_path / "planner") as session:

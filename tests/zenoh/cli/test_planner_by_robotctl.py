@@ -6,7 +6,6 @@ import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Protocol
 
 import pytest
 
@@ -19,30 +18,27 @@ from keyexpr_schema.payloads.plans import PlanAddress, PlanState
 from keyexpr_schema.payloads.simulation import SimAddress, SimClock
 from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.session import Session
-from tests.planner_process import carry_out, next_order, person, planner
-from tests.robotctl import Robotctl
+from tests.support.planner_process import carry_out, next_order, person, planner
+from tests.support.robotctl import Robotctl
+from tests.support.router_process import RouterProcess
 
 TEXT = "Bring cup 1 to the hallway"
 
 
-class Router(Protocol):
-    endpoint: str
-
-
 @pytest.fixture
-def robotctl(router: Router, tmp_path: Path) -> Robotctl:
+def robotctl(router: RouterProcess, tmp_path: Path) -> Robotctl:
     return Robotctl(router.endpoint, tmp_path, "test")
 
 
 @asynccontextmanager
-async def fleet(router: Router, data: Path, *options: str) -> AsyncIterator[Session]:
+async def fleet(router: RouterProcess, data: Path, *options: str) -> AsyncIterator[Session]:
     """A household with a manipulator that the test plays, and a planner."""
     async with person(router.endpoint) as session, planner(router.endpoint, data, *options):
         yield session
 
 
 async def test_a_plan_waits_for_approval_if_the_planner_was_told_so(
-    router: Router, robotctl: Robotctl, tmp_path: Path
+    router: RouterProcess, robotctl: Robotctl, tmp_path: Path
 ) -> None:
     async with fleet(router, tmp_path / "planner", "--approval") as session:
         await robotctl.soon("goal", "add", TEXT, "--id", "g")
@@ -63,7 +59,7 @@ async def test_a_plan_waits_for_approval_if_the_planner_was_told_so(
 
 
 async def test_waiting_goals_are_planned_unasked_if_the_file_says_so(
-    router: Router, robotctl: Robotctl, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    router: RouterProcess, robotctl: Robotctl, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     settings = tmp_path / "auto.yaml"
     settings.write_text("planner: {auto_plan: true}")
@@ -74,7 +70,7 @@ async def test_waiting_goals_are_planned_unasked_if_the_file_says_so(
 
 
 async def test_a_goal_is_planned_and_waited_for_in_one_command(
-    router: Router, robotctl: Robotctl, tmp_path: Path
+    router: RouterProcess, robotctl: Robotctl, tmp_path: Path
 ) -> None:
     async with fleet(router, tmp_path / "planner") as session:
         waiting = asyncio.create_task(
@@ -103,7 +99,7 @@ async def test_a_goal_is_planned_and_waited_for_in_one_command(
 
 
 async def test_the_page_of_a_plan_and_its_graph(
-    router: Router, robotctl: Robotctl, tmp_path: Path
+    router: RouterProcess, robotctl: Robotctl, tmp_path: Path
 ) -> None:
     async with fleet(router, tmp_path / "planner"):
         await robotctl.soon("goal", "add", TEXT, "--id", "g", "--plan")
@@ -120,7 +116,9 @@ async def test_the_page_of_a_plan_and_its_graph(
     assert "already in plan plan-1" in llm.err
 
 
-async def test_facts_of_people_carry_the_fleets_time(router: Router, robotctl: Robotctl) -> None:
+async def test_facts_of_people_carry_the_fleets_time(
+    router: RouterProcess, robotctl: Robotctl
+) -> None:
     async with person(router.endpoint) as session:
         address = FactAddress("cup_1", "at")
         await robotctl.soon("world", "add", "--fact", "at", "cup_1", "hallway")

@@ -14,7 +14,7 @@ from keyexpr_schema.keyspace import (
 from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.payloads.service import PlannerAddress, PlannerStatus
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from tests.robotctl import Robotctl
+from tests.support.robotctl import Robotctl
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 ROBOTS = sorted(str(file) for file in (CONFIGS / "robots").glob("*.yaml"))

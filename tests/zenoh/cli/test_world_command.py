@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Protocol
 
 import pytest
 
-from tests.planner_process import person, planner
-from tests.robotctl import Robotctl
+from tests.support.planner_process import person, planner
+from tests.support.robotctl import Robotctl
+from tests.support.router_process import RouterProcess
 
 WORLD = str(Path(__file__).parents[3] / "configs" / "worlds" / "home.yaml")
 
 
-class Router(Protocol):
-    endpoint: str
-
-
 @pytest.fixture
-def robotctl(router: Router, tmp_path: Path) -> Robotctl:
+def robotctl(router: RouterProcess, tmp_path: Path) -> Robotctl:
     return Robotctl(router.endpoint, tmp_path, "test")
 
 
@@ -115,7 +111,7 @@ def test_what_makes_no_sense_is_one_sentence(
 
 
 async def test_a_statement_tells_how_it_was_read(
-    router: Router, robotctl: Robotctl, tmp_path: Path
+    router: RouterProcess, robotctl: Robotctl, tmp_path: Path
 ) -> None:
     async with person(router.endpoint), planner(router.endpoint, tmp_path / "planner"):
         read = await robotctl.soon("world", "add", "Cup 1 is in the hallway.")

@@ -11,7 +11,7 @@ from keyexpr_schema.keyspace import SIM_MOTION
 from keyexpr_schema.payloads.motions import MotionOutcome, MotionState
 from keyexpr_schema.payloads.simulation import MotionCall, SimRobotAddress
 from keyexpr_schema.transport.session import open_session
-from tests.session_values import motion_call, senses
+from tests.support.session_values import motion_call, senses
 
 
 async def _ask_whoever_comes(client, address, call="c1"):

@@ -15,8 +15,8 @@ from fleet.core.step import step
 from keyexpr_schema.keyspace import DURATIONS
 from keyexpr_schema.payloads.durations import Durations, Estimate
 from keyexpr_schema.payloads.tasks import ReportState
-from tests.fleet_model import FleetModel
-from tests.household import SKILLS, bring, manipulator
+from tests.support.fleet_model import FleetModel
+from tests.support.household import SKILLS, bring, manipulator
 
 PICK, NAVIGATE = SKILLS["pick"], SKILLS["navigate"]
 

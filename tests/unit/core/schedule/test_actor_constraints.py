@@ -6,7 +6,7 @@ from fleet.core.checker.checked_plan import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.schedule.actor_constraints import tasks_nobody_can_do
 from fleet.planners.base import PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
-from tests.household import bring, carrier, home, manipulator
+from tests.support.household import bring, carrier, home, manipulator
 
 
 def test_tasks_that_nobody_can_do_are_named_with_what_is_lacking() -> None:

@@ -15,7 +15,7 @@ from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Object, Place
 
 SKILLS: dict[str, SkillModel] = load_skills(
-    Path(__file__).parents[1] / "configs" / "skills" / "household.yaml"
+    Path(__file__).parents[2] / "configs" / "skills" / "household.yaml"
 )
 UNLOAD = {
     "parameters": {"robot": "robot", "object": "object", "carrier": "robot", "place": "place"},

@@ -16,8 +16,8 @@ from fleet.planners.llm.planner import LlmPlanner
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan
-from tests.household import bring, checked, home
-from tests.llm_server import LlmServer
+from tests.support.household import bring, checked, home
+from tests.support.llm_server import LlmServer
 
 GOALS = (bring(1, "hallway"), bring(2, "living_room"))
 

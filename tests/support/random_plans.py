@@ -21,7 +21,7 @@ from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan, Task
-from tests.household import PLACES, SKILLS, UNLOAD, at, carrier, cup, fact, manipulator
+from tests.support.household import PLACES, SKILLS, UNLOAD, at, carrier, cup, fact, manipulator
 
 MOST_TASKS = 6
 _MORE = {

@@ -47,7 +47,7 @@ from keyexpr_schema.payloads.world import Fact, FactAddress, Place, PlaceAddress
 
 WALL_S = 1_760_000_000.0
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
-HOME = Path(__file__).parents[1] / "configs" / "worlds" / "home.yaml"
+HOME = Path(__file__).parents[2] / "configs" / "worlds" / "home.yaml"
 SPEED_M_S = 0.5
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fleet.language import Reading, Vocabulary
 from keyexpr_schema.payloads.world import Object, Place, Surface
-from tests.household import carrier, manipulator
+from tests.support.household import carrier, manipulator
 
 
 def _table(name: str) -> Surface:

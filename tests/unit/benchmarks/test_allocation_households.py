@@ -24,7 +24,7 @@ from fleet.core.checker.checked_plan import check_plan
 from fleet.jobshop.instance import Instance
 from fleet.jobshop.portfolio import solve
 from fleet.jobshop.time_budget import StepClock, TimeBudget
-from tests.household import checked
+from tests.support.household import checked
 
 
 @pytest.mark.parametrize("scenario", scenarios())

@@ -15,8 +15,6 @@ from cli.demo.child_processes import ChildProcesses, free_endpoint
 from cli.errors import BadArgument, ProcessDied
 from tests.support.polling import until
 
-DEADLINE_S = 20.0
-
 
 def make(out: Path) -> ChildProcesses:
     processes = ChildProcesses(free_endpoint(), "demo", out)

@@ -56,7 +56,7 @@ lock: $(VENV)/development ## renew the pinned versions of everything
 		-o requirements-dev.lock
 
 clean: ## remove everything that is made
-	rm -rf $(VENV) runs .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
+	rm -rf $(VENV) runs build .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
 
 # --- installation --------------------------------------------------------------------------------
 $(VENV)/created:
@@ -65,12 +65,12 @@ $(VENV)/created:
 	$(PYTHON) -m venv $(VENV)
 	touch $@
 
-$(VENV)/runtime: requirements.lock pyproject.toml | $(VENV)/created
+$(VENV)/runtime: requirements.lock pyproject.toml setup.py | $(VENV)/created
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@
 
-$(VENV)/development: requirements-dev.lock pyproject.toml | $(VENV)/created
+$(VENV)/development: requirements-dev.lock pyproject.toml setup.py | $(VENV)/created
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@ $(VENV)/runtime

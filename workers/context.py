@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from keyexpr_schema.facts import AT, HOLDING, NOTHING, ON, FactKey, Value
+from keyexpr_schema.facts import AT, HOLDING, NOTHING, ON, FactKey, Literal, Value
 from keyexpr_schema.payloads.motions import (
     Detection,
     Motion,
@@ -48,13 +48,8 @@ class SkillContext:
 
     def observe(self, relation: str, subject: str, value: Value) -> None:
         """Note that `relation(subject)` is `value` now; `None` says that it is unknown."""
-        self._observed[FactKey(relation, subject)] = Fact(
-            subject=subject,
-            relation=relation,
-            value=value,
-            source=self.robot,
-            time_s=self.now_s,
-        )
+        literal = Literal(FactKey(relation, subject), value)
+        self._observed[literal.variable] = Fact.of(literal, self.robot, self.now_s)
 
     def observe_failure(self, failure: SkillFailed) -> None:
         """Take over the facts that a failure brought."""

@@ -29,7 +29,7 @@ from keyexpr_schema.keyspace import (
     TASK_RECORD,
     UNDECODABLE,
 )
-from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalStatus
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.plans import Plan, PlanStatus
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
@@ -155,6 +155,24 @@ class FleetView:
                     await self.changed.wait()
         except TimeoutError:
             raise TooLate(f"waited {timeout_s:g} s for {waiting_for}, in vain") from None
+
+    async def until_read(
+        self, goals: tuple[str, ...], what: str, planner_s: float, model_s: float
+    ) -> None:
+        """Return as soon as each goal has been read: by the planner's grammar, else by a model.
+
+        Raises:
+            TooLate: one had not; the message names `what` was to be read.
+        """
+        status = self.goal_status
+        await self.until(
+            lambda: all(goal in status for goal in goals), planner_s, f"the planner to read {what}"
+        )
+        await self.until(
+            lambda: all(status[goal].state is not GoalState.READING for goal in goals),
+            model_s,
+            f"a language model to read {what}",
+        )
 
     async def forever(self) -> NoReturn:
         """Return only by cancellation, or by what goes wrong in the background."""

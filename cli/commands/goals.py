@@ -11,9 +11,9 @@ from cli.command import Call, command, group
 if TYPE_CHECKING:
     from keyexpr_schema.payloads.goals import Goal, GoalStatus
 
-UNDERSTANDING_S = 10.0
+READ_S = 10.0
 """How long the planner may take to say something of a goal."""
-READING_S = 180.0
+MODEL_READ_S = 180.0
 """How long a language model may take to read a sentence that the grammar refuses."""
 
 app = group("Say what you want, in a sentence; see what became of it.")
@@ -53,7 +53,7 @@ async def add(
     from cli.errors import NotRunning, Refused
     from cli.views.goals import GoalRow
     from keyexpr_schema.keyspace import GOAL_STATUS
-    from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
+    from keyexpr_schema.payloads.goals import GoalState
     from keyexpr_schema.payloads.requests import PlanRequest
 
     async with call.session() as session:
@@ -73,16 +73,8 @@ async def add(
             )
             return
         async with fleet_view(session, (GOAL_STATUS, {"goal": spec.goal})) as view:
-            await view.until(
-                lambda: spec.goal in view.goal_status,
-                timeout_s if wait else UNDERSTANDING_S,
-                f"the planner to read goal {spec.goal} (it is stored)",
-            )
-            await view.until(
-                lambda: view.goal_status[spec.goal].state is not GoalState.READING,
-                timeout_s if wait else READING_S,
-                f"a language model to read goal {spec.goal} (it is stored)",
-            )
+            longest_s = (timeout_s, timeout_s) if wait else (READ_S, MODEL_READ_S)
+            await view.until_read((spec.goal,), f"goal {spec.goal} (it is stored)", *longest_s)
             if plan and view.goal_status[spec.goal].state is GoalState.WAITING:
                 call.inform(sentence(spec, view.goal_status[spec.goal]))
                 answer = await ask_planner(
@@ -91,14 +83,12 @@ async def add(
                 call.inform(answer.sentence)
                 await view.until(
                     lambda: view.goal_status[spec.goal].state is not GoalState.WAITING,
-                    UNDERSTANDING_S,
+                    READ_S,
                     f"goal {spec.goal} to be planned",
                 )
             if wait:
                 await view.until(
-                    lambda: view.goal_status[spec.goal].state in ENDED_GOALS,
-                    timeout_s,
-                    f"goal {spec.goal} to end",
+                    lambda: view.ended((spec.goal,)), timeout_s, f"goal {spec.goal} to end"
                 )
             status = view.goal_status[spec.goal]
     if status.state in (GoalState.REJECTED, GoalState.FAILED):

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 SETTLE_S = 20.0
 """How long objects may take to come to rest after the last goal has ended [s, wall]."""
-UNDERSTAND_S = 30.0
+READ_S = 30.0
 PLAN_S = 120.0
 REALM = "demo"
 
@@ -57,16 +57,7 @@ class Demo:
             await put_statement(self.session, text)
         given = [await put_goal(self.session, text, None) for text in self.mission.goals]
         self.goals = tuple(goal.goal for goal in given)
-        await self.view.until(
-            lambda: all(goal in self.view.goal_status for goal in self.goals),
-            UNDERSTAND_S,
-            "the planner to read the goals",
-        )
-        await self.view.until(
-            lambda: not any(s.state is GoalState.READING for s in self._statuses().values()),
-            PLAN_S,
-            "a language model to read the goals",
-        )
+        await self.view.until_read(self.goals, "the goals", READ_S, PLAN_S)
         for status in self._statuses().values():
             if status.state is GoalState.REJECTED:
                 raise Refused(f"goal {status.goal} is rejected: {status.reason}")

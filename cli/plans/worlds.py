@@ -82,5 +82,4 @@ def parse_fact(written: str) -> Fact:
         raise BadArgument(
             f"a fact is RELATION SUBJECT VALUE, such as 'at cup_1 kitchen'; got {written!r}"
         )
-    (relation, subject), value = literal
-    return Fact(subject=subject, relation=relation, value=value, source="person")
+    return Fact.of(literal, "person")

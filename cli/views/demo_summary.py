@@ -8,7 +8,7 @@ from rich.text import Text
 from cli.demo.summary import Summary
 from cli.demo.verdict import Verdict
 from cli.views.console import table
-from cli.views.text import call, seconds
+from cli.views.text import seconds, skill_call
 from keyexpr_schema.payloads.goals import GoalState
 
 MARKS = {Verdict.HOLDS: "✓", Verdict.FAILS: "✗", Verdict.NOT_JUDGED: "?"}
@@ -31,7 +31,7 @@ def summary_page(summary: Summary) -> Group:
         (
             (
                 f"{line.plan}/{line.task}",
-                call(line.skill, line.args, leave_out=line.robot),
+                skill_call(line.skill, line.args, leave_out=line.robot),
                 line.robot,
                 line.attempt,
                 line.tries,

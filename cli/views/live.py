@@ -15,7 +15,7 @@ from rich.text import Text
 
 from cli.views.console import console, table
 from cli.views.plan_tree import plan_tree
-from cli.views.text import call, carried, doing, seconds
+from cli.views.text import carried, doing, seconds, skill_call
 from keyexpr_schema.payloads.goals import GoalStatus
 from keyexpr_schema.payloads.plans import PlanStatus
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -74,7 +74,7 @@ def change_line(what: object) -> tuple[float | None, str] | None:
         }.get(what.state, what.ended_s)
         attempt = f" (attempt {what.attempt})" if what.attempt > 1 else ""
         return time_s, (
-            f"{what.plan}/{what.task} {call(what.skill, what.args, what.robot)} "
+            f"{what.plan}/{what.task} {skill_call(what.skill, what.args, what.robot)} "
             f"{what.robot or what.actor}: {what.state.value}{attempt}{_because(what.reason)}"
         )
     if isinstance(what, GoalStatus):

@@ -12,7 +12,8 @@ from cli.plans.comparison import PlanDiff, TaskChange
 from cli.views.console import table
 from cli.views.plan_graph import plan_graph
 from cli.views.plan_tree import plan_tree
-from cli.views.text import call, natural_order, outcome, seconds
+from cli.views.text import natural_order, outcome, seconds, skill_call
+from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.plans import Making, Plan, PlanStatus, Task, Violation
 from keyexpr_schema.payloads.tasks import TaskRecord
@@ -146,4 +147,5 @@ def _named(change: TaskChange) -> str:
 
 def _line(task: Task) -> str:
     after = f"  after {', '.join(task.after)}" if task.after else ""
-    return f"{task.task} {call(task.skill, task.args, f'?{task.actor}')}  ?{task.actor}{after}"
+    actor = actor_arg(task.actor)
+    return f"{task.task} {skill_call(task.skill, task.args, actor)}  {actor}{after}"

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from rich.table import Table
 
 from cli.views.console import table
-from cli.views.text import call, seconds, spent_s
+from cli.views.text import seconds, skill_call, spent_s
 from keyexpr_schema.payloads.tasks import Report, TaskRecord
 
 
@@ -19,7 +19,7 @@ def tasks_table(records: Iterable[TaskRecord], now_s: float | None = None) -> Ta
             (
                 record.plan,
                 record.task,
-                call(record.skill, record.args, leave_out=record.robot),
+                skill_call(record.skill, record.args, leave_out=record.robot),
                 record.robot,
                 record.state.value,
                 record.attempt or "",

@@ -35,7 +35,7 @@ def seconds(duration_s: float | None) -> str:
     return "" if duration_s is None else f"{duration_s:.1f} s"
 
 
-def call(skill: str, args: Mapping[str, str], leave_out: str | None = None) -> str:
+def skill_call(skill: str, args: Mapping[str, str], leave_out: str | None = None) -> str:
     """`pick(object=cup_1)`; arguments equal to `leave_out` (the robot itself) are not shown."""
     inner = ", ".join(f"{name}={arg}" for name, arg in args.items() if arg != leave_out)
     return f"{skill}({inner})"
@@ -44,7 +44,7 @@ def call(skill: str, args: Mapping[str, str], leave_out: str | None = None) -> s
 def task_call(task: Task, status: PlanStatus | None, robot: str | None = None) -> str:
     """The call of a task without who does it (`robot`), with robots in place of actors."""
     allocation = status.allocation if status else {}
-    return call(
+    return skill_call(
         task.skill,
         {
             name: allocation.get(actor_in(arg) or "", arg)

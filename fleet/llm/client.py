@@ -130,7 +130,7 @@ class _LiteLlmProcess:
             self.release()
             self._read = b""
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "fleet.llm.litellm_process"],
+                [sys.executable, "-P", "-m", "fleet.llm.litellm_process"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,

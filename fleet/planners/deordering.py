@@ -38,9 +38,10 @@ def deordered(
     pins: dict[str, str] = {}
     actor_count = 0
     actors: dict[str, str] = {}
+    named = frozenset[str]().union(*(sequence.named for sequence in sequences))
     for sequence in sequences:
         if not one_actor_each:
-            actors = {}
+            actors, named = {}, sequence.named
         for action in sequence.actions:
             args = dict(action.args)
             for parameter in action.skill.robot_parameters:
@@ -50,7 +51,7 @@ def deordered(
                     # Names stay unique over the revisions of a plan, as the task numbers do.
                     revision = f"{first_task}-" if first_task > 1 else ""
                     actors[robot] = f"a{revision}{actor_count}"
-                    if robot in sequence.named:
+                    if robot in named:
                         pins[actors[robot]] = robot
                 args[parameter] = actor_arg(actors[robot])
             lifted = action.skill.ground(args)
@@ -78,22 +79,15 @@ def _dependencies(rows: Sequence[tuple[str, Action]]) -> dict[str, set[str]]:
     readers: dict[FactKey, set[str]] = defaultdict(set)
     last: dict[str, str] = {}
     for name, action in rows:
-        befores: set[str] = set()
-        for literal in action.before:
-            if literal.variable in writer:
-                befores.add(writer[literal.variable])
-        for literal in action.after:
-            befores |= readers[literal.variable]
-            if literal.variable in writer:
-                befores.add(writer[literal.variable])
-        for robot in action.participants:
-            if robot in last:
-                befores.add(last[robot])
-            last[robot] = name
-        for literal in action.before:
-            readers[literal.variable].add(name)
-        for literal in action.after:
-            writer[literal.variable] = name
-            readers[literal.variable] = set()
-        after[name] = befores - {name}
+        reads = {literal.variable for literal in action.before}
+        writes = {literal.variable for literal in action.after}
+        befores = {writer[variable] for variable in reads | writes if variable in writer}
+        befores.update(*(readers[variable] for variable in writes))
+        befores |= {last[robot] for robot in action.participants if robot in last}
+        last.update(dict.fromkeys(action.participants, name))
+        for variable in reads:
+            readers[variable].add(name)
+        for variable in writes:
+            writer[variable], readers[variable] = name, set()
+        after[name] = befores
     return after

@@ -59,6 +59,12 @@ class Fact(Payload, frozen=True, kw_only=True):
     source: str
     time_s: float = 0.0
 
+    @classmethod
+    def of(cls, literal: Literal, source: str, time_s: float = 0.0) -> Fact:
+        """The fact that a literal holds."""
+        (relation, subject), value = literal
+        return cls(subject=subject, relation=relation, value=value, source=source, time_s=time_s)
+
     @property
     def key(self) -> FactKey:
         """The variable that it is about."""

@@ -64,3 +64,11 @@ def test_there_are_pages_and_names_in_them() -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_what_a_page_names_is_there(page: Path) -> None:
     assert not _missing(page)
+
+
+def test_the_index_has_every_decision_by_its_title() -> None:
+    folder = ROOT / "docs" / "decisions"
+    index = (folder / "README.md").read_text()
+    for page in folder.glob("0*.md"):
+        title = page.read_text().splitlines()[0].removeprefix("# ")
+        assert f"- [{page.name[:4]}]({page.name}) {title}\n" in index

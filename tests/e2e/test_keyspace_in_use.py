@@ -15,7 +15,7 @@ from keyexpr_schema.key import Component
 from keyexpr_schema.keyspace import GOAL_SPEC, KEYSPACE, UNDECODABLE
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.transport.trace import TRACE_VARIABLE
-from tests.support.planner_process import until
+from tests.support.polling import until
 from tests.support.robotctl import Robotctl
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow, pytest.mark.timeout(240)]

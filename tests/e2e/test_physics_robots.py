@@ -78,19 +78,20 @@ def test_two_robots_cross_through_one_door_without_touching() -> None:
     assert backend.collision_log == ()
 
 
-def test_collisions_are_noticed_and_counted_once() -> None:
-    """Driven into a wall and into each other by hand, past the navigator."""
-    backend = start(hsr=(9.0, 3.0, 0.0), locobot=(8.0, 3.0, 0.0))
-    drive = {name: backend._bodies[name].drive for name in ("hsr", "locobot")}
+@pytest.mark.parametrize(
+    ("hsr_x_m", "locobot_x_m", "counted", "pair"),
+    [(9.75, 8.0, (1, 0), ("hsr", "walls")), (9.0, 8.6, (0, 1), ("hsr", "locobot"))],
+)
+def test_collisions_are_noticed_and_counted_once(
+    hsr_x_m: float, locobot_x_m: float, counted: tuple[int, int], pair: tuple[str, str]
+) -> None:
+    """Put into a wall, and into each other: the navigator would never lead them there."""
+    backend = start(hsr=(hsr_x_m, 3.0, 0.0), locobot=(locobot_x_m, 3.0, 0.0))
     for _ in range(100):
-        drive["hsr"].drive(10.5, 3.0, 0.0)
-        backend._physics()
-    assert (backend.contacts().robot_wall, backend.contacts().robot_robot) == (1, 0)
-    for _ in range(100):
-        drive["locobot"].drive(9.9, 3.0, 0.0)
-        backend._physics()
-    assert backend.contacts().robot_robot == 1
-    assert ("hsr", "locobot") in [touch[1:] for touch in backend.collision_log]
+        backend.advance()
+    contacts = backend.contacts()
+    assert (contacts.robot_wall, contacts.robot_robot) == counted
+    assert [touch[1:] for touch in backend.collision_log] == [pair]
 
 
 def test_a_motion_that_takes_too_long_fails_and_the_robot_halts() -> None:

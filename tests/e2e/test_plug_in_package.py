@@ -33,7 +33,8 @@ from keyexpr_schema.payloads.robots import RobotAddress, RobotSpec
 from keyexpr_schema.payloads.world import FactAddress, ObjectAddress, PlaceAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from tests.support.household import PLACES, cup, fact
-from tests.support.planner_process import DEADLINE_S, planner, value
+from tests.support.planner_process import planner, value
+from tests.support.polling import DEADLINE_S
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "stocktaking"
 ROBOTS = ("clerk_1", "clerk_2")

@@ -35,13 +35,20 @@ def test_what_is_rendered_is_read_as_the_same_value() -> None:
     assert quoted[True] and quoted[False]
 
 
-@given(NAMES, NAMES, VALUES)
-def test_a_literal_is_read_as_it_is_written(relation: str, subject: str, value: Value) -> None:
-    literal = Literal(FactKey(relation, subject), value)
-    written = render_value(value)
-    if not any(sign.isspace() for sign in written) and written:
-        assert parse_literal(str(literal)) == literal
-        assert parse_literal(f"{relation} {subject} {written}") == literal
+def test_a_literal_is_read_as_it_is_written() -> None:
+    kinds: Counter[type] = Counter()
+
+    @given(NAMES, NAMES, VALUES)
+    def law(relation: str, subject: str, value: Value) -> None:
+        literal = Literal(FactKey(relation, subject), value)
+        written = render_value(value)
+        if not any(sign.isspace() for sign in written) and written:
+            assert parse_literal(str(literal)) == literal
+            assert parse_literal(f"{relation} {subject} {written}") == literal
+            kinds[type(value)] += 1
+
+    law()
+    assert set(kinds) == {str, bool, int, float, type(None)}
 
 
 @pytest.mark.parametrize(

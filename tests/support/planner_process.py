@@ -5,12 +5,10 @@ from __future__ import annotations
 import asyncio
 import subprocess
 import sys
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
-
-import pytest
 
 from keyexpr_schema.key import Address, Key
 from keyexpr_schema.keyspace import (
@@ -35,8 +33,7 @@ from keyexpr_schema.payloads.tasks import Order, Report, ReportAddress, ReportSt
 from keyexpr_schema.payloads.world import FactAddress, ObjectAddress, PlaceAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from tests.support.household import PLACES, SKILLS, cup, fact, manipulator
-
-DEADLINE_S = 30.0
+from tests.support.polling import until
 
 
 class PlannerProcess:
@@ -97,17 +94,6 @@ async def person(endpoint: str) -> AsyncIterator[Session]:
         for known in (fact("cup_1", "at", "kitchen"), fact("hsr", "holding", "nothing")):
             await session.confirm(FACT, FactAddress.of(known.key), known)
         yield session
-
-
-async def until(look: Callable[[], Awaitable[Any]], what: str) -> Any:
-    """The first true answer of `look`."""
-    try:
-        async with asyncio.timeout(DEADLINE_S):
-            while not (found := await look()):
-                await asyncio.sleep(0.02)
-            return found
-    except TimeoutError:
-        pytest.fail(f"{what} did not come within {DEADLINE_S:g} s")
 
 
 async def value(session: Session, key: Key[Any, Any], address: Address, **fields: Any) -> Any:

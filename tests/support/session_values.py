@@ -1,9 +1,8 @@
-"""Values to put, and what waits for them: for the tests of the session."""
+"""Values to put, and how they are read from a watch: for the tests of the session."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
 from typing import Any
 
 from keyexpr_schema.payloads.goals import Goal
@@ -29,12 +28,6 @@ def motion_call(name: str) -> MotionCall:
 
 def senses(time_s: float) -> Senses:
     return Senses(robot="r1", time_s=time_s, pose_m_rad=(0.0, 0.0, 0.0), place=None)
-
-
-async def until(condition: Callable[[], Awaitable[bool]], timeout_s: float = 10.0) -> None:
-    async with asyncio.timeout(timeout_s):
-        while not await condition():
-            await asyncio.sleep(0.01)
 
 
 async def not_connected(session: Session) -> bool:

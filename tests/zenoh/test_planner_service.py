@@ -35,7 +35,6 @@ from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from tests.support.household import fact, manipulator
 from tests.support.planner_process import (
-    DEADLINE_S,
     PlannerProcess,
     ask_for_plan,
     carry_out,
@@ -43,9 +42,9 @@ from tests.support.planner_process import (
     next_order,
     person,
     planner,
-    until,
     value,
 )
+from tests.support.polling import DEADLINE_S, until
 from tests.support.robotctl import Robotctl
 from tests.support.router_process import RouterProcess
 

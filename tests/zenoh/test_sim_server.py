@@ -8,7 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from typing import Any
 
 import pytest
@@ -22,6 +22,7 @@ from sim.embodiment import SimEmbodiment
 from sim.files.mission_file import load_mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
 from sim.server.sim_server import SimServer
+from tests.support.polling import until
 from tests.support.router_process import RouterProcess
 from workers.embodiment import Embodiment
 from workers.errors import RobotUnreachable
@@ -53,19 +54,15 @@ async def served(
 
 async def ask(session: Session, call: MotionCall) -> MotionOutcome:
     """Ask until somebody serves: declarations take a moment to get around."""
-    async with asyncio.timeout(10.0):
-        while True:
-            try:
-                outcome: MotionOutcome = await session.query(SIM_MOTION, HSR, call, 5.0)
-                return outcome
-            except NoReply:
-                await asyncio.sleep(0.02)
 
+    async def reply() -> MotionOutcome | None:
+        with suppress(NoReply):
+            outcome: MotionOutcome = await session.query(SIM_MOTION, HSR, call, 5.0)
+            return outcome
+        return None
 
-async def until(condition: Callable[[], bool], timeout_s: float = 10.0) -> None:
-    async with asyncio.timeout(timeout_s):
-        while not condition():
-            await asyncio.sleep(0.01)
+    outcome: MotionOutcome = await until(reply, "an answer to a motion call")
+    return outcome
 
 
 async def test_a_motion_is_carried_out_in_simulated_time(session_config: Make) -> None:
@@ -131,7 +128,7 @@ async def test_a_motion_nobody_asks_about_is_stopped(session_config: Make) -> No
     async with served(session_config, speed=1.0, step_s=0.05, watchdog_s=0.3) as (backend, asker):
         call = MotionCall(call="c1", incarnation="i1", motion=TO_KITCHEN, wait_s=0.0)
         assert (await ask(asker, call)).state is MotionState.RUNNING
-        await until(lambda: not backend.senses("hsr").moving, 3.0)
+        await until(lambda: not backend.senses("hsr").moving, timeout_s=3.0)
         outcome = await ask(asker, call)
         assert outcome.state is MotionState.STOPPED
         assert outcome.reason == "nobody asked about it any more"
@@ -192,9 +189,8 @@ async def test_senses_truths_and_scene_are_published(session_config: Make) -> No
 
 
 async def until_stored(asker: Session) -> None:
-    async with asyncio.timeout(10.0):
-        while await asker.get(SIM_SCENE, SimAddress()) is None or not await asker.list(SIM_TRUTH):
-            await asyncio.sleep(0.05)
+    await until(lambda: asker.get(SIM_SCENE, SimAddress()), "the scene")
+    await until(lambda: asker.list(SIM_TRUTH), "the truths")
 
 
 async def test_an_unknown_robot_is_named_together_with_those_there_are(

@@ -22,6 +22,7 @@ from keyexpr_schema.payloads.goals import Goal, GoalAddress
 from keyexpr_schema.payloads.simulation import Frame, Frames, SimAddress, SimClock
 from keyexpr_schema.payloads.tasks import TaskAddress, TaskRecord, TaskState
 from keyexpr_schema.transport.session import Session, open_session
+from tests.support.polling import until
 
 DEADLINE_S = 30.0
 
@@ -62,13 +63,13 @@ def read(out: Path, entity: str, component: str) -> list[Row]:
 
 async def until_written(out: Path, entity: str, component: str, count: int) -> list[Row]:
     """Wait until the file holds so many rows."""
-    deadline = time.monotonic() + DEADLINE_S
-    while time.monotonic() < deadline:
+
+    async def written() -> list[Row] | None:
         found = await asyncio.to_thread(read, out, entity, component)
-        if len(found) >= count:
-            return found
-        await asyncio.sleep(0.1)  # between two looks at the condition, not in place of one
-    raise AssertionError(f"{entity} has {len(found)} rows of {component}, not {count}")
+        return found if len(found) >= count else None
+
+    found: list[Row] = await until(written, f"{count} rows of {component} in {entity}", DEADLINE_S)
+    return found
 
 
 def record(state: TaskState, ended_s: float | None = None) -> TaskRecord:

@@ -48,13 +48,15 @@ class Causality:
         final = self._final_facts()
         for condition in self._plan.conditions:
             if not condition_holds(final, condition):
-                self.violations.append(
-                    Violation(
-                        code="goal-unmet",
-                        sentence=f"{condition} does not hold when the plan is done",
-                        condition=condition,
-                    )
-                )
+                sentence = f"{condition} does not hold when the plan is done"
+                self._report("goal-unmet", sentence, condition=condition)
+
+    def _report(
+        self, code: str, sentence: str, task: str | None = None, condition: Condition | None = None
+    ) -> None:
+        self.violations.append(
+            Violation(code=code, sentence=sentence, task=task, condition=condition)
+        )
 
     def _one_task_at_a_time(self) -> None:
         last: dict[str, str] = {}
@@ -62,14 +64,11 @@ class Causality:
             for robot in self._actions[task].participants:
                 before = last.get(robot)
                 if before is not None and not self._graph.precedes(before, task):
-                    self.violations.append(
-                        Violation(
-                            code="robot-in-two-places",
-                            sentence=f"{before} and {task} both need {bare_name(robot)} "
-                            "and nothing says which comes first",
-                            task=task,
-                        )
+                    sentence = (
+                        f"{before} and {task} both need {bare_name(robot)} "
+                        "and nothing says which comes first"
                     )
+                    self._report("robot-in-two-places", sentence, task)
                 last[robot] = task
 
     def _check_condition(self, task: str, literal: Literal) -> None:
@@ -81,12 +80,8 @@ class Causality:
                 continue
             if not any(graph.precedes(writer, restorer) for restorer in restorers):
                 verb = "makes" if graph.precedes(writer, task) else "may make"
-                self._unmet(
-                    "condition-undone",
-                    task,
-                    literal,
-                    f"{task} needs {literal}, and {writer} {verb} it {render_value(value)} before",
-                )
+                undone = f"{writer} {verb} it {render_value(value)} before"
+                self._unmet("condition-undone", task, literal, undone)
                 return
         if not restorers:
             self._check_at_start(task, literal)
@@ -104,24 +99,13 @@ class Causality:
             self.requirements[str(wanted)].valued.setdefault(variable, task)
         elif has != wanted:
             state = "that is not known" if has is None else f"it is {has}"
-            sentence = f"{task} needs {literal}, and at the start {state}"
-            self._unmet("condition-unmet", task, literal, sentence)
+            self._unmet("condition-unmet", task, literal, f"at the start {state}")
 
-    def _unmet(self, code: str, task: str, literal: Literal, sentence: str) -> None:
-        subject = bare_name(literal.variable.subject)
-        value = literal.value
-        if isinstance(value, str):
-            value = bare_name(value)
-        self.violations.append(
-            Violation(
-                code=code,
-                sentence=sentence,
-                task=task,
-                condition=Condition(
-                    relation=literal.variable.relation, subject=subject, value=value
-                ),
-            )
-        )
+    def _unmet(self, code: str, task: str, literal: Literal, why: str) -> None:
+        (relation, subject), value = literal
+        value = bare_name(value) if isinstance(value, str) else value
+        condition = Condition(relation=relation, subject=bare_name(subject), value=value)
+        self._report(code, f"{task} needs {literal}, and {why}", task, condition)
 
     def _check_space(self, task: str, carrier: str) -> None:
         at_start, planned = self._baskets.before(task, self._actions[task], carrier)
@@ -130,14 +114,11 @@ class Causality:
             freed = sum(self._baskets.unloaded_before(task, row) for row in requirement.valued)
             requirement.space = max(requirement.space, planned + 1 - freed)
         elif at_start + planned + 1 > (room := capacity(carrier, self._world)):
-            self.violations.append(
-                Violation(
-                    code="no-space",
-                    sentence=f"{task} puts an object into {carrier}'s basket, which takes "
-                    f"{room} and may hold {at_start + planned} by then",
-                    task=task,
-                )
+            sentence = (
+                f"{task} puts an object into {carrier}'s basket, which takes "
+                f"{room} and may hold {at_start + planned} by then"
             )
+            self._report("no-space", sentence, task)
 
     def _final_facts(self) -> dict[FactKey, Value]:
         """Every variable at the end; unknown where the order of its last writers is open."""

@@ -98,7 +98,7 @@ def check_allocation(
     allocation: Mapping[str, str],
     extra_after: Mapping[str, Iterable[str]] | None = None,
 ) -> tuple[Violation, ...]:
-    """What speaks against a plan with actors bound to robots; nothing if it is valid so.
+    """The violations of a plan with actors bound to robots; none if it is valid.
 
     `extra_after` adds dependencies: task to tasks that it also waits for.
     """

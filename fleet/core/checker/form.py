@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.ids import actor_arg, actor_in
 from keyexpr_schema.payloads.plans import Plan, Task, Violation
+
+
+class _Malformed(Exception):
+    """What is wrong with a task: a code and a sentence."""
 
 
 class PlanForm:
@@ -19,92 +24,71 @@ class PlanForm:
     def __init__(self, plan: Plan, world: WorldModel, allocation: Mapping[str, str] | None) -> None:
         self.violations: list[Violation] = []
         self.actions: dict[str, Action] = {}
-        self._world = world
-        self._allocation = allocation
+        self._world, self._allocation = world, allocation
         self._actors = {task.actor for task in plan.tasks}
         for pinned in plan.pins.values():
             if pinned not in world.robots:
-                self._say("unknown-name", f"there is no robot {pinned}{_among(world.robots)}", None)
-        names = [task.task for task in plan.tasks]
-        for name in (
-            {name for name in names if names.count(name) > 1}
-            if len(set(names)) < len(names)
-            else ()
-        ):
-            self._say("duplicate-task", f"two tasks are called {name}", name)
-        known = set(names)
+                self._report("unknown-name", f"there is no robot {pinned}{_among(world.robots)}")
+        times = Counter(task.task for task in plan.tasks)
+        for name, count in times.items():
+            if count > 1:
+                self._report("duplicate-task", f"two tasks are called {name}", name)
         for task in plan.tasks:
             for before in task.after:
-                if before not in known:
-                    self._say(
-                        "unknown-dependency",
-                        f"{task.task} waits for {before}, which is not in the plan",
-                        task.task,
-                    )
-            self._read(task)
+                if before not in times:
+                    sentence = f"{task.task} waits for {before}, which is not in the plan"
+                    self._report("unknown-dependency", sentence, task.task)
+            try:
+                self.actions[task.task] = self._action(task)
+            except _Malformed as wrong:
+                code, sentence = wrong.args
+                self._report(code, f"{task.task}: {sentence}", task.task)
 
-    def _say(self, code: str, sentence: str, task: str | None) -> None:
+    def _report(self, code: str, sentence: str, task: str | None = None) -> None:
         self.violations.append(Violation(code=code, sentence=sentence, task=task))
 
-    def _read(self, task: Task) -> None:
+    def _action(self, task: Task) -> Action:
         skill = self._world.skills.get(task.skill)
         if skill is None:
-            self._say(
-                "unknown-skill",
-                f"{task.task}: there is no skill {task.skill}{_among(self._world.skills)}",
-                task.task,
+            raise _Malformed(
+                "unknown-skill", f"there is no skill {task.skill}{_among(self._world.skills)}"
             )
-            return
         if set(task.args) != set(skill.parameters):
-            self._say(
+            raise _Malformed(
                 "wrong-arguments",
-                f"{task.task}: {task.skill} takes {', '.join(skill.parameters)}, "
+                f"{task.skill} takes {', '.join(skill.parameters)}, "
                 f"not {', '.join(task.args) or 'nothing'}",
-                task.task,
             )
-            return
-        if task.args[skill.actor_parameter] != actor_arg(task.actor):
-            self._say(
+        parameter = skill.actor_parameter
+        if task.args[parameter] != actor_arg(task.actor):
+            raise _Malformed(
                 "wrong-actor",
-                f"{task.task}: `{skill.actor_parameter}` must be {actor_arg(task.actor)}, "
-                f"the actor that does the task, not {task.args[skill.actor_parameter]}",
-                task.task,
+                f"`{parameter}` must be {actor_arg(task.actor)}, "
+                f"the actor that does the task, not {task.args[parameter]}",
             )
-            return
-        bound: dict[str, str] = {}
-        for parameter, kind in skill.parameters.items():
-            value = self._bind(task, parameter, kind)
-            if value is None:
-                return
-            bound[parameter] = value
-        action = skill.ground(bound)
+        kinds = skill.parameters.items()
+        action = skill.ground({name: self._bound(task, name, kind) for name, kind in kinds})
         if len(set(action.participants)) < len(action.participants):
-            self._say(
+            raise _Malformed(
                 "robot-in-two-places",
-                f"{task.task}: {task.skill} needs different robots, "
+                f"{task.skill} needs different robots, "
                 f"and was given {' and '.join(action.participants)}",
-                task.task,
             )
-            return
-        self.actions[task.task] = action
+        return action
 
-    def _bind(self, task: Task, parameter: str, kind: str) -> str | None:
+    def _bound(self, task: Task, parameter: str, kind: str) -> str:
         value = task.args[parameter]
         if kind == "robot" and (actor := actor_in(value)) is not None:
             if actor not in self._actors:
-                self._say(
+                raise _Malformed(
                     "unknown-name",
-                    f"{task.task}: `{parameter}` names actor {actor}, who has no task"
-                    f"{_among(self._actors)}",
-                    task.task,
+                    f"`{parameter}` names actor {actor}, who has no task{_among(self._actors)}",
                 )
-                return None
             if self._allocation is None:
                 return value
             robot = self._allocation.get(actor)
             if robot is None or robot not in self._world.robots:
-                self._say("unallocated", f"actor {actor} has no robot", task.task)
-                return None
+                raise _Malformed("unallocated", f"actor {actor} has no robot")
             return robot
         found = self._world.kind_of(value)
         if found != kind:
@@ -114,13 +98,10 @@ class PlanForm:
                 "object": self._world.objects,
                 "place": self._world.places,
             }[kind]
-            self._say(
+            raise _Malformed(
                 "unknown-name" if found is None else "wrong-type",
-                f"{task.task}: `{parameter}` must be a {kind} and is {value}, {what}"
-                f"{_among(choices)}",
-                task.task,
+                f"`{parameter}` must be a {kind} and is {value}, {what}{_among(choices)}",
             )
-            return None
         return value
 
 

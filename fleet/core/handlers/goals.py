@@ -162,17 +162,11 @@ def _note(state: State, reading: Reading) -> str | None:
 
 def _presume(state: State, goal: str, reading: Reading) -> State:
     """Believe what a goal takes for granted where nothing is known, as if it had been stated."""
-    for (relation, subject), value in reading.presumed:
-        fact = state.fact(relation, subject)
+    for literal in reading.presumed:
+        fact = state.fact(*literal.variable)
         if fact is None or fact.value is None:
-            said = Fact(
-                subject=subject,
-                relation=relation,
-                value=value,
-                source=f"{PLANNER_SOURCE}:{goal}",
-                time_s=state.time_s,
-            )
-            state = believe(state, said)
+            source = f"{PLANNER_SOURCE}:{goal}"
+            state = believe(state, Fact.of(literal, source, state.time_s))
     return state
 
 

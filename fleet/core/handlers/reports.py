@@ -92,16 +92,8 @@ def _succeeded(
     state = _learned(state, record, report, action)
     for literal in action.after if action is not None else ():
         if literal.variable not in reported:
-            state = believe(
-                state,
-                Fact(
-                    subject=literal.variable.subject,
-                    relation=literal.variable.relation,
-                    value=literal.value,
-                    source=PLANNER_SOURCE,
-                    time_s=report.ended_s or state.time_s,
-                ),
-            )
+            time_s = report.ended_s or state.time_s
+            state = believe(state, Fact.of(literal, PLANNER_SOURCE, time_s))
     return set_record(state, entry, _ended(record, report, TaskState.SUCCEEDED))
 
 

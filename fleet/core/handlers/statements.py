@@ -47,16 +47,8 @@ def _read_statement(state: State, name: str) -> State:
         read = statement_facts(state.statements[name].text, state.vocabulary())
     except NotUnderstood as error:
         return _set_status(state, StatementStatus(statement=name, reason=str(error)))
-    facts = tuple(
-        Fact(
-            subject=key.subject,
-            relation=key.relation,
-            value=value,
-            source=f"{PLANNER_SOURCE}:{name}",
-            time_s=state.time_s,
-        )
-        for key, value in read
-    )
+    source = f"{PLANNER_SOURCE}:{name}"
+    facts = tuple(Fact.of(literal, source, state.time_s) for literal in read)
     for fact in facts:
         state = believe(state, fact)
     return _set_status(state, StatementStatus(statement=name, facts=facts))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from fleet.core.model.durations import pace, work_s
@@ -145,15 +145,7 @@ class WorldModel:
 
     def with_facts(self, facts: Mapping[FactKey, Value]) -> WorldModel:
         """The same world with some facts changed."""
-        return WorldModel(
-            self.skills,
-            self.places,
-            self.objects,
-            self.robots,
-            self.available,
-            {**self.facts, **facts},
-            self.durations,
-        )
+        return replace(self, facts={**self.facts, **facts})
 
 
 def condition_holds(facts: Mapping[FactKey, Value], condition: Condition) -> bool:

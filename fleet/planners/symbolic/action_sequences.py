@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
+from functools import cache
 
 from msgspec.structs import replace
 
@@ -164,45 +165,29 @@ def _cheapest_few(
     actions = relaxed_reachable(grounded, start, condition, world)
     if not actions:
         return []  # nothing that these objects are good for makes it true
-    used: dict[tuple[str, tuple[str, ...]], int] = {}
-
-    seconds: dict[tuple[int, Value], float] = {}
-    """By number of the action and where its robot comes from; charges change between searches."""
-    numbers = {id(action): number for number, action in enumerate(actions)}
     stands = [FactKey(AT, action.actor) for action in actions]
+    numbers = {id(action): number for number, action in enumerate(actions)}
+    charge_s = [0.0] * len(actions)
 
-    def cost_s(action: Action, now: Mapping[FactKey, Value]) -> float:
-        number = numbers[id(action)]
-        where = now.get(stands[number]) or facts.get(stands[number])
-        cost = seconds.get((number, where))
-        if cost is None:
-            cost = world.duration_s(action, where, action.actor)
-            cost += REUSE_CHARGE_S * used.get(_signature(action), 0)
-            seconds[number, where] = cost
-        return cost
+    @cache
+    def duration_s(number: int, origin: Value) -> float:
+        return world.duration_s(actions[number], origin, actions[number].actor)
 
-    results: list[Solution] = []
+    def cost_s(number: int, now: Mapping[FactKey, Value]) -> float:
+        origin = now.get(stands[number]) or facts.get(stands[number])
+        return duration_s(number, origin) + charge_s[number]
+
+    solutions: list[Solution] = []
     for _ in range(ALTERNATIVES):
         found = uniform_cost_search(actions, start, condition, world, cost_s)
         if found is None:
             break
-        results.append(_with_true_cost(found, world, facts))
-        for action in found.actions:
-            used[_signature(action)] = used.get(_signature(action), 0) + 1
-        seconds.clear()
-    return results
-
-
-def _with_true_cost(found: Solution, world: WorldModel, facts: Facts) -> Solution:
-    """The same sequence with its true cost [s], without what was charged to make it different."""
-    where: dict[str, Value] = {robot: facts.get(FactKey(AT, robot)) for robot in world.robots}
-    seconds = 0.0
-    for action in found.actions:
-        seconds += world.duration_s(action, where.get(action.actor), action.actor)
-        for literal in action.after:
-            if literal.variable == FactKey(AT, action.actor):
-                where[action.actor] = literal.value
-    return Solution(found.actions, seconds, found.facts)
+        used = [numbers[id(action)] for action in found.actions]
+        true_cost_s = found.cost_s - sum(charge_s[number] for number in used)
+        solutions.append(Solution(found.actions, round(true_cost_s, 6), found.facts))
+        for number in used:
+            charge_s[number] += REUSE_CHARGE_S
+    return solutions
 
 
 def _signature(action: Action) -> tuple[str, tuple[str, ...]]:

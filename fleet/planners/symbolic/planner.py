@@ -13,9 +13,8 @@ all robots that can, in parallel. What is found leads to the next revision.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from heapq import heapify, heappop, heappush
 from itertools import product
 from math import inf, prod
 
@@ -131,24 +130,21 @@ def _not_found(subgoal: Subgoal, problem: PlanningProblem) -> str:
 
 @dataclass(frozen=True)
 class _Candidate:
-    """A valid plan for a choice of sequences, and what it costs.
+    """A valid plan for a choice of sequences, each actor with the able robot that has least to do.
 
-    `allocation` gives each actor the able robot with the least to do. Until `verified`, the cost is
-    that of the shortest schedule, which may not pass the checker with robots for actors.
+    Until it is verified, `cost` is that of the shortest schedule, which need not pass the checker.
     """
 
     choice: Choice
-    checked: CheckedPlan
-    allocation: Mapping[str, str]
+    allocated: AllocatedPlan
     cost: Cost
-    verified: bool = False
 
-    def verify(self) -> _Candidate | NoPlan:
-        """The candidate with the cost of its shortest schedule that passes the checker."""
-        found = AllocatedPlan(self.checked, self.allocation).valid_schedule()
+    def verified(self) -> _Candidate | NoPlan:
+        """With the cost of the shortest schedule that passes the checker."""
+        found = self.allocated.valid_schedule()
         if isinstance(found, tuple):
             return NoPlan(found[0].sentence, found)
-        return replace(self, cost=_cost(found, self.checked), verified=True)
+        return replace(self, cost=_cost(found, self.allocated.checked))
 
 
 def _cost(schedule: PlanSchedule, checked: CheckedPlan) -> Cost:
@@ -159,106 +155,67 @@ def _cost(schedule: PlanSchedule, checked: CheckedPlan) -> Cost:
 def _choose(
     problem: PlanningProblem, options: Sequence[Choice], explored: Exploration | None
 ) -> CheckedPlan | NoPlan:
+    best: _Candidate | NoPlan | None = None
     if problem.strategy == MONOLITHIC:
-        return _plan_of(problem, [alternatives[0] for alternatives in options], explored)
-    if problem.strategy == PER_GOAL:
-        choice: list[ActionSequence] = []
+        best = _best(problem, [alternatives[:1] for alternatives in options], explored)
+    elif problem.strategy == PER_GOAL:
+        choice: list[Choice] = []
         for goal in dict.fromkeys(alternatives[0].goal for alternatives in options):
             mine = [alternatives for alternatives in options if alternatives[0].goal == goal]
             alone = _best(problem, mine, None)
             if isinstance(alone, NoPlan):
                 break
-            choice.extend(alone.choice)
+            choice += [(sequence,) for sequence in alone.choice]
         else:
-            merged = _plan_of(problem, choice, explored)
-            if isinstance(merged, CheckedPlan):
-                return merged
-        # What is best for each goal alone does not fit together, as where two want one helper.
-    best = _best(problem, options, explored)
-    return best if isinstance(best, NoPlan) else best.checked
-
-
-def _plan_of(
-    problem: PlanningProblem, choice: Choice, explored: Exploration | None
-) -> CheckedPlan | NoPlan:
-    """The plan of one choice, if it can be allocated."""
-    candidate = _candidate(problem, choice, explored)
-    verified = candidate if isinstance(candidate, NoPlan) else candidate.verify()
-    return verified if isinstance(verified, NoPlan) else verified.checked
+            best = _best(problem, choice, explored)
+        # What is best for each goal alone may not fit together, as where two want one helper.
+        best = best if isinstance(best, _Candidate) else None
+    best = best or _best(problem, options, explored)
+    return best if isinstance(best, NoPlan) else best.allocated.checked
 
 
 def _best(
     problem: PlanningProblem, options: Sequence[Choice], explored: Exploration | None
 ) -> _Candidate | NoPlan:
-    """The cheapest candidate; of few combinations the cheapest of all."""
+    """The cheapest candidate: of few combinations the cheapest of all; else from the cheapest
+    sequence of each, one is changed at a time for as long as that helps.
+    """
+    best: _Candidate | None = None
+    failure: NoPlan | None = None
+
+    def better(found: _Candidate | NoPlan) -> bool:
+        nonlocal best, failure
+        # Verifying does not make a plan cheaper: only what looks cheaper is verified.
+        if isinstance(found, _Candidate) and (best is None or found.cost < best.cost):
+            found = found.verified()
+            if isinstance(found, _Candidate) and (best is None or found.cost < best.cost):
+                best = found
+                return True
+        failure = found if failure is None and isinstance(found, NoPlan) else failure
+        return False
 
     def candidate(choice: Choice) -> _Candidate | NoPlan:
         return _candidate(problem, choice, explored)
 
     if prod(map(len, options)) <= MAX_COMBINATIONS:
-        return _cheapest([candidate(choice) for choice in product(*options)])
-    return _hill_climbed(options, candidate)
-
-
-def _cheapest(candidates: Sequence[_Candidate | NoPlan]) -> _Candidate | NoPlan:
-    """The cheapest that can be verified, the first of equals; or why the first one cannot be.
-
-    Verifying does not make a plan cheaper, so only those that look cheapest are verified.
-    """
-    open_: dict[int, _Candidate] = {}
-    failed: dict[int, NoPlan] = {}
-    for number, candidate in enumerate(candidates):
-        if isinstance(candidate, NoPlan):
-            failed[number] = candidate
-        else:
-            open_[number] = candidate
-    queue = [(candidate.cost, number) for number, candidate in open_.items()]
-    heapify(queue)
-    while queue:
-        _, number = heappop(queue)
-        if open_[number].verified:
-            return open_[number]
-        verified = open_[number].verify()
-        if isinstance(verified, NoPlan):
-            failed[number] = verified
-        else:
-            open_[number] = verified
-            heappush(queue, (verified.cost, number))
-    return failed[min(failed)]
-
-
-def _hill_climbed(
-    options: Sequence[Choice], candidate: Callable[[Choice], _Candidate | NoPlan]
-) -> _Candidate | NoPlan:
-    """From the cheapest sequence of each, one is changed at a time for as long as that helps."""
-    best: _Candidate | None = None
-    failure: NoPlan | None = None
-
-    def better(choice: Choice) -> bool:
-        nonlocal best, failure
-        found = candidate(choice)
-        if isinstance(found, _Candidate):
-            if best is not None and found.cost >= best.cost:
-                return False
-            found = found.verify()
-        if isinstance(found, NoPlan):
-            failure = failure or found
-        elif best is None or found.cost < best.cost:
-            best = found
-            return True
-        return False
-
-    current = [alternatives[0] for alternatives in options]
-    better(current)
-    improved = True
-    while improved:
-        improved = False
-        for number, alternatives in enumerate(options):
-            for sequence in alternatives:
-                changed = [*current[:number], sequence, *current[number + 1 :]]
-                if changed != current and better(changed):
-                    current, improved = changed, True
+        for found in sorted(map(candidate, product(*options)), key=_promise):
+            better(found)
+    else:
+        current = [alternatives[0] for alternatives in options]
+        better(candidate(current))
+        improved = True
+        while improved:
+            improved = False
+            for number, alternatives in enumerate(options):
+                for sequence in alternatives:
+                    changed = [*current[:number], sequence, *current[number + 1 :]]
+                    if changed != current and better(candidate(changed)):
+                        current, improved = changed, True
     return best or failure or NoPlan("no combination of action sequences passes the checker")
+
+
+def _promise(found: _Candidate | NoPlan) -> Cost:
+    return (-inf, -inf) if isinstance(found, NoPlan) else found.cost
 
 
 def _candidate(
@@ -270,9 +227,10 @@ def _candidate(
     allocation = least_loaded(checked)
     if allocation is None:
         return NoPlan("there are fewer robots than the plan needs at the same time")
-    schedule = next(AllocatedPlan(checked, allocation).schedules(), None)
+    allocated = AllocatedPlan(checked, allocation)
+    schedule = next(allocated.schedules(), None)
     cost = (inf, inf) if schedule is None else _cost(schedule, checked)
-    return _Candidate(choice, checked, allocation, cost)
+    return _Candidate(choice, allocated, cost)
 
 
 def _plan(problem: PlanningProblem, choice: Choice, explored: Exploration | None) -> Plan:

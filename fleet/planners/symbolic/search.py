@@ -176,14 +176,16 @@ def _may_hold_for(
 
 
 def uniform_cost_search(
-    actions: Iterable[Action],
+    actions: Sequence[Action],
     start: Facts,
     goal: Condition,
     world: WorldModel,
-    cost_s: Callable[[Action, Mapping[FactKey, Value]], float],
+    cost_s: Callable[[int, Mapping[FactKey, Value]], float],
 ) -> Solution | None:
-    """The cheapest sequence of `actions` from `start` to a state in which `goal` holds."""
-    actions = tuple(actions)
+    """The cheapest sequence of `actions` from `start` to a state in which `goal` holds.
+
+    `cost_s` is of an action, by its number, in a state.
+    """
     variables = tuple(
         dict.fromkeys(literal.variable for action in actions for literal in action.after)
     )
@@ -192,10 +194,11 @@ def uniform_cost_search(
     # What no action writes is looked up once; the rest is compared as the numbers that it is.
     moves = [
         (
+            number,
             action,
             [(index[row.variable], row.value) for row in action.before if row.variable in index],
         )
-        for action in actions
+        for number, action in enumerate(actions)
         if all(
             known_value(row.variable, start, world) == row.value
             for row in action.before
@@ -215,7 +218,7 @@ def uniform_cost_search(
         facts = {**start, **dict(zip(variables, state, strict=True))}
         if condition_holds(facts, goal):
             return Solution(_path(state, came), spent, facts)
-        for action, needs in moves:
+        for number, action, needs in moves:
             if not all(state[i] == value for i, value in needs):
                 continue
             if action.space_in and not applicable(action, facts, world):
@@ -224,7 +227,7 @@ def uniform_cost_search(
             for variable, value in action.after:
                 values[index[variable]] = value
             reached = tuple(values)
-            total = spent + cost_s(action, facts)
+            total = spent + cost_s(number, facts)
             if total < best.get(reached, float("inf")):
                 best[reached] = total
                 came[reached] = state, action

@@ -6,7 +6,6 @@ import asyncio
 import os
 import signal
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -14,8 +13,7 @@ import pytest
 from cli.demo.bring_up import router_up
 from cli.demo.child_processes import ChildProcesses, free_endpoint
 from cli.errors import BadArgument, ProcessDied
-
-DEADLINE_S = 20.0
+from tests.support.polling import until
 
 
 def make(out: Path) -> ChildProcesses:
@@ -32,12 +30,6 @@ def runs(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
     except FileNotFoundError:
         return False
-
-
-async def until(condition: Callable[[], bool]) -> None:
-    async with asyncio.timeout(DEADLINE_S):
-        while not condition():
-            await asyncio.sleep(0.02)
 
 
 async def test_a_process_is_ready_by_its_keys_and_gone_at_the_end(tmp_path: Path) -> None:

@@ -12,7 +12,8 @@ from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
 from keyexpr_schema.payloads.service import StoreAddress, StoreQuery
 from keyexpr_schema.transport.session import open_session
-from tests.support.session_values import goal, not_connected, until
+from tests.support.polling import until
+from tests.support.session_values import goal, not_connected
 
 
 async def test_a_confirmed_value_is_read_back_listed_and_deleted(session_config):

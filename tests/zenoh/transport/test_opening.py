@@ -14,7 +14,8 @@ from keyexpr_schema.keyspace import GOAL_SPEC, SIM_MOTION
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.simulation import SimRobotAddress
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from tests.support.session_values import goal, motion_call, not_connected, until
+from tests.support.polling import until
+from tests.support.session_values import goal, motion_call, not_connected
 
 
 async def test_without_a_router_opening_fails_with_one_sentence():

@@ -10,7 +10,8 @@ from keyexpr_schema.keyspace import GOAL_SPEC, ROBOT_ALIVE
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.robots import AliveAddress
 from keyexpr_schema.transport.session import open_session
-from tests.support.session_values import goal, not_connected, take, until
+from tests.support.polling import until
+from tests.support.session_values import goal, not_connected, take
 
 
 async def test_tokens_come_and_go_and_survive_the_watchers_lost_link(router, session_config):

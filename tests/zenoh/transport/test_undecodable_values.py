@@ -12,7 +12,8 @@ from keyexpr_schema.errors import UndecodablePayload
 from keyexpr_schema.keyspace import FACT, UNDECODABLE
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.session import Watch, open_session
-from tests.support.session_values import AT, fact, take, until
+from tests.support.polling import until
+from tests.support.session_values import AT, fact, take
 
 BAD = [
     (b"{", "application/json", "is not a Fact"),

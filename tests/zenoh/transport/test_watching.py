@@ -16,6 +16,7 @@ from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.session import open_session
 from keyexpr_schema.transport.storage import Write
+from tests.support.polling import until
 from tests.support.session_values import (
     AT,
     fact,
@@ -24,7 +25,6 @@ from tests.support.session_values import (
     senses,
     take,
     take_until_value,
-    until,
 )
 
 

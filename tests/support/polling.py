@@ -1,0 +1,28 @@
+"""Waiting for a condition: no test sleeps instead."""
+
+from __future__ import annotations
+
+import asyncio
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+DEADLINE_S = 30.0
+BETWEEN_LOOKS_S = 0.01
+
+
+async def until(look: Callable[[], Any], what: str = "it", timeout_s: float = DEADLINE_S) -> Any:
+    """The first true answer of `look`, which may be a coroutine function."""
+    try:
+        async with asyncio.timeout(timeout_s):
+            while True:
+                found = look()
+                if inspect.isawaitable(found):
+                    found = await found
+                if found:
+                    return found
+                await asyncio.sleep(BETWEEN_LOOKS_S)
+    except TimeoutError:
+        pytest.fail(f"{what} did not come within {timeout_s:g} s")

@@ -100,7 +100,7 @@ class SkillContext:
         return outcome
 
     async def look(self) -> tuple[Detection, ...]:
-        """Look around. What is seen elsewhere than the facts say, or on other things, becomes a fact.
+        """Look around. What is seen elsewhere than the facts say, or on another support, is a fact.
 
         Raises:
             SkillFailed: the camera gave nothing.

@@ -39,7 +39,7 @@ class PlanOutcome(msgspec.Struct, frozen=True, kw_only=True):
 
     allocation: dict[str, str] = {}
     sequence: dict[str, tuple[str, ...]] = {}
-    makespan_s: float | None = None
+    predicted_makespan_s: float | None = None
     lower_bound_s: float | None = None
     notes: tuple[str, ...] = ()
     planning_time_s: float | None = None

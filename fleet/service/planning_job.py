@@ -115,7 +115,7 @@ class _Run:
             sequence=dict(schedule.sequence),
             extra_after=dict(schedule.extra_after),
             durations_s=durations_s,
-            makespan_s=schedule.makespan_s,
+            predicted_makespan_s=schedule.makespan_s,
             lower_bound_s=found.lower_bound_s,
             notes=(*found.notes, *notes),
             repaired=repaired,

@@ -149,7 +149,7 @@ class _Candidate:
 
 def _cost(schedule: PlanSchedule, checked: CheckedPlan) -> Cost:
     unloading_s = UNLOADING_S * len(carried_at_end(checked))
-    return round(schedule.makespan_s + unloading_s, 3), schedule.work_s
+    return round(schedule.makespan_s + unloading_s, 3), sum(schedule.durations_s.values())
 
 
 def _choose(

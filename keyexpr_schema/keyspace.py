@@ -17,8 +17,8 @@ from keyexpr_schema.payloads import (
     plans,
     requests,
     robots,
-    service,
     simulation,
+    system,
     tasks,
     world,
 )
@@ -149,25 +149,25 @@ ANSWER = Key(
 
 # --- the system itself ---------------------------------------------------------------------------
 PLANNER_STATUS = Key(
-    "planner_status", "planner/status", service.PlannerAddress, service.PlannerStatus,
+    "planner_status", "planner/status", system.PlannerAddress, system.PlannerStatus,
     delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
     about="Which run of the planner is in charge, and what it can do.",
 )
 PLANNER_ALIVE = Key(
-    "planner_alive", "planner/alive/{incarnation}", service.PlannerAliveAddress, robots.Alive,
+    "planner_alive", "planner/alive/{incarnation}", system.PlannerAliveAddress, robots.Alive,
     delivery=TOKEN, writers=PLANNER, readers=PERSON,
     about="There while that run of the planner is connected.",
 )
 UNDECODABLE = Key(
-    "reject", "rejects/{component}/{digest}", service.UndecodableAddress, service.UndecodableValue,
+    "reject", "rejects/{component}/{digest}", system.UndecodableAddress, system.UndecodableValue,
     delivery=STORED, writers=ANYONE, readers=PERSON | RECORDER,
     about="A value that is not what its key promises: which key, why, how often.",
 )
 STORE_JOURNAL = Key(
-    "store_journal", "store/journal", service.StoreAddress, service.StoreQuery,
+    "store_journal", "store/journal", system.StoreAddress, system.StoreQuery,
     delivery=QUERY, writers=ANYONE, readers=STORE,
     about="What changed in the key-space, in the order in which the store applied it.",
-    reply=service.StoreJournal,
+    reply=system.StoreJournal,
 )
 
 # --- the simulated world -------------------------------------------------------------------------

@@ -47,7 +47,7 @@ class CheckedPlan:
     able: Mapping[str, tuple[str, ...]]
     violations: ClassVar[tuple[Violation, ...]] = ()
 
-    def made_by(self, making: Making, strategy: str) -> CheckedPlan:
+    def with_making(self, making: Making, strategy: str) -> CheckedPlan:
         """The same plan, saying how it was made; no check depends on that."""
         return replace(
             self, plan=msgspec.structs.replace(self.plan, making=making, strategy=strategy)

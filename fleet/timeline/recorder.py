@@ -168,7 +168,7 @@ class Recorder:
         """
         self._draw()
         self._lanes.flush()
-        self._world.flush(1 if whole else POSES)
+        self._world.poses.flush(1 if whole else POSES)
         self._frame_view(final=False)
         self._sink.stream.flush(timeout_sec=10.0)
 
@@ -177,7 +177,7 @@ class Recorder:
         self._utilisation.advance(self._clock.now_s, final=True)
         self._graphs.draw(self._clock.now_s, final=True)
         self._lanes.flush()
-        self._world.flush()
+        self._world.poses.flush()
         self._frame_view(final=True)
         self._sink.stream.flush(timeout_sec=30.0)
         self._sink.stream.disconnect()

@@ -92,7 +92,7 @@ class KinematicBackend(Backend):
             objects[name] = KinematicObject(name, entry.kind, mass_kg, point, entry.on)
         self._state = KinematicState(world, states, objects)
 
-    def _advance(self) -> None:
+    def advance(self) -> None:
         while self._events and self._stale(self._events[0]):
             heapq.heappop(self._events)
         horizon = self.time_s + (self._step_s or 0.05)

@@ -135,7 +135,7 @@ class MujocoBackend(Backend):
         if run is not None and run.ended is None:
             self._end(robot, run, MotionState.STOPPED, f"stopped while {run.phase}")
 
-    def _advance(self) -> None:
+    def advance(self) -> None:
         context = self._context
         # A robot whose arm is out, stopped in mid-work perhaps, must not be moved.
         pinned = {name for name, body in self._bodies.items() if body.arm_out()}

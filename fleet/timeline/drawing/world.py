@@ -33,7 +33,7 @@ class World:
         self._sink = sink
         self._palette = palette
         self._bodies: dict[str, Body] = {}
-        self._poses = Poses(sink)
+        self.poses = Poses(sink)
         self._roots: dict[str, str] = {}  # owner -> the body that stands for it
         self._specs: dict[str, RobotSpec] = {}
         self._trails: dict[str, Trail] = {}
@@ -51,10 +51,10 @@ class World:
         """Draw the fixed bodies and the shapes of the moving ones."""
         if scene == self._scene:
             return
-        self.flush()
+        self.poses.flush()
         self._scene = scene
         self._bodies = {body.body: body for body in scene.bodies}
-        self._poses.clear()
+        self.poses.clear()
         self._roots.clear()
         for body in scene.bodies:
             fixed = scene.fixed.get(body.body)
@@ -130,7 +130,7 @@ class World:
         for name, pose in frame.poses.items():
             body = self._bodies.get(name)
             owner = (body.owner if body else None) or "world"
-            self._poses.take(name, owner, pose, frame.time_s, wall_s)
+            self.poses.take(name, owner, pose, frame.time_s, wall_s)
         for owner, root in self._roots.items():
             there = frame.poses.get(root)
             if there is not None:
@@ -194,10 +194,6 @@ class World:
             wall_s,
         )
 
-    def flush(self, at_least: int = 1) -> None:
-        """Send the poses that wait, of bodies with `at_least` so many."""
-        self._poses.flush(at_least)
-
     def _relabel(self) -> None:
         for robot in self._specs:
             self.robot_label(robot, self._doing.get(robot), self._sink.clock.now_s, None)
@@ -223,11 +219,11 @@ class World:
 
     def _height(self, robot: str) -> float:
         """Height [m] of a robot's highest shape over its root, as far as its frames tell."""
-        root = self._poses.last(self._roots.get(robot, ""))
+        root = self.poses.last(self._roots.get(robot, ""))
         base = root[0][2] if root is not None else 0.0
         tops = [0.3]
         for name, body in self._bodies.items():
-            pose = self._poses.last(name)
+            pose = self.poses.last(name)
             if body.owner == robot and pose is not None:
                 tops.append(pose[0][2] - base + max(map(_top, body.shapes), default=0.0))
         # Kept from one call to the next, or the label would dance with the arm.

@@ -29,16 +29,16 @@ class AllocationContext:
 
     `ready_s` says from when on a robot is free [s from now]; `priority` of a goal decides between
     equal makespans (each step up counts twice); `due_s` says when a goal should be done
-    [s from now]. `home` is the robot of each actor in the plan that this is the rest of, and
-    `sequence` the order in which they were to begin: few actors should change hands. Actors that
-    are `under_way` go on at once.
+    [s from now]. `previous_allocation` has the robots of actors in the plan that this is the rest
+    of, and `actor_order` the order in which they were to begin: few actors should change hands.
+    Actors that are `under_way` go on at once.
     """
 
     ready_s: Mapping[str, float] = field(default_factory=dict)
     priority: Mapping[str, int] = field(default_factory=dict)
     due_s: Mapping[str, float] = field(default_factory=dict)
-    home: Mapping[str, str] = field(default_factory=dict)
-    sequence: tuple[str, ...] = ()
+    previous_allocation: Mapping[str, str] = field(default_factory=dict)
+    actor_order: tuple[str, ...] = ()
     under_way: frozenset[str] = frozenset()
 
 

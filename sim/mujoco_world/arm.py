@@ -180,10 +180,6 @@ class Gripper:
         """Close and press."""
         self._goal = self.entry.squeeze_m
 
-    def settled(self) -> bool:
-        """Whether the command has reached its goal (the fingers may be blocked)."""
-        return self._setpoint == self._goal
-
     def feels(self) -> bool:
         """Whether both fingers press on something that keeps them apart."""
         touched = all(float(self._data.sensordata[at]) > TOUCH_N for at in self._touch)

@@ -9,8 +9,8 @@ from keyexpr_schema.facts import render_value
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus
 from keyexpr_schema.payloads.robots import RobotActivity, RobotSpec, RobotState
-from keyexpr_schema.payloads.service import UndecodableValue
 from keyexpr_schema.payloads.simulation import Truth
+from keyexpr_schema.payloads.system import UndecodableValue
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskRecord, TaskState, Try
 from keyexpr_schema.payloads.world import Fact
 

@@ -13,7 +13,7 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.core import events
 from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry, PlanningJob
 from fleet.core.state import Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
@@ -80,9 +80,10 @@ class FleetModel:
         """One event into the core; its effects are carried out."""
         self.time_s += 1.0
         self.wall_s += 0.01
-        self._apply(kind(time_s=self.time_s, wall_time_s=self.wall_s, **fields))
+        self.apply(kind(time_s=self.time_s, wall_time_s=self.wall_s, **fields))
 
-    def _apply(self, event: Event) -> None:
+    def apply(self, event: Event) -> None:
+        """An event into the core, as it is."""
         before = self.state
         self.state, effects = step(before, event, SKILLS)
         if self.state is before:
@@ -108,12 +109,16 @@ class FleetModel:
                 self.documents.pop(effect.key.build(effect.address), None)
         for effect in effects:
             if isinstance(effect, MakePlan):
-                at = {"time_s": self.time_s, "wall_time_s": self.wall_s}
-                answer = run_planning_job(effect.job, self.state, COMPOSITION, at)
+                answer = self.run(effect.job)
                 if self.late:
                     self.answers.append(answer)
                 else:
-                    self._apply(answer)
+                    self.apply(answer)
+
+    def run(self, job: PlanningJob) -> Answer:
+        """What a planning job comes to, from the state as it is now."""
+        at = {"time_s": self.time_s, "wall_time_s": self.wall_s}
+        return run_planning_job(job, self.state, COMPOSITION, at)
 
     def answer(self, pick: int = 0) -> None:
         """One of the planning jobs under way is answered."""
@@ -121,14 +126,14 @@ class FleetModel:
         self.given_answers.append(answer)
         self.met["in another order"] += any(other.job < answer.job for other in self.answers)
         self._count(answer)
-        self._apply(answer)
+        self.apply(answer)
 
     def answer_again(self, pick: int) -> None:
         """An answer comes a second time."""
         answer = self.given_answers[pick % len(self.given_answers)]
         self.met["a second time"] += 1
         before = self.state.plans
-        self._apply(answer)
+        self.apply(answer)
         assert self.state.plans == before, "a job was answered twice"
 
     def _count(self, answer: Answer) -> None:
@@ -240,6 +245,10 @@ class FleetModel:
         """A robot has tried, and failed for good."""
         self.start(order)
         self.report(order, ReportState.FAILED, reason=reason, ended_s=self.time_s)
+
+    def cancelled(self, order: Order) -> None:
+        """A robot confirms that it does no more about an order."""
+        self.report(order, ReportState.CANCELLED)
 
     def interrupt(self, order: Order, done: bool) -> None:
         """A worker crashed in the middle and is back; the work was done, or it was not."""

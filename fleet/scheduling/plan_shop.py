@@ -82,7 +82,9 @@ def plan_shop(
     context = context or AllocationContext()
     world, graph = checked.world, checked.graph
     robots = tuple(world.team)
+    machine = {robot: i for i, robot in enumerate(robots)}
     block_of = {actor_arg(actor): i for i, actor in enumerate(able)}
+    """With robots that the plan names, if they are connected: others are no machines."""
     number = {task: i for i, task in enumerate(graph.order)}
     numbers = _Numbers(world, robots)
     weights, dues_s = _weights_and_dues(checked.plan, graph, context)
@@ -92,10 +94,11 @@ def plan_shop(
         action = checked.actions[task]
         blocks: dict[int, None] = {}
         for participant in action.participants:
-            if participant not in block_of:
+            if participant in machine and participant not in block_of:
                 block_of[participant] = len(members)
                 members.append([])
-            blocks[block_of[participant]] = None
+            if participant in block_of:
+                blocks[block_of[participant]] = None
         for block in blocks:
             members[block].append(i)
         target, arrives = numbers.sites(action)
@@ -110,7 +113,6 @@ def plan_shop(
                 due_s=dues_s.get(task, inf),
             )
         )
-    machine = {robot: i for i, robot in enumerate(robots)}
     able_of = {actor_arg(actor): rows for actor, rows in able.items()}
     positions = _positions(checked, able, context)
     kept_apart: dict[str, set[int]] = {}

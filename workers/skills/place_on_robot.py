@@ -11,7 +11,7 @@ from workers.errors import SkillFailed
 from workers.skill_registry import ParameterKind, skill
 
 STATE_S = 10.0
-"""Wall seconds to wait for the carrier's worker to say where it stands or what it carries."""
+"""Wall seconds to wait for a state of the carrier: where it stands, what it carries."""
 FIRST_STATE_S = 1.0
 """Wall seconds to wait for it before looking into the basket oneself."""
 STOOD_STILL_M = 0.05

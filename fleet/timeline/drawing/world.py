@@ -172,7 +172,7 @@ class World:
         """Write over the robot what it is called, and what it does (`None`: nothing)."""
         root = self._roots.get(robot)
         if root is None and robot not in self._stand_ins:
-            return  # nobody has said where it is
+            return  # its pose is not known
         path = entity("world", "bodies", robot, root) if root else entity("world", "robots", robot)
         spec = self._specs.get(robot)
         name = (spec.label if spec else "") or robot
@@ -245,4 +245,4 @@ _TINTS: tuple[Rgba, ...] = (
     (90, 70, 88, 255),
     (78, 78, 82, 255),
 )
-"""Floors of places, in the order in which those are told of."""
+"""Floors of places, in the order in which those come."""

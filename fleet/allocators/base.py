@@ -29,14 +29,6 @@ class Allocated:
     lower_bound_s: float | None = None
     notes: tuple[str, ...] = ()
 
-    @property
-    def gap(self) -> float | None:
-        """How far from optimal at most, as a share of the makespan; 0 is proven optimal."""
-        if self.lower_bound_s is None:
-            return None
-        makespan_s = self.schedule.makespan_s
-        return max(0.0, 1 - self.lower_bound_s / makespan_s) if makespan_s > 0 else 0.0
-
 
 @dataclass(frozen=True)
 class Assignment:
@@ -125,12 +117,10 @@ class Allocator(ABC):
         chosen = self._assign(problem)
         if isinstance(chosen, NotAllocated):
             return chosen
-        if not isinstance(chosen, Assignment):
-            chosen = Assignment(chosen)
         return _scheduled(problem, chosen)
 
     @abstractmethod
-    def _assign(self, problem: AllocationProblem) -> Mapping[str, str] | Assignment | NotAllocated:
+    def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
         """A robot for every actor, among those able; or why there is none."""
 
 

@@ -22,7 +22,7 @@ from fleet.service.router_process import with_port
 from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.facts import AT
 from keyexpr_schema.keyspace import FACT, STORE_JOURNAL
-from keyexpr_schema.payloads.service import StoreAddress, StoreQuery
+from keyexpr_schema.payloads.system import StoreAddress, StoreQuery
 from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from keyexpr_schema.transport.storage import Write

@@ -68,7 +68,7 @@ def main() -> None:
         table.add_row(
             (happens.__doc__ or "").split(".")[0],
             f"{made.planning_time_s:.2f} s",
-            f"{made.makespan_s:.0f} s",
+            f"{made.predicted_makespan_s:.0f} s",
             least,
             str(moved) if made.repaired else "",
             *changes,
@@ -88,23 +88,23 @@ class Running:
 
     def __post_init__(self) -> None:
         self.state, self.time_s, self.made = State(), 0.0, PlanningSucceeded
-        self.tell(events.PlannerStarted, epoch=1, incarnation="bench")
+        self.receive(events.PlannerStarted, epoch=1, incarnation="bench")
         for number in range(PLACES):
             ways = {f"room_{n}": abs(n - number) * STEP_M for n in range(PLACES) if n != number}
             place = Place(place=f"room_{number}", label=f"room {number}", travel_m=ways)
-            self.tell(events.PlacePut, place=place)
+            self.receive(events.PlacePut, place=place)
         for number in range(self.robots):
             spec = RobotSpec(
                 robot=f"r{number}", model="hsr",
                 skills=("navigate", "pick", "place"),
                 capabilities={"drive": 0.6, "see": 4.0, "grip": 1.2, "reach": 1.0},
             )  # fmt: skip
-            self.tell(events.RobotRegistered, spec=spec)
-            self.tell(events.WorkerConnected, robot=spec.robot, incarnation="i1")
+            self.receive(events.RobotRegistered, spec=spec)
+            self.receive(events.WorkerConnected, robot=spec.robot, incarnation="i1")
             self.learn(spec.robot, HOLDING, NOTHING)
             self.learn(spec.robot, AT, f"room_{number % PLACES}")
         for number in range(self.goals):
-            self.tell(
+            self.receive(
                 events.ObjectPut,
                 object=Object(object=f"c{number}", kind="cup", label=f"c{number}"),
             )
@@ -112,15 +112,15 @@ class Running:
             wanted = f"room_{(number + 1 + number // PLACES % (PLACES - 1)) % PLACES}"
             condition = Condition(relation=AT, subject=f"c{number}", value=wanted)
             goal = Goal(goal=f"g{number}", text="", conditions=(condition,), ordinal=number)
-            self.tell(events.GoalPut, goal=goal)
-        self.tell(events.PlanRequested, request=PlanRequest(request="r", plan="p"))
+            self.receive(events.GoalPut, goal=goal)
+        self.receive(events.PlanRequested, request=PlanRequest(request="r", plan="p"))
 
     @property
     def entry(self) -> PlanEntry:
         """What is kept of the plan."""
         return self.state.plans["p"]
 
-    def tell(self, kind: type[events.Event], wait_s: float = 0.0, **fields: Any) -> None:
+    def receive(self, kind: type[events.Event], wait_s: float = 0.0, **fields: Any) -> None:
         """One event; planning jobs are done at once."""
         self.time_s += wait_s
         at = {"time_s": self.time_s, "wall_time_s": self.time_s}
@@ -136,7 +136,7 @@ class Running:
     def learn(self, subject: str, relation: str, value: str) -> None:
         """Something is told."""
         fact = Fact(subject=subject, relation=relation, value=value, source="bench")
-        self.tell(events.FactPut, fact=fact)
+        self.receive(events.FactPut, fact=fact)
 
     def outstanding(self) -> list[TaskRecord]:
         """Tasks that robots are at."""
@@ -146,9 +146,9 @@ class Running:
         """Some robot starts its task and ends it."""
         record = self.outstanding()[0]
         report = self.report_of(record)
-        self.tell(events.ReportReceived, report=report)
+        self.receive(events.ReportReceived, report=report)
         done = replace(report, state=ReportState.SUCCEEDED, ended_s=self.time_s + record.duration_s)
-        self.tell(events.ReportReceived, report=done)
+        self.receive(events.ReportReceived, report=done)
 
     def report_of(self, record: TaskRecord) -> Report:
         """The report that the task has begun."""
@@ -163,21 +163,21 @@ class Running:
 def lost(running: Running) -> None:
     """A robot is lost: the plan is repaired."""
     robot = running.outstanding()[-1].robot
-    running.tell(events.WorkerDisconnected, robot=robot, incarnation="i1")
-    running.tell(events.TimerFired, wait_s=Policy().lost_after_s + 1.0)
+    running.receive(events.WorkerDisconnected, robot=robot, incarnation="i1")
+    running.receive(events.TimerFired, wait_s=Policy().lost_after_s + 1.0)
 
 
 def late(running: Running) -> None:
     """A robot is ten minutes late: the plan is repaired."""
     record = running.outstanding()[-1]
-    running.tell(events.ReportReceived, report=running.report_of(record))
-    running.tell(events.TimerFired, wait_s=FACTOR * record.duration_s + MARGIN_S + 600.0)
+    running.receive(events.ReportReceived, report=running.report_of(record))
+    running.receive(events.TimerFired, wait_s=FACTOR * record.duration_s + MARGIN_S + 600.0)
 
 
 def planned_again(running: Running) -> None:
     """A person wants another plan: everything is planned again."""
     ask = ReplanRequest(request="again", plan="p", reason="because")
-    running.tell(events.ReplanRequested, request=ask)
+    running.receive(events.ReplanRequested, request=ask)
 
 
 if __name__ == "__main__":

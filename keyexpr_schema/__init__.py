@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from keyexpr_schema.payloads.plans import *  # noqa: F403
     from keyexpr_schema.payloads.requests import *  # noqa: F403
     from keyexpr_schema.payloads.robots import *  # noqa: F403
-    from keyexpr_schema.payloads.service import *  # noqa: F403
     from keyexpr_schema.payloads.simulation import *  # noqa: F403
+    from keyexpr_schema.payloads.system import *  # noqa: F403
     from keyexpr_schema.payloads.tasks import *  # noqa: F403
     from keyexpr_schema.payloads.world import *  # noqa: F403
     from keyexpr_schema.transport.router import *  # noqa: F403
@@ -65,7 +65,7 @@ else:
             "payloads.robots": (
                 "Alive AliveAddress PoseMRad RobotActivity RobotAddress RobotSpec RobotState"
             ),
-            "payloads.service": (
+            "payloads.system": (
                 "JournalEntry PlannerAddress PlannerAliveAddress PlannerStatus StoreAddress "
                 "StoreJournal StoreQuery UndecodableAddress UndecodableValue"
             ),

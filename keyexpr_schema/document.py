@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,6 @@ import msgspec
 from keyexpr_schema.key import Component
 from keyexpr_schema.keyspace import KEYSPACE
 
-DEFAULT_PATH = Path("docs/keyspace.md")
 _PREAMBLE = """\
 <!-- Written by `python -m keyexpr_schema.document` from keyexpr_schema/keyspace.py. -->
 
@@ -107,19 +105,11 @@ def _type(kind: Any) -> str:
 def _default(field: msgspec.structs.FieldInfo) -> str:
     if field.default_factory is not msgspec.NODEFAULT:
         return f"`{field.default_factory()!r}`"
-    return "required" if field.default is msgspec.NODEFAULT else f"`{_plain(field.default)!r}`"
-
-
-def _plain(value: Any) -> Any:
-    return msgspec.to_builtins(value) if not isinstance(value, tuple) else value
-
-
-def main() -> None:
-    """Write the page to the path given, or to docs/keyspace.md."""
-    path = Path(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT_PATH
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(document(), encoding="utf-8")
+    if field.default is msgspec.NODEFAULT:
+        return "required"
+    plain = field.default if field.default == () else msgspec.to_builtins(field.default)
+    return f"`{plain!r}`"
 
 
 if __name__ == "__main__":
-    main()
+    Path("docs/keyspace.md").write_text(document(), encoding="utf-8")

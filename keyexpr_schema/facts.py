@@ -3,15 +3,15 @@
 A fact is `relation(subject) = value`, in that order everywhere. A value is written as in JSON,
 and a word needs no quotes: `true`, `false`; `unknown` (or `null`); a JSON number, `3` a whole one,
 `3.0` and `1e3` with a fraction; text in double quotes is that text, `"3"` a word of one digit; and
-anything else is a word as it stands (`kitchen`, `007`, `nan`, a number that no payload can hold).
+anything else is a word as it stands (`kitchen`, `007`, `nan`).
 """
 
 from __future__ import annotations
 
-import json
-import math
 import re
 from typing import NamedTuple
+
+import msgspec
 
 Value = str | bool | int | float | None
 """The value of a fact. `None` is *unknown*: somebody says that nobody knows."""
@@ -56,39 +56,27 @@ class Literal(NamedTuple):
         return f"{self.variable} = {render_value(self.value)}"
 
 
-WHOLE_BELOW = 2.0**63
-"""Whole numbers that a payload can hold."""
-_NUMBER = re.compile(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?")
-_WORDS: dict[str, Value] = {"unknown": None, "null": None, "true": True, "false": False}
 _LITERAL = re.compile(r"\s*([\w.-]+)\s*(?:\(\s*([\w.-]+)\s*\)\s*=|\s([\w.-]+)\s)\s*(\".*\"|\S+)\s*")
 
 
 def parse_value(text: str) -> Value:
     """The value that `text` stands for; the rule stands at the head of this module."""
-    if text in _WORDS:
-        return _WORDS[text]
-    if number := _NUMBER.fullmatch(text):
-        real = float(text)
-        if number[1] is not None or number[2] is not None:
-            return real if math.isfinite(real) else text
-        return int(text) if abs(real) < WHOLE_BELOW else text
-    if text.startswith('"'):
-        try:
-            word = json.loads(text)
-        except ValueError:
-            return text
-        return word if isinstance(word, str) else text
-    return text
+    if text == "unknown":
+        return None
+    try:
+        value = msgspec.json.decode(text)
+    except (msgspec.DecodeError, RecursionError):
+        return text
+    return text if isinstance(value, list | dict) else value
 
 
 def render_value(value: Value) -> str:
     """A value as it is written: `parse_value` of it gives `value` again."""
     if value is None:
         return "unknown"
-    if isinstance(value, str):
-        plain = parse_value(value) == value and value == value.strip()
-        return value if plain else json.dumps(value, ensure_ascii=False)
-    return json.dumps(value)
+    if isinstance(value, str) and parse_value(value) == value and value == value.strip():
+        return value
+    return msgspec.json.encode(value).decode()
 
 
 def parse_literal(text: str) -> Literal | None:

@@ -17,8 +17,8 @@ from keyexpr_schema.payloads import (
     plans,
     requests,
     robots,
-    service,
     simulation,
+    system,
     tasks,
     world,
 )
@@ -30,210 +30,181 @@ STORED, LATEST, STREAM, SEQUENCE, TOKEN, QUERY = Delivery
 # fmt: off
 # --- goals ---------------------------------------------------------------------------------------
 GOAL_SPEC = Key(
-    "goal_spec", "goals/{goal}/spec",
-    goals.GoalAddress, goals.Goal, delivery=STORED,
-    writers=PERSON, readers=PLANNER | PERSON | RECORDER,
+    "goal_spec", "goals/{goal}/spec", goals.GoalAddress, goals.Goal,
+    delivery=STORED, writers=PERSON, readers=PLANNER | PERSON | RECORDER,
     about="What someone wants, in words and as conditions.",
 )
 GOAL_STATUS = Key(
-    "goal_status", "goals/{goal}/status",
-    goals.GoalAddress, goals.GoalStatus, delivery=STORED,
-    writers=PLANNER, readers=PLANNER | PERSON | RECORDER,
+    "goal_status", "goals/{goal}/status", goals.GoalAddress, goals.GoalStatus,
+    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON | RECORDER,
     about="How the goal stands, what it was understood to mean, and why not where it failed.",
 )
 
 # --- world ---------------------------------------------------------------------------------------
 FACT = Key(
-    "fact", "world/facts/{subject}/{relation}",
-    world.FactAddress, world.Fact, delivery=STORED,
-    writers=PERSON | PLANNER | WORKER, readers=PLANNER | WORKER | PERSON | RECORDER,
+    "fact", "world/facts/{subject}/{relation}", world.FactAddress, world.Fact,
+    delivery=STORED, writers=PERSON | PLANNER | WORKER,
+    readers=PLANNER | WORKER | PERSON | RECORDER,
     about="One state variable, its value, who said so and when; the latest word holds.",
 )
 STATEMENT = Key(
-    "statement", "world/statements/{statement}",
-    world.StatementAddress, world.Statement, delivery=STORED,
-    writers=PERSON, readers=PLANNER | PERSON,
+    "statement", "world/statements/{statement}", world.StatementAddress, world.Statement,
+    delivery=STORED, writers=PERSON, readers=PLANNER | PERSON,
     about="A sentence about the world; the planner reads facts out of it where it can.",
 )
 STATEMENT_STATUS = Key(
     "statement_status", "world/statements/{statement}/status",
-    world.StatementAddress, world.StatementStatus, delivery=STORED,
-    writers=PLANNER, readers=PERSON,
+    world.StatementAddress, world.StatementStatus,
+    delivery=STORED, writers=PLANNER, readers=PERSON,
     about="The facts that the planner read out of a statement, or why it read none.",
 )
 PLACE = Key(
-    "place", "world/places/{place}",
-    world.PlaceAddress, world.Place, delivery=STORED,
-    writers=PERSON, readers=PLANNER | WORKER | PERSON | RECORDER,
+    "place", "world/places/{place}", world.PlaceAddress, world.Place,
+    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | PERSON | RECORDER,
     about="A named region of the floor, its surfaces and its distances to other places.",
 )
 OBJECT = Key(
-    "object", "world/objects/{object}",
-    world.ObjectAddress, world.Object, delivery=STORED,
-    writers=PERSON, readers=PLANNER | WORKER | PERSON,
+    "object", "world/objects/{object}", world.ObjectAddress, world.Object,
+    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | PERSON,
     about="A thing that can be spoken about; where it is, is a fact.",
 )
 
 # --- robots --------------------------------------------------------------------------------------
 ROBOT_SPEC = Key(
-    "robot_spec", "robots/{robot}/spec",
-    robots.RobotAddress, robots.RobotSpec, delivery=STORED,
-    writers=PERSON, readers=PLANNER | WORKER | PERSON | RECORDER,
+    "robot_spec", "robots/{robot}/spec", robots.RobotAddress, robots.RobotSpec,
+    delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | PERSON | RECORDER,
     about="What the robot is and can do.",
 )
 ROBOT_STATE = Key(
-    "robot_state", "robots/{robot}/state",
-    robots.RobotAddress, robots.RobotState, delivery=LATEST,
-    writers=OWN_WORKER, readers=WORKER | PERSON | RECORDER,
+    "robot_state", "robots/{robot}/state", robots.RobotAddress, robots.RobotState,
+    delivery=LATEST, writers=OWN_WORKER, readers=WORKER | PERSON | RECORDER,
     about="Where the robot is, what it holds, what it is doing.",
 )
 ROBOT_ALIVE = Key(
-    "robot_alive", "robots/{robot}/alive/{incarnation}",
-    robots.AliveAddress, robots.Alive, delivery=TOKEN,
-    writers=OWN_WORKER, readers=PLANNER | OWN_WORKER | PERSON,
+    "robot_alive", "robots/{robot}/alive/{incarnation}", robots.AliveAddress, robots.Alive,
+    delivery=TOKEN, writers=OWN_WORKER, readers=PLANNER | OWN_WORKER | PERSON,
     about="There while that run of the robot's worker is connected.",
 )
 ORDER = Key(
-    "order", "robots/{robot}/orders/{plan}/{task}",
-    tasks.OrderAddress, tasks.Order, delivery=STORED,
-    writers=PLANNER, readers=PLANNER | OWN_WORKER | PERSON | RECORDER,
+    "order", "robots/{robot}/orders/{plan}/{task}", tasks.OrderAddress, tasks.Order,
+    delivery=STORED, writers=PLANNER, readers=PLANNER | OWN_WORKER | PERSON | RECORDER,
     about="A task given to a robot: revision, attempt, epoch, deadline.",
 )
 REPORT = Key(
-    "report", "robots/{robot}/reports/{plan}/{task}/{attempt}",
-    tasks.ReportAddress, tasks.Report, delivery=STORED,
-    writers=OWN_WORKER, readers=PLANNER | OWN_WORKER | PERSON | RECORDER,
+    "report", "robots/{robot}/reports/{plan}/{task}/{attempt}", tasks.ReportAddress, tasks.Report,
+    delivery=STORED, writers=OWN_WORKER, readers=PLANNER | OWN_WORKER | PERSON | RECORDER,
     about="What became of one attempt: every try with its reason, and the facts learned.",
 )
 
 DURATIONS = Key(
-    "durations", "durations/{model}",
-    durations.DurationsAddress, durations.Durations, delivery=STORED,
-    writers=PLANNER, readers=PLANNER | PERSON,
+    "durations", "durations/{model}", durations.DurationsAddress, durations.Durations,
+    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
     about="How long a type of robot really takes, learned from its reports.",
 )
 
 # --- plans ---------------------------------------------------------------------------------------
 PLAN_SPEC = Key(
-    "plan_spec", "plans/{plan}/spec",
-    plans.PlanAddress, plans.Plan, delivery=STORED,
-    writers=PLANNER, readers=PLANNER | PERSON | RECORDER,
+    "plan_spec", "plans/{plan}/spec", plans.PlanAddress, plans.Plan,
+    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON | RECORDER,
     about="Goals, tasks, dependencies and actors: a DAG.",
 )
 PLAN_PROPOSAL = Key(
-    "plan_proposal", "plans/{plan}/proposal",
-    plans.PlanAddress, plans.Plan, delivery=STORED,
-    writers=PERSON, readers=PLANNER,
+    "plan_proposal", "plans/{plan}/proposal", plans.PlanAddress, plans.Plan,
+    delivery=STORED, writers=PERSON, readers=PLANNER,
     about="A plan that somebody wants checked, allocated and carried out.",
 )
 PLAN_STATUS = Key(
-    "plan_status", "plans/{plan}/status",
-    plans.PlanAddress, plans.PlanStatus, delivery=STORED,
-    writers=PLANNER, readers=PLANNER | PERSON | RECORDER,
+    "plan_status", "plans/{plan}/status", plans.PlanAddress, plans.PlanStatus,
+    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON | RECORDER,
     about="Revision, allocation, how the plan stands, and why not where it failed.",
 )
 TASK_RECORD = Key(
-    "task_record", "plans/{plan}/tasks/{task}",
-    tasks.TaskAddress, tasks.TaskRecord, delivery=STORED,
-    writers=PLANNER, readers=PLANNER | PERSON | RECORDER,
+    "task_record", "plans/{plan}/tasks/{task}", tasks.TaskAddress, tasks.TaskRecord,
+    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON | RECORDER,
     about="The planner's record of one task: state, robot, attempts, times, reasons.",
 )
 
 # --- requests ------------------------------------------------------------------------------------
 PLAN_REQUEST = Key(
-    "plan_request", "requests/plan/{request}",
-    requests.RequestAddress, requests.PlanRequest, delivery=STORED,
-    writers=PERSON, readers=PLANNER,
+    "plan_request", "requests/plan/{request}", requests.RequestAddress, requests.PlanRequest,
+    delivery=STORED, writers=PERSON, readers=PLANNER,
     about="Make a plan.",
 )
 REPLAN_REQUEST = Key(
-    "replan_request", "requests/replan/{request}",
-    requests.RequestAddress, requests.ReplanRequest, delivery=STORED,
-    writers=PERSON, readers=PLANNER,
+    "replan_request", "requests/replan/{request}", requests.RequestAddress, requests.ReplanRequest,
+    delivery=STORED, writers=PERSON, readers=PLANNER,
     about="Plan again from what is known now.",
 )
 CONTROL_REQUEST = Key(
     "control_request", "requests/control/{request}",
-    requests.RequestAddress, requests.ControlRequest, delivery=STORED,
-    writers=PERSON, readers=PLANNER,
+    requests.RequestAddress, requests.ControlRequest,
+    delivery=STORED, writers=PERSON, readers=PLANNER,
     about="Start, cancel or delete a plan; add a task to one.",
 )
 ANSWER = Key(
-    "answer", "answers/{request}",
-    requests.RequestAddress, requests.Answer, delivery=STORED,
-    writers=PLANNER, readers=PLANNER | PERSON,
+    "answer", "answers/{request}", requests.RequestAddress, requests.Answer,
+    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
     about="What became of a request, in a sentence.",
 )
 
 # --- the system itself ---------------------------------------------------------------------------
 PLANNER_STATUS = Key(
-    "planner_status", "planner/status",
-    service.PlannerAddress, service.PlannerStatus, delivery=STORED,
-    writers=PLANNER, readers=PLANNER | PERSON,
+    "planner_status", "planner/status", system.PlannerAddress, system.PlannerStatus,
+    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
     about="Which run of the planner is in charge, and what it can do.",
 )
 PLANNER_ALIVE = Key(
-    "planner_alive", "planner/alive/{incarnation}",
-    service.PlannerAliveAddress, robots.Alive, delivery=TOKEN,
-    writers=PLANNER, readers=PERSON,
+    "planner_alive", "planner/alive/{incarnation}", system.PlannerAliveAddress, robots.Alive,
+    delivery=TOKEN, writers=PLANNER, readers=PERSON,
     about="There while that run of the planner is connected.",
 )
 UNDECODABLE = Key(
-    "reject", "rejects/{component}/{digest}",
-    service.UndecodableAddress, service.UndecodableValue, delivery=STORED,
-    writers=ANYONE, readers=PERSON | RECORDER,
+    "reject", "rejects/{component}/{digest}", system.UndecodableAddress, system.UndecodableValue,
+    delivery=STORED, writers=ANYONE, readers=PERSON | RECORDER,
     about="A value that is not what its key promises: which key, why, how often.",
 )
 STORE_JOURNAL = Key(
-    "store_journal", "store/journal",
-    service.StoreAddress, service.StoreQuery, delivery=QUERY,
-    writers=ANYONE, readers=STORE,
+    "store_journal", "store/journal", system.StoreAddress, system.StoreQuery,
+    delivery=QUERY, writers=ANYONE, readers=STORE,
     about="What changed in the key-space, in the order in which the store applied it.",
-    reply=service.StoreJournal,
+    reply=system.StoreJournal,
 )
 
 # --- the simulated world -------------------------------------------------------------------------
 SIM_MOTION = Key(
-    "sim_motion", "sim/robots/{robot}/motion",
-    simulation.SimRobotAddress, simulation.MotionCall, delivery=QUERY,
-    writers=OWN_WORKER, readers=SIMULATION,
+    "sim_motion", "sim/robots/{robot}/motion", simulation.SimRobotAddress, simulation.MotionCall,
+    delivery=QUERY, writers=OWN_WORKER, readers=SIMULATION,
     about="Drives one simulated robot, as a robot's driver would be driven.",
     reply=motions.MotionOutcome,
 )
 SIM_SENSES = Key(
-    "sim_senses", "sim/robots/{robot}/senses",
-    simulation.SimRobotAddress, motions.Senses, delivery=STREAM,
-    writers=SIMULATION, readers=PERSON,
+    "sim_senses", "sim/robots/{robot}/senses", simulation.SimRobotAddress, motions.Senses,
+    delivery=STREAM, writers=SIMULATION, readers=PERSON,
     about="Odometry, hand and basket sensors of one simulated robot.",
 )
 SIM_CLOCK = Key(
-    "sim_clock", "sim/clock",
-    simulation.SimAddress, simulation.SimClock, delivery=STREAM,
-    writers=SIMULATION, readers=PLANNER | WORKER | PERSON | RECORDER | SIMULATION,
+    "sim_clock", "sim/clock", simulation.SimAddress, simulation.SimClock,
+    delivery=STREAM, writers=SIMULATION, readers=PLANNER | WORKER | PERSON | RECORDER | SIMULATION,
     about="Simulated time.",
 )
 SIM_FRAMES = Key(
-    "sim_frames", "sim/frames",
-    simulation.SimAddress, simulation.Frames, delivery=SEQUENCE,
-    writers=SIMULATION, readers=RECORDER,
+    "sim_frames", "sim/frames", simulation.SimAddress, simulation.Frames,
+    delivery=SEQUENCE, writers=SIMULATION, readers=RECORDER,
     about="Where every movable body was, ten times in a simulated second.",
 )
 SIM_SCENE = Key(
-    "sim_scene", "sim/scene",
-    simulation.SimAddress, simulation.Scene, delivery=STORED,
-    writers=SIMULATION, readers=SIMULATION | PERSON | RECORDER,
+    "sim_scene", "sim/scene", simulation.SimAddress, simulation.Scene,
+    delivery=STORED, writers=SIMULATION, readers=SIMULATION | PERSON | RECORDER,
     about="The shapes of every body, and where the fixed ones stand.",
 )
 SIM_TRUTH = Key(
-    "sim_truth", "sim/truth/{object}",
-    simulation.TruthAddress, simulation.Truth, delivery=LATEST,
-    writers=SIMULATION, readers=PERSON | RECORDER,
+    "sim_truth", "sim/truth/{object}", simulation.TruthAddress, simulation.Truth,
+    delivery=LATEST, writers=SIMULATION, readers=PERSON | RECORDER,
     about="Where an object really is.",
 )
 SIM_CONTACTS = Key(
-    "sim_contacts", "sim/contacts",
-    simulation.SimAddress, simulation.ContactCount, delivery=LATEST,
-    writers=SIMULATION, readers=PERSON,
+    "sim_contacts", "sim/contacts", simulation.SimAddress, simulation.ContactCount,
+    delivery=LATEST, writers=SIMULATION, readers=PERSON,
     about="How often robots ran into each other or into walls.",
 )
 

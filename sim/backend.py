@@ -56,10 +56,6 @@ class Backend(ABC):
         if robot not in self._refused:
             self._stop(robot)
 
-    def advance(self) -> None:
-        """Let the world go on for one step: a control period, or to the next event."""
-        self._advance()
-
     def outcome(self, robot: str) -> MotionOutcome | None:
         """How the robot's latest motion stands or ended; `None` if it never moved."""
         self._check_robot(robot)
@@ -73,6 +69,10 @@ class Backend(ABC):
         """What the robot knows of itself."""
         self._check_robot(robot)
         return self._senses(robot)
+
+    @abstractmethod
+    def advance(self) -> None:
+        """Let the world go on for one step: a control period, or to the next event."""
 
     @abstractmethod
     def truths(self) -> tuple[Truth, ...]:
@@ -97,9 +97,6 @@ class Backend(ABC):
     @abstractmethod
     def _stop(self, robot: str) -> None:
         """As `stop`; a robot that does nothing stays as it is."""
-
-    @abstractmethod
-    def _advance(self) -> None: ...
 
     @abstractmethod
     def _outcome(self, robot: str) -> MotionOutcome | None: ...

@@ -5,8 +5,6 @@ from __future__ import annotations
 from sim.files.mission_file import Mission
 from sim.mujoco_world.description import load_description
 from sim.mujoco_world.driving import REACH_MARGIN_M
-from sim.navigation.clearance import Clearance
-from sim.navigation.lattice import Lattice
 from sim.navigation.spots import Spots
 
 
@@ -28,16 +26,15 @@ def out_of_reach(mission: Mission) -> tuple[str, ...]:
             hands.append((robot.spec.robot, about.clearance_m, reach_m))
     if not hands:
         return ()
-    clearance = Clearance(mission.world)
-    spots = Spots(mission.world, Lattice(mission.world, clearance), clearance)
-    said = []
+    spots = Spots(mission.world)
+    unreachable = []
     for name, entry in mission.world.object_entries.items():
         point = mission.world.start_point_m(name)
         if any(spots.stances(point, radius_m, reach_m) for _, radius_m, reach_m in hands):
             continue
         robot_name, radius_m, reach_m = hands[0]
-        said.append(
+        unreachable.append(
             f"{name} lies on {entry.on} at {list(entry.at_m)}, where no hand gets to: "
             f"for {robot_name}, {spots.why_not(point, radius_m, reach_m)}"
         )
-    return tuple(said)
+    return tuple(unreachable)

@@ -1,4 +1,4 @@
-"""`SkillContext`: what a skill may use: a body, the known world, a clock, and words for it."""
+"""`SkillContext`: what a skill may use: a robot, the known world, and a clock."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from workers.world_cache import WorldCache
 class SkillContext:
     """One attempt's view of robot and world.
 
-    What is learned is kept over all tries of the attempt, the later word in place of the earlier,
+    What is observed is kept over all tries of the attempt, the later value in place of the earlier,
     and goes out as facts just before the final report.
     """
 
@@ -43,7 +43,7 @@ class SkillContext:
 
     @property
     def observed(self) -> tuple[Fact, ...]:
-        """Everything learned in this attempt so far."""
+        """The facts observed in this attempt so far."""
         return tuple(self._observed.values())
 
     def observe(self, relation: str, subject: str, value: Value) -> None:
@@ -52,7 +52,7 @@ class SkillContext:
         self._observed[literal.variable] = Fact.of(literal, self.robot, self.now_s)
 
     def observe_failure(self, failure: SkillFailed) -> None:
-        """Learn the facts that a failure brought."""
+        """Take over the facts that a failure brought."""
         for relation, subject, value in failure.facts:
             self.observe(relation, subject, value)
 
@@ -61,11 +61,11 @@ class SkillContext:
         self._log.info("%s", sentence)
 
     def robot_state(self, robot: str) -> RobotState | None:
-        """What another robot's worker last said of it; `None` if it never spoke."""
+        """The state that another robot's worker published last; `None` if it never did."""
         return self.world.robots.get(robot)
 
     def robot_pose(self, robot: str) -> PoseMRad | None:
-        """Another robot's `(x [m], y [m], yaw [rad])`, world frame, as its worker last said."""
+        """Another robot's `(x [m], y [m], yaw [rad])`, world frame, as its worker published it."""
         state = self.robot_state(robot)
         return None if state is None else state.pose_m_rad
 
@@ -100,7 +100,7 @@ class SkillContext:
         return outcome
 
     async def look(self) -> tuple[Detection, ...]:
-        """Look around. What is seen elsewhere than the facts say, or on something else, is learned.
+        """Look around. What is seen elsewhere than the facts say, or on another support, is a fact.
 
         Raises:
             SkillFailed: the camera gave nothing.
@@ -118,7 +118,7 @@ class SkillContext:
         return seen
 
     async def holding(self) -> str | None:
-        """The object in the hand, by the hand's own sensor; what it says is learned."""
+        """The object in the hand, by the hand's own sensor; observed as a fact."""
         held = (await self.embodiment.senses()).holding
         self.observe(HOLDING, self.robot, NOTHING if held is None else held)
         if held is not None:

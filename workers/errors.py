@@ -5,7 +5,7 @@ from __future__ import annotations
 from keyexpr_schema.facts import Value
 
 Observation = tuple[str, str, Value]
-"""One thing learned: `(relation, subject, value)`, e.g. `("at", "cup_1", None)` for *unknown*."""
+"""One observed fact: `(relation, subject, value)`, e.g. `("at", "cup_1", None)` for *unknown*."""
 
 
 class WorkerError(Exception):
@@ -16,7 +16,7 @@ class SkillFailed(WorkerError):
     """A skill could not do what it was asked to, for a reason that lies in the world.
 
     `reason` is a sentence; `retryable` says whether trying again here and now could help;
-    `facts` is what the failure taught, beside what `SkillContext.observe` was told.
+    `facts` are those that the failure shows, beside those that `SkillContext.observe` was given.
     """
 
     def __init__(

@@ -19,7 +19,7 @@ WORLD_KEYS = (PLACE, OBJECT, FACT, ROBOT_SPEC, ROBOT_STATE)
 
 
 class WorldCache:
-    """The latest word on everything, kept up to date by `apply`."""
+    """The latest value of each key, kept up to date by `apply`."""
 
     def __init__(self) -> None:
         self.places: dict[str, Place] = {}
@@ -59,7 +59,7 @@ class WorldCache:
         return True
 
     def value_of(self, relation: str, subject: str) -> Value:
-        """The value of the fact `relation(subject)`; `None` if unknown or never told."""
+        """The value of the fact `relation(subject)`; `None` if it is unknown."""
         fact = self.facts.get(FactKey(relation, subject))
         return None if fact is None else fact.value
 
@@ -78,7 +78,7 @@ class WorldCache:
         """The value of `at(object)` that a detection shows.
 
         That is the place where the object lies on floor or furniture, or the robot in whose
-        basket it lies; `None` if the detection does not tell (in a hand, outside all places).
+        basket it lies; `None` if the detection does not show it (in a hand, outside all places).
         """
         if seen.support == FLOOR:
             if seen.place is not None:

@@ -20,12 +20,12 @@ from rich.table import Table
 
 from benchmarks.allocation.alternatives import big_m, in_turn, makespan_s, nearest, papers_milp
 from benchmarks.allocation.shop_files import NAMES, load
-from benchmarks.allocation.shops import random_shop
+from benchmarks.allocation.shops import random_shop, with_under_way, without_machines
 from fleet.jobshop.instance import Instance
 from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.portfolio import solve
 from fleet.jobshop.problem import Machine, Shop
-from fleet.jobshop.rescheduling import reschedule, without_machines
+from fleet.jobshop.rescheduling import reschedule
 from fleet.jobshop.time_budget import TimeBudget
 
 SIZES = ((8, 3), (10, 3), (20, 4), (50, 5), (100, 10), (1000, 50), (10_000, 1000))
@@ -177,11 +177,10 @@ def rescheduling() -> list[Rescheduling]:
         assert planned is not None
         for what in ("lost", "late"):
             left = without_machines(shop, frozenset({LOST})) if what == "lost" else _late(shop)
-            frozen = under_way(shop, planned.machine_of, planned.order, LOST)
+            begun = under_way(shop, planned.machine_of, planned.order, LOST)
+            left = with_under_way(left, planned.machine_of, begun)
             began_s = time.perf_counter()
-            made = reschedule(
-                left, planned.machine_of, planned.order, TimeBudget(RESCHEDULING_S), frozen
-            )
+            made = reschedule(left, planned.machine_of, planned.order, TimeBudget(RESCHEDULING_S))
             took_s = time.perf_counter() - began_s
             scratch = list_schedule(Instance(left))
             assert made is not None and scratch is not None
@@ -192,8 +191,8 @@ def rescheduling() -> list[Rescheduling]:
                     travel,
                     planned.makespan_s,
                     planned.machine_of.count(LOST),
-                    len(frozen),
-                    sum(made.schedule.machine_of[b] == planned.machine_of[b] for b in frozen),
+                    len(begun),
+                    sum(made.schedule.machine_of[b] == planned.machine_of[b] for b in begun),
                     made.schedule.makespan_s,
                     made.best_makespan_s,
                     len(made.moved),

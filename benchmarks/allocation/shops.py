@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from random import Random
 
-from fleet.jobshop.problem import Block, Machine, Operation, Shop
+from fleet.jobshop.problem import Block, Machine, Operation, Position, Shop
 
 ROOMS = 12
 ROOM_M = 4.0
@@ -90,3 +92,27 @@ def random_shop(
         tuple(Machine(kinds[m], random.randrange(ROOMS)) for m in range(machines)),
         ways if travel else (),
     )
+
+
+def without_machines(shop: Shop, lost: frozenset[int]) -> Shop:
+    """The shop when these machines are gone; machines keep their numbers.
+
+    Raises:
+        BadShop: some block can be done by no other machine.
+    """
+    blocks = (
+        replace(block, machines=tuple(m for m in block.machines if m not in lost))
+        for block in shop.blocks
+    )
+    return replace(shop, blocks=tuple(blocks))
+
+
+def with_under_way(shop: Shop, machine_of: Sequence[int], under_way: frozenset[int]) -> Shop:
+    """The shop in which these blocks stay on their machines and come first there."""
+    blocks = (
+        replace(block, machines=(machine_of[number],), position=Position.FIRST)
+        if number in under_way
+        else block
+        for number, block in enumerate(shop.blocks)
+    )
+    return replace(shop, blocks=tuple(blocks))

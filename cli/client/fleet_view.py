@@ -33,8 +33,8 @@ from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStat
 from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.plans import Plan, PlanStatus
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
-from keyexpr_schema.payloads.service import UndecodableValue
 from keyexpr_schema.payloads.simulation import ContactCount, Scene, SimClock, Truth
+from keyexpr_schema.payloads.system import UndecodableValue
 from keyexpr_schema.payloads.tasks import TaskRecord
 from keyexpr_schema.payloads.world import Fact
 

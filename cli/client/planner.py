@@ -26,11 +26,11 @@ from keyexpr_schema.payloads.requests import (
     ReplanRequest,
     RequestAddress,
 )
-from keyexpr_schema.payloads.service import PlannerAddress
+from keyexpr_schema.payloads.system import PlannerAddress
 
 if TYPE_CHECKING:
     from keyexpr_schema.payloads.robots import RobotSpec
-    from keyexpr_schema.payloads.service import PlannerStatus
+    from keyexpr_schema.payloads.system import PlannerStatus
     from keyexpr_schema.payloads.world import StatementStatus
     from keyexpr_schema.transport.session import Session
 

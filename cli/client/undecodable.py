@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload
 from keyexpr_schema.keyspace import key_of
-from keyexpr_schema.payloads.service import UndecodableValue
+from keyexpr_schema.payloads.system import UndecodableValue
 
 if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Session

@@ -95,7 +95,7 @@ async def journal(
 ) -> None:
     """What changed in the key-space, in the order in which the store applied it."""
     from keyexpr_schema.keyspace import STORE_JOURNAL
-    from keyexpr_schema.payloads.service import StoreAddress, StoreJournal, StoreQuery
+    from keyexpr_schema.payloads.system import StoreAddress, StoreJournal, StoreQuery
 
     async with call.session() as session:
         # What a query key replies is not in its type; the key table says it is a StoreJournal.

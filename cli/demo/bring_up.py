@@ -18,7 +18,7 @@ from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import PLANNER_ALIVE, ROBOT_ALIVE, ROBOT_SPEC, STORE_JOURNAL
 from keyexpr_schema.payloads.robots import RobotAddress
-from keyexpr_schema.payloads.service import StoreAddress, StoreQuery
+from keyexpr_schema.payloads.system import StoreAddress, StoreQuery
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.files.world_payloads import object_payloads, place_payloads
 

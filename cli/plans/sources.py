@@ -14,7 +14,7 @@ from cli.plans.files import is_plan_file, read_plan
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.keyspace import PLAN_SPEC, PLAN_STATUS, STORE_JOURNAL, TASK_RECORD
 from keyexpr_schema.payloads.plans import Plan, PlanAddress, PlanStatus
-from keyexpr_schema.payloads.service import JournalEntry, StoreAddress, StoreJournal, StoreQuery
+from keyexpr_schema.payloads.system import JournalEntry, StoreAddress, StoreJournal, StoreQuery
 from keyexpr_schema.payloads.tasks import TaskState
 
 if TYPE_CHECKING:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import msgspec
 from rich.text import Text
 from rich.tree import Tree
 
@@ -61,15 +62,7 @@ def _earlier(plan: Plan, records: Mapping[str, TaskRecord]) -> list[Task]:
     """Tasks of earlier revisions that were begun; what was only planned is of no interest now."""
     current = {task.task for task in plan.tasks}
     return [
-        Task(
-            task=record.task,
-            skill=record.skill,
-            args=record.args,
-            actor=record.actor,
-            after=record.after,
-            goal=record.goal,
-            duration_s=record.duration_s,
-        )
+        msgspec.convert(record, Task, from_attributes=True)
         for record in sorted(records.values(), key=lambda record: natural_order(record.task))
         if record.task not in current and record.started_s is not None
     ]

@@ -13,7 +13,7 @@ from cli.views.console import table
 from cli.views.goals import GoalRow, goals_table
 from cli.views.plans import plans_table
 from cli.views.robots import RobotRow, robots_table
-from keyexpr_schema.payloads.service import PlannerStatus, StoreJournal, UndecodableValue
+from keyexpr_schema.payloads.system import PlannerStatus, StoreJournal, UndecodableValue
 
 if TYPE_CHECKING:
     from cli.client.fleet_view import FleetView

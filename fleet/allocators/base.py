@@ -29,25 +29,17 @@ class Allocated:
     lower_bound_s: float | None = None
     notes: tuple[str, ...] = ()
 
-    @property
-    def gap(self) -> float | None:
-        """How far from optimal at most, as a share of the makespan; 0 is proven optimal."""
-        if self.lower_bound_s is None:
-            return None
-        makespan_s = self.schedule.makespan_s
-        return max(0.0, 1 - self.lower_bound_s / makespan_s) if makespan_s > 0 else 0.0
-
 
 @dataclass(frozen=True)
 class Assignment:
     """What an allocator chose: a robot for every actor, and perhaps in which order they come.
 
-    `sequence` lists all actors; every robot takes its own in that order. Without it the base class
-    looks for a good order.
+    `actor_order` lists all actors; every robot takes its own in that order. Without it the base
+    class looks for a good one.
     """
 
     allocation: Mapping[str, str]
-    sequence: tuple[str, ...] | None = None
+    actor_order: tuple[str, ...] | None = None
     lower_bound_s: float | None = None
     notes: tuple[str, ...] = ()
 
@@ -89,7 +81,7 @@ class Allocator(ABC):
 
     name: str
     reschedules = False
-    """Whether it heeds the context's `home` itself; for others, whoever can stays where he is."""
+    """Whether it heeds the `previous_allocation` itself; for others, actors stay where they can."""
 
     def allocate(
         self, checked: CheckedPlan, context: AllocationContext | None = None
@@ -99,9 +91,10 @@ class Allocator(ABC):
         Tasks of one actor go to one robot, in order; a robot does its actors one after the other.
         """
         context = context or AllocationContext()
-        if context.home and not self.reschedules:
+        if context.previous_allocation and not self.reschedules:
             plan, world = checked.plan, checked.world
-            stay = {a: robot for a, robot in context.home.items() if robot in world.team}
+            previous = context.previous_allocation
+            stay = {a: robot for a, robot in previous.items() if robot in world.team}
             pins = {a: robot for a, robot in {**stay, **plan.pins}.items() if a in plan.actors}
             if pins != plan.pins:
                 pinned = check_plan(msgspec.structs.replace(plan, pins=pins), world)
@@ -124,12 +117,10 @@ class Allocator(ABC):
         chosen = self._assign(problem)
         if isinstance(chosen, NotAllocated):
             return chosen
-        if not isinstance(chosen, Assignment):
-            chosen = Assignment(chosen)
         return _scheduled(problem, chosen)
 
     @abstractmethod
-    def _assign(self, problem: AllocationProblem) -> Mapping[str, str] | Assignment | NotAllocated:
+    def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
         """A robot for every actor, among those able; or why there is none."""
 
 
@@ -137,7 +128,7 @@ def _scheduled(problem: AllocationProblem, chosen: Assignment) -> Allocated | No
     """In the order that was chosen with the robots, if that will do, or else in another one."""
     allocation = chosen.allocation
     plan = AllocatedPlan(problem.checked, allocation, problem.context)
-    found = plan.schedule(chosen.sequence) if chosen.sequence is not None else None
+    found = plan.schedule(chosen.actor_order) if chosen.actor_order is not None else None
     if found is None or plan.violations(found):
         other = plan.valid_schedule(thorough=True)
         if isinstance(other, tuple):

@@ -46,9 +46,9 @@ class LlmAllocator(Allocator):
         self._model = model
         self._fallback = fallback
 
-    def _assign(self, problem: AllocationProblem) -> Mapping[str, str] | Assignment | NotAllocated:
+    def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
         if not problem.able:
-            return {}
+            return Assignment({})
 
         def read(text: str) -> dict[str, str] | Rejected:
             return read_allocation(text, problem)
@@ -62,14 +62,12 @@ class LlmAllocator(Allocator):
             read=read,
         )
         if not isinstance(made, GivenUp):
-            return made
+            return Assignment(made)
         note = f"allocated by {self._fallback.name} and not by language model: {made.reason}"
         log.warning(note)
         instead = self._fallback._assign(problem)
         if isinstance(instead, NotAllocated):
             return instead
-        if not isinstance(instead, Assignment):
-            instead = Assignment(instead)
         return replace(instead, notes=(note, *instead.notes))
 
 

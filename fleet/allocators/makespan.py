@@ -55,7 +55,7 @@ class MakespanAllocator(Allocator):
 
     def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
         made = plan_shop(problem.checked, problem.able, problem.apart, problem.context)
-        if problem.context.home:
+        if problem.context.previous_allocation:
             budget = TimeBudget(RESCHEDULE_SHARE * self._deadline_s, self._clock)
             rescheduled = _rescheduled(made, problem.context, budget, self._seed)
             if rescheduled is not None:
@@ -76,7 +76,7 @@ def _assignment(made: PlanShop, found: Schedule) -> Assignment:
         allocation={
             actor: made.robots[found.machine_of[block]] for block, actor in enumerate(made.actors)
         },
-        sequence=tuple(made.actors[b] for b in found.order if b < len(made.actors)),
+        actor_order=tuple(made.actors[b] for b in found.order if b < len(made.actors)),
         lower_bound_s=found.lower_bound_s,
         notes=found.notes,
     )
@@ -88,10 +88,11 @@ def _rescheduled(
     """The allocation there was, with few actors in other hands."""
     machine = {robot: i for i, robot in enumerate(made.robots)}
     named = made.shop.blocks[len(made.actors) :]
-    home = [machine.get(context.home.get(actor, ""), NOBODY) for actor in made.actors]
+    previous = context.previous_allocation
+    home = [machine.get(previous.get(actor, ""), NOBODY) for actor in made.actors]
     home += [block.machines[0] for block in named]
     block_of = {actor: block for block, actor in enumerate(made.actors)}
-    order = [block_of[actor] for actor in context.sequence if actor in block_of]
+    order = [block_of[actor] for actor in context.actor_order if actor in block_of]
     found = reschedule(made.shop, home, order, budget, seed=seed)
     if found is None:
         return None

@@ -7,9 +7,12 @@ whatever was lost.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
+
+from msgspec.structs import asdict
 
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, PlanningJob
 from fleet.core.state import State
@@ -25,12 +28,9 @@ from keyexpr_schema.keyspace import (
     STATEMENT_STATUS,
     TASK_RECORD,
 )
-from keyexpr_schema.payloads.durations import DurationsAddress
-from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.plans import PlanAddress, PlanStatus
-from keyexpr_schema.payloads.requests import RequestAddress
 from keyexpr_schema.payloads.tasks import Order, OrderAddress, TaskAddress, TaskRecord
-from keyexpr_schema.payloads.world import FactAddress, StatementAddress
+from keyexpr_schema.payloads.world import FactAddress
 
 PLANNER_SOURCE = "planner"
 """`source` of facts that the planner concludes itself; statements add a colon and their id."""
@@ -91,99 +91,75 @@ def effects_of(state: State) -> tuple[Effect, ...]:
 
 
 def _documents(old: State, new: State) -> Iterator[Effect]:
-    if old.goal_states is not new.goal_states:
-        yield from _difference(
-            GOAL_STATUS,
-            {GoalAddress(goal): status for goal, status in old.goal_states.items()},
-            {GoalAddress(goal): status for goal, status in new.goal_states.items()},
-        )
-    if old.statement_states is not new.statement_states:
-        yield from _difference(
-            STATEMENT_STATUS,
-            {StatementAddress(name): status for name, status in old.statement_states.items()},
-            {StatementAddress(name): status for name, status in new.statement_states.items()},
-        )
-    if old.answers is not new.answers:
-        yield from _difference(
-            ANSWER,
-            {RequestAddress(name): answer for name, answer in old.answers.items()},
-            {RequestAddress(name): answer for name, answer in new.answers.items()},
-        )
-    if old.durations is not new.durations:
-        yield from _difference(
-            DURATIONS,
-            {DurationsAddress(model): known for model, known in old.durations.items()},
-            {DurationsAddress(model): known for model, known in new.durations.items()},
-        )
+    views: tuple[tuple[Key[Any, Any], Mapping[str, Payload], Mapping[str, Payload]], ...] = (
+        (GOAL_STATUS, old.goal_states, new.goal_states),
+        (STATEMENT_STATUS, old.statement_states, new.statement_states),
+        (ANSWER, old.answers, new.answers),
+        (DURATIONS, old.durations, new.durations),
+    )
+    for key, before, after in views:
+        if before is not after:
+            yield from _difference(key, key.address, before, after)
     for plan in {**old.plans, **new.plans}:
-        before, after = old.plans.get(plan), new.plans.get(plan)
-        if before is after and old.epoch == new.epoch:
-            continue
-        yield from _plan_documents(plan, before, after, old.epoch, new.epoch)
+        if old.plans.get(plan) is not new.plans.get(plan) or old.epoch != new.epoch:
+            yield from _plan_documents(plan, old, new)
 
 
-def _plan_documents(
-    plan: str, before: PlanEntry | None, after: PlanEntry | None, old_epoch: int, epoch: int
-) -> Iterator[Effect]:
-    address = PlanAddress(plan)
+def _plan_documents(plan: str, old: State, new: State) -> Iterator[Effect]:
+    before, after = old.plans.get(plan), new.plans.get(plan)
     yield from _difference(
         PLAN_SPEC,
-        {address: before.plan} if before and before.plan.tasks else {},
-        {address: after.plan} if after and after.plan.tasks else {},
+        PlanAddress,
+        {plan: before.plan} if before and before.plan.tasks else {},
+        {plan: after.plan} if after and after.plan.tasks else {},
     )
     yield from _difference(
         PLAN_STATUS,
-        {address: status_of(before)} if before else {},
-        {address: status_of(after)} if after else {},
+        PlanAddress,
+        {plan: status_of(before)} if before else {},
+        {plan: status_of(after)} if after else {},
     )
-    old_records = before.records if before else {}
-    new_records = after.records if after else {}
-    # Of a thousand records one has changed: the others are the very same objects.
-    touched = [
-        task
-        for task in {**old_records, **new_records}
-        if old_records.get(task) is not new_records.get(task)
-    ]
     yield from _difference(
         TASK_RECORD,
-        {TaskAddress(plan, task): old_records[task] for task in touched if task in old_records},
-        {TaskAddress(plan, task): new_records[task] for task in touched if task in new_records},
+        partial(TaskAddress, plan),
+        before.records if before else {},
+        after.records if after else {},
     )
-    yield from _difference(ORDER, _orders(before, old_epoch), _orders(after, epoch))
+    orders = _orders(before, old.epoch), _orders(after, new.epoch)
+    yield from _difference(ORDER, lambda address: address, *orders)
 
 
 def _difference(
-    key: Key[Any, Any], old: Mapping[Any, Payload], new: Mapping[Any, Payload]
+    key: Key[Any, Any],
+    address: Callable[[Any], Address],
+    old: Mapping[Any, Payload],
+    new: Mapping[Any, Payload],
 ) -> Iterator[Effect]:
-    for address in old:
-        if address not in new:
-            yield Retract(key, address)
-    for address, payload in new.items():
-        if old.get(address) != payload:
-            yield Publish(key, address, payload)
+    for name in old:
+        if name not in new:
+            yield Retract(key, address(name))
+    for name, payload in new.items():
+        known = old.get(name)
+        # Of a thousand records one has changed: the others are the very same objects.
+        if payload is not known and payload != known:
+            yield Publish(key, address(name), payload)
 
 
 def status_of(entry: PlanEntry) -> PlanStatus:
     """What is published of a plan."""
-    outcome = entry.outcome
     return PlanStatus(
         plan=entry.plan.plan,
         revision=entry.plan.revision,
         state=entry.state,
         goals=entry.plan.goals,
-        allocation=outcome.allocation,
-        sequence=outcome.sequence,
         made_by=entry.plan.made_by,
         allocator=entry.plan.allocator,
-        predicted_makespan_s=outcome.makespan_s,
-        lower_bound_s=outcome.lower_bound_s,
-        notes=outcome.notes,
-        planning_time_s=outcome.planning_time_s,
         making=entry.plan.making,
         change=entry.change,
         reason=(entry.replan and entry.replan.sentence) or entry.reason,
         violations=entry.violations,
         time_s=entry.changed_s,
+        **asdict(entry.outcome),
     )
 
 

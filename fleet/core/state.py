@@ -117,23 +117,6 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
         return self.facts.get(FactKey(relation, subject))
 
 
-def encode_state(state: State) -> bytes:
-    """The state as JSON, with `subject/relation` for the key of a fact, as in the key-space."""
-    return msgspec.json.encode(state, enc_hook=lambda key: f"{key.subject}/{key.relation}")
-
-
-def decode_state(data: bytes) -> State:
-    """The state that `encode_state` wrote.
-
-    Raises:
-        msgspec.DecodeError: it is none, or one of a version that kept something else.
-    """
-    fields = msgspec.json.decode(data, type=dict[str, msgspec.Raw])
-    facts = msgspec.json.decode(fields.pop("facts", msgspec.Raw(b"{}")), type=dict[str, Fact])
-    state = msgspec.json.decode(msgspec.json.encode(fields), type=State)
-    return msgspec.structs.replace(state, facts={fact.key: fact for fact in facts.values()})
-
-
 def put(mapping: Mapping[K, T], key: K, value: T) -> dict[K, T]:
     """A copy of `mapping` with one entry set."""
     return {**mapping, key: value}

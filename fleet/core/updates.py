@@ -94,6 +94,14 @@ def set_record(state: State, entry: PlanEntry, record: TaskRecord) -> State:
     return set_entry(state, replace(entry, records=put(entry.records, record.task, record)))
 
 
+def cancel(state: State, entry: PlanEntry) -> State:
+    """Begin to cancel a plan; a planning job under way counts no more."""
+    name = entry.plan.plan
+    waiting = entry.job.request if entry.job is not None else None
+    state = answer(state, waiting, False, f"plan {name} was cancelled while it was made")
+    return set_entry(state, replace(entry, cancelling=True, job=None))
+
+
 def give_up(state: State, entry: PlanEntry, reason: str) -> State:
     """End a plan as failed, and with it those of its goals that are not reached."""
     records = {

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         Schedule,
         Shop,
     )
-    from fleet.jobshop.rescheduling import Rescheduled, reschedule, without_machines
+    from fleet.jobshop.rescheduling import Rescheduled, reschedule
     from fleet.jobshop.sequencing import sequences
     from fleet.jobshop.time_budget import StepClock, TimeBudget
 
@@ -48,7 +48,6 @@ __all__ = [
     "schedule_of",
     "sequences",
     "solve",
-    "without_machines",
 ]
 
 _MODULES = {
@@ -61,7 +60,6 @@ _MODULES = {
     "schedule_of": "forward_pass",
     "sequences": "sequencing",
     "solve": "portfolio",
-    "without_machines": "rescheduling",
 }
 
 

@@ -8,7 +8,7 @@ Kirkpatrick, Gelatt, Vecchi 1983; moves at the critical path as in van Laarhoven
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import inf, log
+from math import log
 from random import Random
 
 from fleet.jobshop.forward_pass import Solution, evaluate
@@ -38,21 +38,20 @@ def anneal(
     seed: int = 0,
     move_price_s: float = 0.0,
     home: Sequence[int] | None = None,
-    frozen: frozenset[int] = frozenset(),
     stopped: Callable[[], bool] = lambda: False,
 ) -> Solution:
     """The best found from `begin` until the `budget` is over or the bound is met.
 
-    With `home` machines, every block away from home costs `move_price_s`. Blocks in `frozen` keep
-    their machine. It ends as soon as `stopped` says so. The answer is never worse than `begin`.
+    With `home` machines, every block away from home costs `move_price_s`. It ends as soon as
+    `stopped` says so. The solution is never worse than `begin`.
     """
     random = Random(seed)
-    search = _Search(instance, begin, random, move_price_s, home, frozen)
+    search = _Search(instance, begin, random, move_price_s, home)
     share = FIRST_COOLING
     while not budget.over:
         if search.run(budget.part(share, SHORTEST_S), bound_s, stopped):
             break
-        search = _Search(instance, search.best, random, move_price_s, home, frozen)
+        search = _Search(instance, search.best, random, move_price_s, home)
         share = LATER_COOLING
     return search.best
 
@@ -65,13 +64,12 @@ class _Search:
         random: Random,
         move_price_s: float,
         home: Sequence[int] | None,
-        frozen: frozenset[int],
     ) -> None:
         self.instance, self.random = instance, random
-        self.price_s, self.home, self.frozen = move_price_s, home, frozen
+        self.price_s, self.home = move_price_s, home
         self.order = list(begin.order)
         self.machine_of = list(begin.machine_of)
-        self.end_s = begin.end_s
+        self.start_s, self.end_s = begin.start_s, begin.end_s
         self.makespan = begin.makespan_s
         self.cost = begin.cost + self._moves_price()
         self.best, self.best_cost = begin, self.cost
@@ -80,17 +78,17 @@ class _Search:
         self.index_of = [0] * len(self.order)
         self.critical: list[int] = []
         self._index(0, len(self.order))
-        self._trace()
+        if self.order:
+            self._trace()
 
     def run(self, budget: TimeBudget, bound_s: float, stopped: Callable[[], bool]) -> bool:
         """One cooling; whether there is nothing more to look for."""
+        if not self.order:
+            return True
         random = self.random
         scale = self.makespan or 1.0
         tries = 0
-        temperature = HOT * scale
-        exact = self.price_s == 0.0 and not self.instance.has_due and len(self.order) > 0
-        if len(self.order) == 0:
-            return True
+        exact = self.price_s == 0.0 and not self.instance.has_due
         while True:
             if tries % 16 == 0:
                 spent = budget.spent
@@ -119,7 +117,7 @@ class _Search:
     def _reassign(self, limit: float) -> None:
         block = self._block()
         machines = self.instance.shop.blocks[block].machines
-        if len(machines) < 2 or block in self.frozen:
+        if len(machines) < 2:
             return
         old = self.machine_of[block]
         new = self.random.choice(machines)
@@ -134,9 +132,7 @@ class _Search:
         other = self.random.randrange(len(self.machine_of))
         a, b = self.machine_of[one], self.machine_of[other]
         blocks = self.instance.shop.blocks
-        if a == b or one in self.frozen or other in self.frozen:
-            return
-        if b not in blocks[one].machines or a not in blocks[other].machines:
+        if a == b or b not in blocks[one].machines or a not in blocks[other].machines:
             return
         self.machine_of[one], self.machine_of[other] = b, a
         if self._apart(one, b) or self._apart(other, a) or not self._try(limit):
@@ -196,7 +192,7 @@ class _Search:
         if found is None:
             return False
         self.cost = found.cost + price
-        self.end_s, self.makespan = found.end_s, found.makespan_s
+        self.start_s, self.end_s, self.makespan = found.start_s, found.end_s, found.makespan_s
         self._trace()
         if self.cost < self.best_cost - NEAR:
             self.best_cost = self.cost
@@ -207,33 +203,21 @@ class _Search:
         """The blocks on one critical path: from the last end back along what was waited for."""
         instance, end_s = self.instance, self.end_s
         self.critical = []
-        if not end_s:
-            return
         op = max(range(len(end_s)), key=end_s.__getitem__)
-        seen: set[int] = set()
-        kinds = instance.kinds
-        while op not in seen:
-            seen.add(op)
+        while True:
             mine = instance.blocks_of[op]
             self.critical.extend(b for b in mine if b not in self.critical[-2:])
             latest = max(instance.predecessors[op], key=end_s.__getitem__, default=-1)
-            after_s = end_s[latest] if latest >= 0 else -inf
-            length = instance.durations_s[op][kinds[self.machine_of[mine[0]]]]
-            start_s = end_s[op] - length
-            opens = instance.operations_of[mine[0]][0] == op
-            if latest >= 0 and (after_s >= start_s - NEAR or not opens):
-                op = latest
-                continue
-            before = self._previous(mine, op, after_s)
-            if before < 0 and latest < 0:
+            if latest < 0 or end_s[latest] < self.start_s[op] - NEAR:
+                latest = self._previous(op)
+            if latest < 0:
                 return
-            op = before if before >= 0 else latest
+            op = latest
 
-    def _previous(self, mine: Sequence[int], op: int, after_s: float) -> int:
-        """The last operation of the block that the machine did just before, if it ended later."""
-        instance, end_s = self.instance, self.end_s
-        best, latest = -1, max(after_s, 0.0)
-        for block in mine:
+    def _previous(self, op: int) -> int:
+        """The last operation of the block before on the machine that it waited for; -1: none."""
+        instance = self.instance
+        for block in instance.blocks_of[op]:
             if instance.operations_of[block][0] != op:
                 continue
             machine = self.machine_of[block]
@@ -242,8 +226,8 @@ class _Search:
                 blocks = instance.component_blocks[self.order[back]]
                 found = [b for b in blocks if self.machine_of[b] == machine]
                 if found:
-                    end = end_s[instance.operations_of[found[-1]][-1]]
-                    if end > latest:
-                        best, latest = instance.operations_of[found[-1]][-1], end
+                    last = instance.operations_of[found[-1]][-1]
+                    if self.end_s[last] >= self.start_s[op] - NEAR:
+                        return last
                     break
-        return best
+        return -1

@@ -186,13 +186,7 @@ def _one_after_the_other(
     return ordered
 
 
-def schedule_of(
-    shop: Shop,
-    order: Sequence[int],
-    machine_of: Sequence[int],
-    lower_bound_s: float = 0.0,
-    notes: tuple[str, ...] = (),
-) -> Schedule | None:
+def schedule_of(shop: Shop, order: Sequence[int], machine_of: Sequence[int]) -> Schedule | None:
     """The earliest schedule in which machines take blocks in `order`, whatever order that is.
 
     `None` if they would wait for each other, or if a block stands where it must not.
@@ -214,11 +208,4 @@ def schedule_of(
     partial = PartialSchedule(instance, list(machine_of))
     if not partial.place([[operations[number] for number in sequence]]):
         return None
-    return Schedule(
-        tuple(machine_of),
-        tuple(order),
-        tuple(partial.start_s),
-        tuple(partial.end_s),
-        lower_bound_s,
-        notes,
-    )
+    return Schedule(tuple(machine_of), tuple(order), tuple(partial.start_s), tuple(partial.end_s))

@@ -26,7 +26,7 @@ class Position(IntEnum):
 
 @dataclass(frozen=True)
 class Operation:
-    """One step.
+    """What one machine does, or several together.
 
     `blocks` are the blocks that it belongs to, the one whose machine sets its duration first.
     `after` are operations that must have ended. `duration_s` is by machine kind. With a `target`

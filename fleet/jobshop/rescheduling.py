@@ -1,10 +1,10 @@
 """A schedule repaired after a machine is lost or late, with few blocks changing machines.
 
-Candidates: the old order gone through again for a range of targets, where everybody stays who does
-not stand in the way of the target; the orphans put where there is time; a schedule from scratch;
-and the best of those annealed. Of all that are within `WITHIN` of the shortest, the one with the
-fewest moves is taken, moves that it can do without are taken back, and what time is left goes into
-a search with a price on moves.
+Candidates: the old order gone through again for a range of targets, where every block stays that
+does not keep the target from being met; the orphans put where there is time; a schedule from
+scratch; and the best of those annealed. Of all that are within `WITHIN` of the shortest, the one
+with the fewest moves is taken, moves that it can do without are taken back, and what time is left
+goes into a search with a price on moves.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fleet.jobshop.forward_pass import Solution, evaluate
 from fleet.jobshop.instance import Instance
 from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.portfolio import schedule_in_order
-from fleet.jobshop.problem import BadShop, Position, Schedule, Shop
+from fleet.jobshop.problem import Position, Schedule, Shop
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.jobshop.warm_start import warm_start
 
@@ -48,41 +48,22 @@ class Rescheduled:
     best_makespan_s: float
 
 
-def without_machines(shop: Shop, lost: frozenset[int]) -> Shop:
-    """The shop when these machines are gone; machines keep their numbers.
-
-    Raises:
-        BadShop: some block can be done by no other machine.
-    """
-    blocks = []
-    for number, block in enumerate(shop.blocks):
-        rest = tuple(machine for machine in block.machines if machine not in lost)
-        if not rest:
-            raise BadShop(f"block {number} can be done by no machine that is left")
-        blocks.append(replace(block, machines=rest))
-    return replace(shop, blocks=tuple(blocks))
-
-
 def reschedule(
     shop: Shop,
     home: Sequence[int],
     order: Sequence[int],
     budget: TimeBudget,
-    frozen: frozenset[int] = frozenset(),
     seed: int = 0,
 ) -> Rescheduled | None:
     """Repair the schedule `home` (machine of each block) and `order` (of blocks) for the `shop` as
     it is now.
 
-    Blocks whose home is not among their machines any more are orphans. Blocks in `frozen` are under
-    way: they stay where they are, before everything else there. What is done is not in the shop,
-    and a machine's `ready_s` says when it is free. `None` if no way was found.
-
-    Raises:
-        BadShop: a frozen block cannot be done by its machine.
+    Blocks whose home is not among their machines any more are orphans. What is done is not in the
+    shop, a block that is under way has one machine and is `Position.FIRST`, and a machine's
+    `ready_s` says when it is free. `None` if no schedule was found.
     """
-    instance = Instance(_pinned(shop, home, frozen))
-    search = _Rescheduling(instance, home, _components_in_order(instance, order), frozen, seed)
+    instance = Instance(shop)
+    search = _Rescheduling(instance, home, _components_in_order(instance, order), seed)
     if not search.begin(budget):
         return None
     search.keep_to_targets(budget.until(TARGETS_SHARE))
@@ -103,11 +84,9 @@ class _Rescheduling:
         instance: Instance,
         home: Sequence[int],
         order: list[int],
-        frozen: frozenset[int],
         seed: int,
     ) -> None:
-        self.instance, self.home, self.order, self.frozen = instance, home, order, frozen
-        self.seed = seed
+        self.instance, self.home, self.order, self.seed = instance, home, order, seed
         self.found: list[Solution] = []
         self.kept: list[Solution] = []
         """Of those found, the ones that keep to a target."""
@@ -125,7 +104,7 @@ class _Rescheduling:
         return self.best_s * (1 + WITHIN)
 
     def begin(self, budget: TimeBudget) -> bool:
-        """From scratch, and with everybody at home who can be; whether there is any schedule."""
+        """From scratch, and with every block at home that can be; whether there is any schedule."""
         self._add(list_schedule(self.instance))
         self._add(warm_start(self.instance, self.order, self.home, inf))
         if not self.found:
@@ -133,8 +112,8 @@ class _Rescheduling:
         return bool(self.found)
 
     def keep_to_targets(self, budget: TimeBudget) -> None:
-        """Everybody stays where the target can be met. That may miss it by a little, where there
-        is travel or are partners, so that shorter ones are tried, too."""
+        """Blocks stay where the target can be met so. Where there is travel, or blocks meet, that
+        may miss it by a little, so that shorter ones are tried, too."""
         tried = 0
         while tried < len(TARGETS):
             if self.met and budget.over:
@@ -166,7 +145,7 @@ class _Rescheduling:
         out of a new one would set a limit that only new ones meet."""
         begin = self.kept if self.met else self.found
         shortest = min(begin, key=lambda solution: solution.makespan_s)
-        self._add(anneal(self.instance, shortest, budget, 0.0, self.seed, frozen=self.frozen))
+        self._add(anneal(self.instance, shortest, budget, 0.0, self.seed))
 
     def move_less(self, take_back: TimeBudget, budget: TimeBudget) -> Solution:
         """The solution with the fewest moves within the limit, and fewer if that can be."""
@@ -175,7 +154,7 @@ class _Rescheduling:
         self.found.append(chosen)
         price_s = PRICE * self.best_s
         seed = self.seed + 1
-        self._add(anneal(self.instance, chosen, budget, 0.0, seed, price_s, self.home, self.frozen))
+        self._add(anneal(self.instance, chosen, budget, 0.0, seed, price_s, self.home))
         return self._chosen()
 
     def _add(self, solution: Solution | None) -> None:
@@ -188,20 +167,6 @@ class _Rescheduling:
             (solution for solution in self.found if solution.makespan_s <= limit_s),
             key=lambda s: (len(_moved(s.machine_of, self.home)), s.makespan_s),
         )
-
-
-def _pinned(shop: Shop, home: Sequence[int], frozen: frozenset[int]) -> Shop:
-    blocks = list(shop.blocks)
-    for number in frozen:
-        if home[number] not in blocks[number].machines:
-            raise BadShop(f"block {number} is under way on a machine that cannot do it")
-        last = blocks[number].position == Position.LAST
-        blocks[number] = replace(
-            blocks[number],
-            machines=(home[number],),
-            position=Position.LAST if last else Position.FIRST,
-        )
-    return replace(shop, blocks=tuple(blocks))
 
 
 def _moved(machine_of: Sequence[int], home: Sequence[int]) -> list[int]:

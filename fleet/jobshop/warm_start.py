@@ -1,5 +1,5 @@
-"""A schedule gone through again, for a target: who can stay where he is does, and whoever cannot
-goes where he is in nobody's way.
+"""A schedule gone through again, for a target: blocks stay on their machines where they can, and
+the others go where they delay the least.
 
 For every block it is known what follows it in the old schedule, on its machine and by dependency,
 at the least (its tail). A block that ends at home early enough for its tail stays. Another one, or

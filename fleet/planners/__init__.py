@@ -1,33 +1,28 @@
 """Planners: goals and a world in, a checked plan out. A plug-in derives from `Planner`."""
 
-from __future__ import annotations
+from typing import TYPE_CHECKING
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from keyexpr_schema.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from fleet.planners.base import NoPlan, Planner, PlanningProblem
-    from fleet.planners.llm.interpreter import LlmInterpreter
-    from fleet.planners.llm.planner import LlmPlanner
-    from fleet.planners.symbolic.planner import SymbolicPlanner
-
-__all__ = [
-    "LlmInterpreter",
-    "LlmPlanner",
-    "NoPlan",
-    "Planner",
-    "PlanningProblem",
-    "SymbolicPlanner",
-]
-
-_MODULES = {
-    "LlmInterpreter": "llm.interpreter",
-    "LlmPlanner": "llm.planner",
-    "SymbolicPlanner": "symbolic.planner",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_MODULES.get(name, 'base')}"), name)
+    from fleet.core.checker.checked_plan import CheckedPlan as CheckedPlan
+    from fleet.planners.base import NoPlan as NoPlan
+    from fleet.planners.base import Planner as Planner
+    from fleet.planners.base import PlanningProblem as PlanningProblem
+    from fleet.planners.deordering import ActionSequence as ActionSequence
+    from fleet.planners.deordering import deordered as deordered
+    from fleet.planners.llm.interpreter import LlmInterpreter as LlmInterpreter
+    from fleet.planners.llm.planner import LlmPlanner as LlmPlanner
+    from fleet.planners.symbolic.planner import SymbolicPlanner as SymbolicPlanner
+else:
+    __all__, __getattr__ = lazy_names(
+        __name__,
+        {
+            "base": "NoPlan Planner PlanningProblem",
+            "deordering": "ActionSequence deordered",
+            "llm.interpreter": "LlmInterpreter",
+            "llm.planner": "LlmPlanner",
+            "symbolic.planner": "SymbolicPlanner",
+            ".core.checker.checked_plan": "CheckedPlan",
+        },
+    )

@@ -37,9 +37,9 @@ class PlanSchedule:
         return max(self.end_s.values(), default=0.0)
 
     @property
-    def work_s(self) -> float:
-        """The sum of all tasks' durations."""
-        return sum(end - self.start_s[task] for task, end in self.end_s.items())
+    def durations_s(self) -> dict[str, float]:
+        """Of every task, with the travel to it."""
+        return {task: end_s - self.start_s[task] for task, end_s in self.end_s.items()}
 
 
 class AllocatedPlan:
@@ -56,11 +56,11 @@ class AllocatedPlan:
         self._shop = plan_shop(checked, robot, context=context)
         self._simple = self._shop.actors_only()
 
-    def schedule(self, sequence: Sequence[str]) -> PlanSchedule | None:
+    def schedule(self, actor_order: Sequence[str]) -> PlanSchedule | None:
         """The earliest one if robots take actors in this order; `None` on deadlock."""
         simple = self._simple
         block_of = {actor: block for block, actor in enumerate(simple.actors)}
-        order = [block_of[actor] for actor in sequence]
+        order = [block_of[actor] for actor in actor_order]
         machine_of = [block.machines[0] for block in simple.shop.blocks]
         found = schedule_of(simple.shop, order, machine_of)
         if found is None:

@@ -29,16 +29,16 @@ class AllocationContext:
 
     `ready_s` says from when on a robot is free [s from now]; `priority` of a goal decides between
     equal makespans (each step up counts twice); `due_s` says when a goal should be done
-    [s from now]. `home` is the robot of each actor in the plan that this is the rest of, and
-    `sequence` the order in which they were to begin: few actors should change hands. Actors that
-    are `under_way` go on at once.
+    [s from now]. `previous_allocation` has the robots of actors in the plan that this is the rest
+    of, and `actor_order` the order in which they were to begin: few actors should change hands.
+    Actors that are `under_way` go on at once.
     """
 
     ready_s: Mapping[str, float] = field(default_factory=dict)
     priority: Mapping[str, int] = field(default_factory=dict)
     due_s: Mapping[str, float] = field(default_factory=dict)
-    home: Mapping[str, str] = field(default_factory=dict)
-    sequence: tuple[str, ...] = ()
+    previous_allocation: Mapping[str, str] = field(default_factory=dict)
+    actor_order: tuple[str, ...] = ()
     under_way: frozenset[str] = frozenset()
 
 
@@ -82,7 +82,9 @@ def plan_shop(
     context = context or AllocationContext()
     world, graph = checked.world, checked.graph
     robots = tuple(world.team)
+    machine = {robot: i for i, robot in enumerate(robots)}
     block_of = {actor_arg(actor): i for i, actor in enumerate(able)}
+    """With robots that the plan names, if they are connected: others are no machines."""
     number = {task: i for i, task in enumerate(graph.order)}
     numbers = _Numbers(world, robots)
     weights, dues_s = _weights_and_dues(checked.plan, graph, context)
@@ -92,10 +94,11 @@ def plan_shop(
         action = checked.actions[task]
         blocks: dict[int, None] = {}
         for participant in action.participants:
-            if participant not in block_of:
+            if participant in machine and participant not in block_of:
                 block_of[participant] = len(members)
                 members.append([])
-            blocks[block_of[participant]] = None
+            if participant in block_of:
+                blocks[block_of[participant]] = None
         for block in blocks:
             members[block].append(i)
         target, arrives = numbers.sites(action)
@@ -110,7 +113,6 @@ def plan_shop(
                 due_s=dues_s.get(task, inf),
             )
         )
-    machine = {robot: i for i, robot in enumerate(robots)}
     able_of = {actor_arg(actor): rows for actor, rows in able.items()}
     positions = _positions(checked, able, context)
     kept_apart: dict[str, set[int]] = {}

@@ -21,12 +21,12 @@ def context_of(job: PlanningJob, state: State, busy: frozenset[str]) -> Allocati
         },
         priority={goal.goal: goal.priority for goal in goals if goal.priority},
         due_s={goal.goal: goal.due_s - state.time_s for goal in goals if goal.due_s is not None},
-        home={
+        previous_allocation={
             actor: robot
             for actor, robot in job.previous_allocation.items()
             if robot in state.robots
         },
-        sequence=job.actor_order,
+        actor_order=job.actor_order,
         under_way=busy | frozenset(job.begun_actors),
     )
 

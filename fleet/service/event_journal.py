@@ -11,13 +11,12 @@ import fcntl
 import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import TextIO
 
 import msgspec
 
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.state import State, decode_state, encode_state
+from fleet.core.state import State
 from fleet.errors import FleetError
 
 SNAPSHOT_FORMAT = 2
@@ -27,10 +26,10 @@ SNAPSHOT_EVERY = 2000
 
 
 class _Snapshot(msgspec.Struct, frozen=True, kw_only=True):
-    """A kept state. What was kept before there was a format has none, and so does not decode."""
+    """A kept state. What was kept before there was a format does not decode."""
 
     format: int
-    state: msgspec.Raw
+    state: State
 
 
 class JournalInUse(FleetError):
@@ -71,12 +70,7 @@ class EventJournal:
         )
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._db.close()
         if self._lock is not None:
             self._lock.close()
@@ -87,11 +81,12 @@ class EventJournal:
         self._since_snapshot += 1
         if self._since_snapshot >= SNAPSHOT_EVERY:
             self._since_snapshot = 0
+            kept = _Snapshot(format=SNAPSHOT_FORMAT, state=state)
             self._db.execute("BEGIN")
             self._db.execute("DELETE FROM snapshots")
             self._db.execute(
                 "INSERT INTO snapshots (number, state) VALUES (?, ?)",
-                (cursor.lastrowid, _snapshot_of(state)),
+                (cursor.lastrowid, msgspec.msgpack.encode(kept)),
             )
             self._db.execute("COMMIT")
 
@@ -109,12 +104,10 @@ class EventJournal:
         if row is None:
             return 0, State()
         try:
-            kept = msgspec.json.decode(row[1], type=_Snapshot)
-            if kept.format != SNAPSHOT_FORMAT:
-                return 0, State()
-            return int(row[0]), decode_state(kept.state)
+            kept = msgspec.msgpack.decode(row[1], type=_Snapshot)
         except msgspec.DecodeError:
             return 0, State()
+        return (int(row[0]), kept.state) if kept.format == SNAPSHOT_FORMAT else (0, State())
 
     def events(self, after: int = 0) -> Iterator[Event]:
         """Every event with a higher number than `after`, in order."""
@@ -122,8 +115,3 @@ class EventJournal:
             "SELECT event FROM events WHERE number > ? ORDER BY number", (after,)
         ):
             yield decode_event(data)
-
-
-def _snapshot_of(state: State) -> bytes:
-    kept = _Snapshot(format=SNAPSHOT_FORMAT, state=msgspec.Raw(encode_state(state)))
-    return msgspec.json.encode(kept)

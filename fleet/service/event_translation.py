@@ -24,41 +24,28 @@ from keyexpr_schema.keyspace import (
 )
 from keyexpr_schema.transport.watch import Change
 
-_PUT: dict[str, Callable[[Any, At], Event]] = {
-    GOAL_SPEC.name: lambda v, at: events.GoalPut(goal=v, **at),
-    FACT.name: lambda v, at: events.FactPut(fact=v, **at),
-    STATEMENT.name: lambda v, at: events.StatementPut(statement=v, **at),
-    PLACE.name: lambda v, at: events.PlacePut(place=v, **at),
-    OBJECT.name: lambda v, at: events.ObjectPut(object=v, **at),
-    ROBOT_SPEC.name: lambda v, at: events.RobotRegistered(spec=v, **at),
-    REPORT.name: lambda v, at: events.ReportReceived(report=v, **at),
-    PLAN_REQUEST.name: lambda v, at: events.PlanRequested(request=v, **at),
-    REPLAN_REQUEST.name: lambda v, at: events.ReplanRequested(request=v, **at),
-    CONTROL_REQUEST.name: lambda v, at: events.ControlRequested(request=v, **at),
-    PLAN_PROPOSAL.name: lambda v, at: events.PlanProposed(plan=v, **at),
+_PUT: dict[Key[Any, Any], Callable[[Any, At], Event]] = {
+    PLACE: lambda v, at: events.PlacePut(place=v, **at),
+    OBJECT: lambda v, at: events.ObjectPut(object=v, **at),
+    ROBOT_SPEC: lambda v, at: events.RobotRegistered(spec=v, **at),
+    STATEMENT: lambda v, at: events.StatementPut(statement=v, **at),
+    FACT: lambda v, at: events.FactPut(fact=v, **at),
+    GOAL_SPEC: lambda v, at: events.GoalPut(goal=v, **at),
+    REPORT: lambda v, at: events.ReportReceived(report=v, **at),
+    PLAN_PROPOSAL: lambda v, at: events.PlanProposed(plan=v, **at),
+    PLAN_REQUEST: lambda v, at: events.PlanRequested(request=v, **at),
+    REPLAN_REQUEST: lambda v, at: events.ReplanRequested(request=v, **at),
+    CONTROL_REQUEST: lambda v, at: events.ControlRequested(request=v, **at),
 }
-_DELETED: dict[str, Callable[[Any, At], Event]] = {
-    GOAL_SPEC.name: lambda a, at: events.GoalDeleted(goal=a.goal, **at),
-    FACT.name: lambda a, at: events.FactDeleted(subject=a.subject, relation=a.relation, **at),
-    STATEMENT.name: lambda a, at: events.StatementDeleted(statement=a.statement, **at),
-    PLACE.name: lambda a, at: events.PlaceDeleted(place=a.place, **at),
-    OBJECT.name: lambda a, at: events.ObjectDeleted(object=a.object, **at),
-    ROBOT_SPEC.name: lambda a, at: events.RobotUnregistered(robot=a.robot, **at),
+_DELETED: dict[Key[Any, Any], Callable[[Any, At], Event]] = {
+    GOAL_SPEC: lambda a, at: events.GoalDeleted(goal=a.goal, **at),
+    FACT: lambda a, at: events.FactDeleted(subject=a.subject, relation=a.relation, **at),
+    STATEMENT: lambda a, at: events.StatementDeleted(statement=a.statement, **at),
+    PLACE: lambda a, at: events.PlaceDeleted(place=a.place, **at),
+    OBJECT: lambda a, at: events.ObjectDeleted(object=a.object, **at),
+    ROBOT_SPEC: lambda a, at: events.RobotUnregistered(robot=a.robot, **at),
 }
-
-WATCHED: tuple[Key[Any, Any], ...] = (
-    PLACE,
-    OBJECT,
-    ROBOT_SPEC,
-    STATEMENT,
-    FACT,
-    GOAL_SPEC,
-    REPORT,
-    PLAN_PROPOSAL,
-    PLAN_REQUEST,
-    REPLAN_REQUEST,
-    CONTROL_REQUEST,
-)
+WATCHED = tuple(_PUT)
 """Keys the planner listens to; names come before the sentences that use them."""
 
 
@@ -68,12 +55,12 @@ def event_of(change: Change[Any, Any], at: At) -> Event | None:
     A payload that speaks of another address than its own key's is ignored: keys are the truth.
     """
     if change.value is None:
-        make = _DELETED.get(change.key.name)
+        make = _DELETED.get(change.key)
         return make(change.address, at) if make else None
     for field in change.address.__struct_fields__:
         if getattr(change.value, field, None) != getattr(change.address, field):
             return None
-    return _PUT[change.key.name](change.value, at)
+    return _PUT[change.key](change.value, at)
 
 
 def missed_deletions(state: State, seen: set[str], at: At) -> list[Event]:
@@ -85,6 +72,4 @@ def missed_deletions(state: State, seen: set[str], at: At) -> list[Event]:
         *((OBJECT, OBJECT.address(thing)) for thing in state.objects),
         *((ROBOT_SPEC, ROBOT_SPEC.address(robot)) for robot in state.robots),
     ]
-    return [
-        _DELETED[key.name](address, at) for key, address in known if key.build(address) not in seen
-    ]
+    return [_DELETED[key](address, at) for key, address in known if key.build(address) not in seen]

@@ -34,7 +34,7 @@ from keyexpr_schema.keyspace import (
     ROBOT_ALIVE,
     SIM_CLOCK,
 )
-from keyexpr_schema.payloads.service import PlannerAddress, PlannerAliveAddress, PlannerStatus
+from keyexpr_schema.payloads.system import PlannerAddress, PlannerAliveAddress, PlannerStatus
 from keyexpr_schema.transport.session import Session, TokenWatch, Watch
 
 log = logging.getLogger(__name__)

@@ -102,9 +102,7 @@ class _Run:
         self, made: PartialPlan, found: Allocated, repaired: bool = False
     ) -> PlanningSucceeded:
         schedule = found.schedule
-        durations_s = {
-            task: end_s - schedule.start_s[task] for task, end_s in schedule.end_s.items()
-        }
+        durations_s = schedule.durations_s
         timed = (replace(task, duration_s=durations_s[task.task]) for task in made.plan.tasks)
         notes = (f"goal {goal} is left out: {reason}" for goal, reason in made.left_out.items())
         return PlanningSucceeded(
@@ -115,7 +113,7 @@ class _Run:
             sequence=dict(schedule.sequence),
             extra_after=dict(schedule.extra_after),
             durations_s=durations_s,
-            makespan_s=schedule.makespan_s,
+            predicted_makespan_s=schedule.makespan_s,
             lower_bound_s=found.lower_bound_s,
             notes=(*found.notes, *notes),
             repaired=repaired,

@@ -67,6 +67,3 @@ class Index:
             if fits("/" + keyexpr):
                 result.append(self._values[keyexpr])
         return result
-
-    def __len__(self) -> int:
-        return len(self._values)

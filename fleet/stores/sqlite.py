@@ -39,14 +39,15 @@ PRAGMA user_version = {FORMAT};
 
 
 class SqliteStore:
-    """A `Store` (which see) in the directory `data_dir`, which one process uses at a time.
+    """A `transport.storage.Store` in the directory `data_dir`, which one process uses at a time.
 
     `synchronous`: `NORMAL` outlives the end of the process at any moment; `FULL` also a power cut,
     at about half the speed. `journal_limit`: how many changes the journal remembers.
 
     Raises:
         StoreInUse: another process has it open.
-        StoreError: the directory or the file cannot be used.
+        StoreError: the directory or the file cannot be used; from `apply`, that nothing of the
+            batch was applied.
     """
 
     def __init__(
@@ -90,11 +91,6 @@ class SqliteStore:
                 self._index.set(Write(keyexpr, number, False, encoding, data))
 
     def apply(self, batch: Sequence[Write]) -> int:
-        """Apply `batch` in one transaction; how many of the writes changed something.
-
-        Raises:
-            StoreError: nothing of the batch was applied.
-        """
         for write in batch:
             if write.stamp <= 0:
                 raise StoreError(f"a write to {write.keyexpr!r} carries no timestamp")
@@ -171,17 +167,11 @@ class SqliteStore:
                 (self._journal_limit,),
             )
 
-    def get(self, keyexpr: str) -> Write | None:
-        """The value of one key, None when it has none or it was deleted."""
-        return next(iter(self.select(keyexpr)), None)
-
     def select(self, pattern: str) -> list[Write]:
-        """The values of every key that `pattern` (`*`, `**` and `$*` allowed) matches, by key."""
         with self._lock:
             return self._index.matching(pattern)
 
     def journal(self, prefix: str, after: int, limit: int) -> tuple[list[AppliedWrite], int]:
-        """At most `limit` changes after number `after` under `prefix/`, and the last number."""
         with self._lock:
             rows = self._db.execute(
                 "SELECT number, wall_time_s, keyexpr, deleted, stamp, data FROM journal "

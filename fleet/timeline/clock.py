@@ -23,7 +23,7 @@ def wall_of(timestamp: str) -> float | None:
 
 
 class Clock:
-    """Fleet time against wall time, learned from every value that carries both.
+    """Fleet time against wall time, fitted to every value that carries both.
 
     A value that names no fleet time of its own still has a Zenoh timestamp, and is placed on the
     fleet's timeline by that: so what was stored before the recorder started stands where it

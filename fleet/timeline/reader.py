@@ -44,10 +44,6 @@ class RecordingSummary:
         """Rows of all entities, static ones not among them."""
         return sum(entity.rows for entity in self.entities.values())
 
-    def below(self, prefix: str) -> dict[str, EntitySummary]:
-        """The entities whose path begins with `prefix`."""
-        return {path: one for path, one in self.entities.items() if path.startswith(prefix)}
-
 
 @dataclass(frozen=True)
 class Row:

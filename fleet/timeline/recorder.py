@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import rerun as rr
 
@@ -87,17 +87,10 @@ _COLOURS = {
 }
 
 
-class Recorded(Protocol):
-    """What the recorder needs of a change: the key, the address, the value, the timestamp."""
+if TYPE_CHECKING:
+    from keyexpr_schema.transport.session import Change
 
-    @property
-    def key(self) -> Key[Any, Any]: ...
-    @property
-    def address(self) -> Any: ...
-    @property
-    def value(self) -> Any: ...
-    @property
-    def timestamp(self) -> str: ...
+    AnyChange = Change[Any, Any]
 
 
 class Recorder:
@@ -125,7 +118,7 @@ class Recorder:
         """Fleet time [s] of the newest value."""
         return self._clock.now_s
 
-    def record_all(self, changes: Iterable[Recorded]) -> None:
+    def record_all(self, changes: Iterable[AnyChange]) -> None:
         """Record what was stored before: in the order in which it was written.
 
         First the clocks are compared, so that values without a time of their own find theirs.
@@ -139,7 +132,7 @@ class Recorder:
         for change in backlog:
             self.record(change)
 
-    def record(self, change: Recorded) -> None:
+    def record(self, change: AnyChange) -> None:
         """Record one change; a value that is already known changes nothing."""
         key, value = change.key.name, change.value
         wall_s = wall_of(change.timestamp) or time.time()
@@ -175,7 +168,7 @@ class Recorder:
         """
         self._draw()
         self._lanes.flush()
-        self._world.flush(1 if whole else POSES)
+        self._world.poses.flush(1 if whole else POSES)
         self._frame_view(final=False)
         self._sink.stream.flush(timeout_sec=10.0)
 
@@ -184,7 +177,7 @@ class Recorder:
         self._utilisation.advance(self._clock.now_s, final=True)
         self._graphs.draw(self._clock.now_s, final=True)
         self._lanes.flush()
-        self._world.flush()
+        self._world.poses.flush()
         self._frame_view(final=True)
         self._sink.stream.flush(timeout_sec=30.0)
         self._sink.stream.disconnect()
@@ -282,7 +275,7 @@ class Recorder:
             self._graphs.of(address.plan).status = None
 
 
-def _own_time(change: Recorded) -> float | None:
+def _own_time(change: AnyChange) -> float | None:
     """The fleet time [s] a value names for itself, if it names one."""
     value = change.value
     if value is None:

@@ -9,9 +9,8 @@ import asyncio
 import contextlib
 import json
 import logging
-import threading
 from collections.abc import AsyncIterator, Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -67,30 +66,9 @@ def zenoh_config(
     return config
 
 
-class _Opening:
-    """`zenoh.open` on a thread, such that a session nobody waits for any more is closed."""
-
-    def __init__(self, config: zenoh.Config) -> None:
-        self._config = config
-        self._lock = threading.Lock()
-        self._abandoned = False
-        self._session: zenoh.Session | None = None
-
-    def run(self) -> zenoh.Session:
-        session = zenoh.open(self._config)
-        with self._lock:
-            self._session = session
-            abandoned = self._abandoned
-        if abandoned:
-            session.close()  # type: ignore[no-untyped-call]
-        return session
-
-    def abandon(self) -> None:
-        with self._lock:
-            self._abandoned = True
-            session = self._session
-        if session is not None:
-            session.close()  # type: ignore[no-untyped-call]
+def _close_unwanted(opening: Future[zenoh.Session]) -> None:
+    if not opening.cancelled() and opening.exception() is None:
+        opening.result().close()  # type: ignore[no-untyped-call]
 
 
 async def _connect(
@@ -120,14 +98,15 @@ async def _connect(
                 f"{', '.join(endpoints)} is not an endpoint of a router: write it like "
                 "tcp/127.0.0.1:7447"
             ) from error
-        opening = _Opening(config)
+        opening = executor.submit(zenoh.open, config)
         try:
-            return await asyncio.shield(loop.run_in_executor(executor, opening.run))
+            return await asyncio.shield(asyncio.wrap_future(opening))
         except zenoh.ZError as error:
             if timeout_s is not None and loop.time() - started_s + pause_s >= timeout_s:
                 raise Unreachable.no_router(endpoints) from error
         except asyncio.CancelledError:
-            opening.abandon()
+            # Nobody can interrupt it: what it opens, now or later, is closed as soon as it is open.
+            opening.add_done_callback(_close_unwanted)
             raise
         if not warned and loop.time() - started_s >= WAITING_LINE_S:
             _log.warning("no router answers at %s; waiting for one", ", ".join(endpoints))

@@ -21,7 +21,7 @@ from zenoh import handlers
 
 from keyexpr_schema.errors import CannotListen, ForeignKey, SchemaError
 from keyexpr_schema.keyspace import STORE_JOURNAL, key_of
-from keyexpr_schema.payloads.service import JournalEntry, StoreAddress, StoreJournal
+from keyexpr_schema.payloads.system import JournalEntry, StoreAddress, StoreJournal
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.samples import (
     Encoded,

@@ -13,7 +13,7 @@ from keyexpr_schema.key import A, Delivery, Key, P, Payload
 from keyexpr_schema.transport.connecting import open_link
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.queries import QueryServer, send_query
-from keyexpr_schema.transport.samples import decode_value, encoding_of
+from keyexpr_schema.transport.samples import Sample, decode_value, encoding_of
 from keyexpr_schema.transport.store_client import StoreClient
 from keyexpr_schema.transport.tokens import TokenChange, TokenWatch
 from keyexpr_schema.transport.trace import Trace
@@ -73,11 +73,6 @@ class Session:
         self._trace = Trace(config.component)
         self._undecodable = UndecodableReports(link, config.component, self._trace)
         self._store = StoreClient(link, config.endpoints, self._trace)
-
-    @property
-    def component(self) -> str:
-        """The name that signs reports and refusals."""
-        return self.config.component
 
     @property
     def connected(self) -> bool:
@@ -159,10 +154,7 @@ class Session:
             UndecodablePayload: there is one, but not of the type that the key promises.
             Unreachable: no router and store could be asked within `timeout_s`.
         """
-        self._check_stored(key)
-        keyexpr = key.build(address)
-        self._trace.note("read", key, keyexpr)
-        samples = await self._store.list(keyexpr, timeout_s)
+        samples = await self._read(key, key.build(address), timeout_s)
         return decode_value(key, samples[0]) if samples else None
 
     async def list(self, key: Key[A, P], timeout_s: float = 3.0, **fixed: str | int) -> dict[A, P]:
@@ -173,20 +165,19 @@ class Session:
         Raises:
             Unreachable: no router and store could be asked within `timeout_s`.
         """
-        self._check_stored(key)
-        pattern = key.pattern(**fixed)
-        self._trace.note("read", key, pattern)
         found: dict[A, P] = {}
-        for sample in await self._store.list(pattern, timeout_s):
+        for sample in await self._read(key, key.pattern(**fixed), timeout_s):
             try:
                 found[key.parse(sample.keyexpr)] = decode_value(key, sample)
             except (ForeignKey, UndecodablePayload) as error:
                 self._undecodable.report(sample.keyexpr, sample.data, str(error))
         return dict(sorted(found.items()))
 
-    def _check_stored(self, key: Key[Any, Any]) -> None:
+    async def _read(self, key: Key[Any, Any], keyexpr: str, timeout_s: float) -> tuple[Sample, ...]:
         if not key.stored:
             raise TypeError(f"{key.name} is {key.delivery.value}: there is nothing to get")
+        self._trace.note("read", key, keyexpr)
+        return await self._store.list(keyexpr, timeout_s)
 
     def report_undecodable(self, keyexpr: str, data: bytes, reason: str) -> None:
         """Report a value that means nothing to us, once for each distinct one of a key."""
@@ -235,9 +226,8 @@ class Session:
         """
         pattern = key.pattern(**fixed)
         self._trace.note("serve", key, pattern)
-        return QueryServer(self.link, self.component, self._undecodable, key, handler).running(
-            pattern
-        )
+        component = self.config.component
+        return QueryServer(self.link, component, self._undecodable, key, handler).running(pattern)
 
     async def query(self, key: Key[A, P], address: A, payload: P, timeout_s: float = 5.0) -> Any:
         """Query whoever serves `key` at `address`; the reply has the type `key.reply`.

@@ -16,7 +16,7 @@ from typing import Any
 from keyexpr_schema.errors import Unconfirmed, Unreachable
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import STORE_JOURNAL
-from keyexpr_schema.payloads.service import StoreAddress, StoreQuery
+from keyexpr_schema.payloads.system import StoreAddress, StoreQuery
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.samples import Sample, encoding_of, stamp_of_text
 from keyexpr_schema.transport.trace import Trace

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 
 from keyexpr_schema.keyspace import UNDECODABLE
-from keyexpr_schema.payloads.service import UndecodableAddress, UndecodableValue
+from keyexpr_schema.payloads.system import UndecodableAddress, UndecodableValue
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.samples import encoding_of
 from keyexpr_schema.transport.trace import Trace

@@ -1,4 +1,4 @@
-"""A world as it is registered on keys. Robots and planners are not told where objects are."""
+"""A world as it is registered on keys. Where objects are is not registered."""
 
 from __future__ import annotations
 

@@ -13,26 +13,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from keyexpr_schema.payloads.motions import (
-    Detection,
     Motion,
     MotionKind,
     MotionOutcome,
     MotionState,
-    PointM,
     Senses,
 )
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from sim.backend import Backend
-from sim.files.world_schema import FLOOR, WorldFile
+from sim.files.world_schema import WorldFile
 from sim.kinematic.scene import draw_frame, draw_scene
+from sim.kinematic.state import REACH_M, KinematicObject, KinematicRobot, KinematicState
 from sim.navigation.routes import Route, Routes
-
-REACH_M = 1.2
-"""How far from a robot's centre its hand gets, sideways; generous, as stances here are coarse."""
-
-MISS_M = 0.15
-"""A hand that closes further than this from the object closes on nothing."""
 
 
 @dataclass(frozen=True)
@@ -65,37 +58,6 @@ class MotionModel:
         }.get(kind, self.release_s)
 
 
-@dataclass
-class _Robot:
-    name: str
-    capabilities: dict[str, float]
-    pose: PoseMRad
-    chance: random.Random
-    node: int
-    """Of the lattice: where it stands or is going."""
-    holding: str | None = None
-    basket: list[str] = field(default_factory=list)
-    counts: dict[MotionKind, int] = field(default_factory=dict)
-    motion: Motion | None = None
-    number: int = 0
-    begun_s: float = 0.0
-    ends_s: float = 0.0
-    route: Route | None = None
-    failure: str | None = None
-    state: MotionState | None = None
-    reason: str | None = None
-    seen: tuple[Detection, ...] = ()
-
-
-@dataclass
-class _Thing:
-    name: str
-    kind: str
-    mass_kg: float
-    point_m: PointM
-    support: str
-
-
 class KinematicBackend(Backend):
     """See the module. `step_s` bounds how far one `advance` goes; `None` is to the next event."""
 
@@ -114,8 +76,8 @@ class KinematicBackend(Backend):
         self._events: list[tuple[float, int, str]] = []
         self._count = 0
         # A generator for each robot: what one draws does not depend on when others ask.
-        self._robots = {
-            spec.robot: _Robot(
+        states = {
+            spec.robot: KinematicRobot(
                 spec.robot,
                 dict(spec.capabilities),
                 start,
@@ -124,20 +86,13 @@ class KinematicBackend(Backend):
             )
             for spec, start in robots
         }
-        self._things = {
-            name: _Thing(
-                name,
-                entry.kind,
-                world.object_kinds[entry.kind].mass_kg,
-                world.start_point_m(name),
-                entry.on,
-            )
-            for name, entry in world.object_entries.items()
-        }
+        objects = {}
+        for name, entry in world.object_entries.items():
+            mass_kg, point = world.object_kinds[entry.kind].mass_kg, world.start_point_m(name)
+            objects[name] = KinematicObject(name, entry.kind, mass_kg, point, entry.on)
+        self._state = KinematicState(world, states, objects)
 
-    # --- time --------------------------------------------------------------------------------
-
-    def _advance(self) -> None:
+    def advance(self) -> None:
         while self._events and self._stale(self._events[0]):
             heapq.heappop(self._events)
         horizon = self.time_s + (self._step_s or 0.05)
@@ -152,14 +107,14 @@ class KinematicBackend(Backend):
         while self._events and self._events[0][0] <= self.time_s:
             event = heapq.heappop(self._events)
             if not self._stale(event):
-                self._finish(self._robots[event[2]])
+                self._finish(self._state.robots[event[2]])
 
     def _stale(self, event: tuple[float, int, str]) -> bool:
-        robot = self._robots[event[2]]
+        robot = self._state.robots[event[2]]
         return robot.number != event[1] or robot.state is not MotionState.RUNNING
 
     def _begin(self, robot: str, motion: Motion) -> None:
-        me = self._robots[robot]
+        me = self._state.robots[robot]
         self._count += 1
         me.motion, me.number, me.seen = motion, self._count, ()
         me.state, me.reason, me.failure, me.route = MotionState.RUNNING, None, None, None
@@ -186,147 +141,34 @@ class KinematicBackend(Backend):
         heapq.heappush(self._events, (me.ends_s, self._count, robot))
 
     def _stop(self, robot: str) -> None:
-        me = self._robots[robot]
+        me = self._state.robots[robot]
         if me.state is MotionState.RUNNING:
-            me.pose = self._pose(me)
+            me.pose = self._state.pose(me, self.time_s)
             me.node = self._routes.nearest(me.pose)
             me.state, me.reason, me.route = MotionState.STOPPED, "it was told to stop", None
 
-    def _end(self, me: _Robot, failure: str | None) -> None:
-        me.pose, me.route = self._pose(me), None
+    def _end(self, me: KinematicRobot, failure: str | None) -> None:
+        me.pose, me.route = self._state.pose(me, self.time_s), None
         me.reason = failure
         me.state = MotionState.SUCCEEDED if failure is None else MotionState.FAILED
 
-    def _finish(self, me: _Robot) -> None:
+    def _finish(self, me: KinematicRobot) -> None:
         assert me.motion is not None
         if me.failure is not None:
             self._end(me, me.failure)
             return
-        me.pose = self._pose(me)
-        self._end(me, self._effect(me, me.motion))
+        me.pose = self._state.pose(me, self.time_s)
+        self._end(me, self._state.effect(me, me.motion, self.time_s))
 
-    # --- what motions do ---------------------------------------------------------------------
-
-    def _route(self, me: _Robot, motion: Motion) -> Route | None:
+    def _route(self, me: KinematicRobot, motion: Motion) -> Route | None:
         if motion.place is not None and motion.kind is MotionKind.GO_TO:
-            taken = {other.node for other in self._robots.values() if other is not me}
+            taken = {other.node for other in self._state.robots.values() if other is not me}
             return self._routes.to_place(me.pose, motion.place, taken)
         assert motion.point_m is not None
         return self._routes.to_point(me.pose, motion.point_m, REACH_M)
 
-    def _effect(self, me: _Robot, motion: Motion) -> str | None:
-        """Carry out the end of `motion`; why not, if it cannot be."""
-        if motion.kind is MotionKind.LOOK:
-            me.seen = self._look(me)
-        elif motion.kind is MotionKind.GRASP:
-            return self._grasp(me, motion)
-        elif motion.kind is MotionKind.RELEASE:
-            return self._release(me, motion)
-        elif motion.kind is MotionKind.RELEASE_IN_BASKET:
-            return self._hand_over(me, motion)
-        return None
-
-    def _look(self, me: _Robot) -> tuple[Detection, ...]:
-        place = self.world.place_at(*me.pose[:2])
-        found = []
-        for thing in self._things.values():
-            point = self._point(thing)
-            near = math.dist(point[:2], me.pose[:2]) <= me.capabilities.get("see", 0.0)
-            here = self.world.place_at(*point[:2]) == place
-            if near and here and self._held_by(thing) is None:
-                found.append(
-                    Detection(
-                        object=thing.name,
-                        kind=thing.kind,
-                        point_m=point,
-                        place=place,
-                        support=thing.support,
-                    )
-                )
-        return tuple(found)
-
-    def _grasp(self, me: _Robot, motion: Motion) -> str | None:
-        assert motion.object is not None and motion.point_m is not None
-        thing = self._things[motion.object]
-        payload_kg = me.capabilities.get("grip")
-        holder = self._held_by(thing)
-        if payload_kg is None:
-            return f"{me.name} has no hand"
-        if me.holding is not None:
-            return f"the hand already holds {me.holding}"
-        if thing.mass_kg > payload_kg:
-            return f"{thing.name} is too heavy: {thing.mass_kg:g} kg of at most {payload_kg:g} kg"
-        point = self._point(thing)
-        if holder is not None or math.dist(point, motion.point_m) > MISS_M:
-            return f"{thing.name} is not there; the hand closed on nothing"
-        if math.dist(point[:2], me.pose[:2]) > REACH_M:
-            return f"{thing.name} is out of reach: drive up to it first"
-        if thing.support in self._robots:
-            self._robots[thing.support].basket.remove(thing.name)
-        me.holding, thing.support = thing.name, ""
-        return None
-
-    def _release(self, me: _Robot, motion: Motion) -> str | None:
-        assert motion.point_m is not None
-        if me.holding is None:
-            return "the hand is empty"
-        if math.dist(motion.point_m[:2], me.pose[:2]) > REACH_M:
-            return "the point is out of reach: drive up to it first"
-        support = self._support_at(motion.point_m)
-        if support is None:
-            return "there is nothing at that point to put it on"
-        thing = self._things[me.holding]
-        thing.point_m, thing.support, me.holding = motion.point_m, support, None
-        return None
-
-    def _hand_over(self, me: _Robot, motion: Motion) -> str | None:
-        assert motion.robot is not None
-        other = self._robots[motion.robot]
-        room = other.capabilities.get("basket", 0.0)
-        if me.holding is None:
-            return "the hand is empty"
-        if room <= 0:
-            return f"{other.name} has no basket"
-        if len(other.basket) >= room:
-            return f"the basket of {other.name} is full"
-        if math.dist(other.pose[:2], me.pose[:2]) > REACH_M or other.route is not None:
-            return f"{other.name} is out of reach or moving"
-        self._things[me.holding].support = other.name
-        other.basket.append(me.holding)
-        me.holding = None
-        return None
-
-    def _support_at(self, point_m: PointM) -> str | None:
-        x, y, z = point_m
-        for top in self.world.surfaces():
-            c, s = math.cos(top.yaw_rad), math.sin(top.yaw_rad)
-            dx, dy = x - top.x_m, y - top.y_m
-            inside = abs(c * dx + s * dy) <= top.length_m / 2
-            inside &= abs(c * dy - s * dx) <= top.width_m / 2
-            if inside:
-                return top.surface if abs(z - top.z_m) <= 0.1 else None
-        return FLOOR if abs(z) <= 0.1 and self.world.place_at(x, y) is not None else None
-
-    # --- where things are --------------------------------------------------------------------
-
-    def _pose(self, me: _Robot) -> PoseMRad:
-        if me.route is None or me.state is not MotionState.RUNNING:
-            return me.pose
-        whole = me.ends_s - me.begun_s
-        return me.route.at(min(1.0, (self.time_s - me.begun_s) / whole) if whole > 0 else 1.0)
-
-    def _held_by(self, thing: _Thing) -> str | None:
-        return next((r.name for r in self._robots.values() if r.holding == thing.name), None)
-
-    def _point(self, thing: _Thing) -> PointM:
-        carrier = self._held_by(thing) or (thing.support if thing.support in self._robots else None)
-        if carrier is None:
-            return thing.point_m
-        x, y, _ = self._pose(self._robots[carrier])
-        return (x, y, 0.8 if thing.support == "" else 0.3)
-
     def _outcome(self, robot: str) -> MotionOutcome | None:
-        me = self._robots[robot]
+        me = self._state.robots[robot]
         if me.state is None:
             return None
         return MotionOutcome(
@@ -334,8 +176,8 @@ class KinematicBackend(Backend):
         )
 
     def _senses(self, robot: str) -> Senses:
-        me = self._robots[robot]
-        pose = self._pose(me)
+        me = self._state.robots[robot]
+        pose = self._state.pose(me, self.time_s)
         return Senses(
             robot=robot,
             time_s=self.time_s,
@@ -347,23 +189,7 @@ class KinematicBackend(Backend):
         )
 
     def truths(self) -> tuple[Truth, ...]:
-        found = []
-        for thing in self._things.values():
-            point, holder = self._point(thing), self._held_by(thing)
-            carrier = self._robots.get(holder or thing.support)
-            found.append(
-                Truth(
-                    object=thing.name,
-                    kind=thing.kind,
-                    time_s=self.time_s,
-                    point_m=point,
-                    place=self.world.place_at(*point[:2]),
-                    support=thing.support or None,
-                    held_by=holder,
-                    settled=holder is None and (carrier is None or carrier.route is None),
-                )
-            )
-        return tuple(found)
+        return self._state.truths(self.time_s)
 
     def contacts(self) -> ContactCount:
         return ContactCount(time_s=self.time_s, robot_robot=0, robot_wall=0)
@@ -372,10 +198,11 @@ class KinematicBackend(Backend):
         return draw_scene(self.world, self.robots)
 
     def frame(self) -> Frame:
+        state, now_s = self._state, self.time_s
         return draw_frame(
-            self.time_s,
-            {name: self._pose(robot) for name, robot in self._robots.items()},
-            {name: self._point(thing) for name, thing in self._things.items()},
+            now_s,
+            {name: state.pose(robot, now_s) for name, robot in state.robots.items()},
+            {name: state.point(thing, now_s) for name, thing in state.objects.items()},
         )
 
 

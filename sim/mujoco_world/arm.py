@@ -56,7 +56,7 @@ class Arm:
         self.goal = list(self.setpoint)
 
     def commanded(self) -> bool:
-        """Whether the joints have been told all the way to the goal."""
+        """Whether the setpoints have come to the goal."""
         return self.setpoint == self.goal
 
     def arrived(self) -> bool:
@@ -67,7 +67,7 @@ class Arm:
         )
 
     def stowed(self) -> bool:
-        """Whether it is told to be folded and nothing else any more."""
+        """Whether setpoints and goal are the folded pose."""
         return self.goal == self.setpoint == list(self.entry.stow)
 
     def tick(self, ctrl: Any) -> None:
@@ -179,10 +179,6 @@ class Gripper:
     def close(self) -> None:
         """Close and press."""
         self._goal = self.entry.squeeze_m
-
-    def settled(self) -> bool:
-        """Whether the command has reached its goal (the fingers may be blocked)."""
-        return self._setpoint == self._goal
 
     def feels(self) -> bool:
         """Whether both fingers press on something that keeps them apart."""

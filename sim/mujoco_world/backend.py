@@ -101,11 +101,9 @@ class MujocoBackend(Backend):
             body.drive.halt()
 
     def truths(self) -> tuple[Truth, ...]:
-        """Where every object really is, in the order of the world file."""
         return self._context.observer.truths(self.time_s)
 
     def contacts(self) -> ContactCount:
-        """Collisions since the start, each touch counted once."""
         return ContactCount(
             time_s=self.time_s,
             robot_robot=self._collisions.robot_robot,
@@ -123,11 +121,9 @@ class MujocoBackend(Backend):
         return run.phase if run is not None and run.ended is None else None
 
     def scene(self) -> Scene:
-        """The shapes of everything."""
         return self._scene
 
     def frame(self) -> Frame:
-        """Where everything that moves is now."""
         return draw_frame(self._model, self._data, self._scene, self.time_s)
 
     def _begin(self, robot: str, motion: Motion) -> None:
@@ -139,7 +135,7 @@ class MujocoBackend(Backend):
         if run is not None and run.ended is None:
             self._end(robot, run, MotionState.STOPPED, f"stopped while {run.phase}")
 
-    def _advance(self) -> None:
+    def advance(self) -> None:
         context = self._context
         # A robot whose arm is out, stopped in mid-work perhaps, must not be moved.
         pinned = {name for name, body in self._bodies.items() if body.arm_out()}

@@ -77,7 +77,7 @@ class Drive(ABC):
             self.drive(x, y, yaw_rad)
 
     def spin(self, rate_rad_s: float) -> None:
-        """Turn on the spot at this rate until told otherwise."""
+        """Turn on the spot at this rate until the next command."""
         if self._spin is None:
             x, y, _ = self.pose()
             self._target = (x, y, None, self._top_m_s)

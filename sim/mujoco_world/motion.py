@@ -27,7 +27,7 @@ FACING_RAD = 0.006
 
 
 BLOCKED_S = 2.5
-"""An arm that is not where it was told to be this long after is held up by something."""
+"""An arm that is not at its setpoints this long after is held up by something."""
 
 
 class MotionFailed(Exception):

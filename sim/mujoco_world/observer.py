@@ -175,7 +175,7 @@ class Observer:
         return hits >= VISIBLE_SHARE * len(points)
 
     def detect(self, robot: RobotBody, object: str) -> Detection:
-        """What the camera tells of an object that it sees (see `sees`)."""
+        """What the camera reports of an object that it sees (see `sees`)."""
         x, y, z = self.base_point(object)
         dx, dy = (float(v) for v in self._random.normal(0.0, NOISE_M, 2))
         x, y = x + dx, y + dy

@@ -31,7 +31,7 @@ class RobotBody:
         self._data = data
         self.held: str | None = None
         self.reaching_for: str | None = None
-        """What the hand was last told to grasp: a hand feels that it holds, not what."""
+        """What the hand was last commanded to grasp: a hand feels that it holds, not what."""
         self.grip_above_base_m = 0.0
         """How far above the held object's base the hand took it."""
         self._untouched_s = 0.0

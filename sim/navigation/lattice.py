@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from functools import lru_cache
+from heapq import heappop, heappush
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,8 +119,6 @@ class Lattice:
         return self._field(goals, blocked)
 
     def _compute_field(self, goals: frozenset[int], blocked: frozenset[int]) -> list[float]:
-        from heapq import heappop, heappush
-
         # Some 150 nodes: a heap in Python (0.2 ms) beats building a sparse matrix for each call.
         field = [math.inf] * len(self)
         heap: list[tuple[float, int]] = []

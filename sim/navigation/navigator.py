@@ -9,8 +9,8 @@ from operator import itemgetter
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.errors import NoPath, NoStance
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
-from sim.navigation.clearance import Clearance, segment_gap
-from sim.navigation.lattice import TRACKING_M, Lattice
+from sim.navigation.clearance import segment_gap
+from sim.navigation.lattice import TRACKING_M
 from sim.navigation.spots import Dock, Spots
 from sim.navigation.steering import Leg, passed, steer
 from sim.navigation.traffic import Traffic, Traveller
@@ -46,9 +46,8 @@ class Navigator:
 
     def __init__(self, world: WorldFile) -> None:
         self._world = world
-        self._clearance = Clearance(world)
-        self._lattice = Lattice(world, self._clearance)
-        self._spots = Spots(world, self._lattice, self._clearance)
+        self._spots = Spots(world)
+        self._lattice = self._spots.lattice
         self._traffic = Traffic(self._lattice, self._spots.retreat)
         self._robots: dict[str, Traveller] = {}
         self._speeds: dict[str, float] = {}

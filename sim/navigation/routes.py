@@ -11,8 +11,6 @@ import numpy as np
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.files.world_schema import WorldFile
-from sim.navigation.clearance import Clearance
-from sim.navigation.lattice import Lattice
 from sim.navigation.spots import Spots
 
 XY = tuple[float, float]
@@ -48,9 +46,8 @@ class Routes:
     """Routes over the lattice of one world, for robots that do not mind each other."""
 
     def __init__(self, world: WorldFile) -> None:
-        clearance = Clearance(world)
-        self._lattice = Lattice(world, clearance)
-        self._spots = Spots(world, self._lattice, clearance)
+        self._spots = Spots(world)
+        self._lattice = self._spots.lattice
 
     def to_place(self, start: PoseMRad, place: str, taken: Collection[int]) -> Route | None:
         """To a waiting spot in `place`, rather none of `taken`; `None`: there is no way."""

@@ -44,8 +44,9 @@ class Dock:
 class Spots:
     """The places to stop at in one world."""
 
-    def __init__(self, world: WorldFile, lattice: Lattice, clearance: Clearance) -> None:
-        self._lattice, self._clearance = lattice, clearance
+    def __init__(self, world: WorldFile) -> None:
+        self._clearance = Clearance(world)
+        self.lattice = lattice = Lattice(world, self._clearance)
         points = lattice.points_m
         self.by_door = np.zeros(len(points), dtype=bool)  # (n,)
         self.forecourt = np.zeros(len(points), dtype=bool)
@@ -77,14 +78,14 @@ class Spots:
 
     def way_out(self, node: int, blocked: int) -> bool:
         """Whether one can get from `node` to a waiting spot while somebody is at `blocked`."""
-        field = self._lattice.field(self._everywhere - {blocked}, frozenset({blocked}))
+        field = self.lattice.field(self._everywhere - {blocked}, frozenset({blocked}))
         return node == blocked or math.isfinite(field[node])
 
     def _cuts(self, node: int) -> bool:
-        around = self._lattice.neighbours[node]
+        around = self.lattice.neighbours[node]
         if len(around) < 2:
             return True  # a dead end: who comes to work there would shut its only way out
-        field = self._lattice.field(frozenset(around[:1]), frozenset({node}))
+        field = self.lattice.field(frozenset(around[:1]), frozenset({node}))
         # Further apart than once around a block of four: a bottleneck for all practical ends.
         return any(field[other] > 8 * PITCH_M for other in around[1:])
 
@@ -99,7 +100,7 @@ class Spots:
         for node in self.waiting[place]:
             if node in taken or not math.isfinite(field[node]):
                 continue
-            crowd = sum(other in taken for other in self._lattice.neighbours[node])
+            crowd = sum(other in taken for other in self.lattice.neighbours[node])
             cost = field[node] + 2.0 * bool(self.at_table[node]) + 0.5 * crowd
             cost += 3.0 * (node in disliked) + 1.0 * bool(self.forecourt[node])
             if best is None or (cost, node) < best:
@@ -108,19 +109,19 @@ class Spots:
 
     def dock(self, start_m: tuple[float, float], node: int, radius_m: float, yaw: float) -> Dock:
         """The stance at `start_m`, entered from `node`."""
-        x, y = (float(v) for v in self._lattice.points_m[node])
+        x, y = (float(v) for v in self.lattice.points_m[node])
         gap = radius_m + LARGEST_RADIUS_M + 2 * TRACKING_M
-        owned = self._lattice.near((x, y), start_m, gap) | {node}
+        owned = self.lattice.near((x, y), start_m, gap) | {node}
         return Dock(node, start_m, yaw, owned, math.dist((x, y), start_m))
 
     def ways_in(
         self, point_m: tuple[float, float], radius_m: float, reach_m: float = DOCK_M
     ) -> list[int]:
         """The nodes from which a robot can drive straight to `point_m`, nearest first."""
-        gaps = np.linalg.norm(self._lattice.points_m - point_m, axis=1)
+        gaps = np.linalg.norm(self.lattice.points_m - point_m, axis=1)
         near = np.flatnonzero(gaps <= reach_m)
         here = float(self._clearance.at(point_m))
-        room = self._clearance.along(point_m, self._lattice.points_m[near])
+        room = self._clearance.along(point_m, self.lattice.points_m[near])
         # Who starts close to a wall may leave it, but not come closer.
         clear = room >= min(radius_m, here - 0.01)
         ordered = near[clear][np.argsort(gaps[near[clear]], kind="stable")]

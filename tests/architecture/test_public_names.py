@@ -1,6 +1,6 @@
 """What a package exports is what may be built on: it is there, documented, and found in one place.
 
-A package without `__all__` has no public names yet, and nothing is asked of those who use it.
+A package without `__all__` has no public names.
 """
 
 from __future__ import annotations
@@ -121,13 +121,13 @@ def internal(tree: ast.AST) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module and not node.level:
             package = home(node.module)
-            for alias in node.names if package and exported(package) else ():
+            for alias in node.names if package else ():
                 if node.module != package or alias.name not in exported(package):
                     yield f"from {node.module} import {alias.name}"
         elif isinstance(node, ast.Import):
             for alias in node.names:
                 package = home(alias.name)
-                if package and exported(package) and alias.name != package:
+                if package and alias.name != package:
                     yield f"import {alias.name}"
 
 

@@ -16,7 +16,7 @@ from cli.demo.mission_run import Demo, running_demo
 from cli.demo.summary import Summary
 from keyexpr_schema.errors import ForeignKey
 from keyexpr_schema.keyspace import REPORT, STORE_JOURNAL
-from keyexpr_schema.payloads.service import StoreAddress, StoreJournal, StoreQuery
+from keyexpr_schema.payloads.system import StoreAddress, StoreJournal, StoreQuery
 from keyexpr_schema.payloads.tasks import (
     FINAL_REPORTS,
     Report,

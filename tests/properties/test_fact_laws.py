@@ -13,7 +13,7 @@ NAMES = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,10}", fullmatch=True)
 VALUES: st.SearchStrategy[Value] = st.one_of(
     st.none(),
     st.booleans(),
-    st.integers(-(2**62), 2**62),
+    st.integers(),
     st.floats(allow_nan=False, allow_infinity=False),
     st.text(),
     st.sampled_from(["unknown", "null", "true", "3", "1e3", '"', '"x"', " x", "007", "nan", ""]),
@@ -59,7 +59,7 @@ def test_a_literal_is_read_as_it_is_written(
         ("007", "007"),
         ("nan", "nan"),
         ("1e999", "1e999"),
-        ("99999999999999999999", "99999999999999999999"),
+        ("99999999999999999999", 99999999999999999999),
         ('"3"', "3"),
         ('"two words"', "two words"),
         ('"', '"'),

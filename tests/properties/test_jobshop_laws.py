@@ -8,6 +8,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
+from benchmarks.allocation.shops import without_machines
 from fleet.jobshop.bounds import bound_with_travel, lower_bound
 from fleet.jobshop.branch_and_bound import branch_and_bound
 from fleet.jobshop.cpsat import helps, installed, request_of
@@ -17,7 +18,7 @@ from fleet.jobshop.instance import Instance
 from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.portfolio import schedule_in_order, solve
 from fleet.jobshop.problem import BadShop, Block, Machine, Operation, Position, Schedule, Shop
-from fleet.jobshop.rescheduling import WITHIN, reschedule, without_machines
+from fleet.jobshop.rescheduling import WITHIN, reschedule
 from fleet.jobshop.sequencing import sequences
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.jobshop.warm_start import warm_start

@@ -6,14 +6,24 @@ that an attempt never changes hands; on every crash that the journal replays to 
 
 from __future__ import annotations
 
+from collections import Counter
+
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    initialize,
+    invariant,
+    precondition,
+    rule,
+    run_state_machine_as_test,
+)
 
 from fleet.core import events
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState
 from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanState
-from keyexpr_schema.payloads.requests import ReplanRequest
+from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
 from keyexpr_schema.payloads.tasks import ReportState, TaskState
 from tests.support.fleet_model import FleetModel
 from tests.support.household import bring, carrier, manipulator
@@ -28,18 +38,23 @@ class Undisturbed(RuleBasedStateMachine):
     """Robots do what they are told; people, crashes and the clock come in between."""
 
     reaches_everything = True
+    late = False
+    met: Counter[str] = Counter()
 
     @initialize(
         second=st.booleans(),
         together=st.booleans(),
-        cups=st.integers(1, 3),
+        cups=st.sampled_from([3, 2, 1]),
         rooms=st.lists(st.sampled_from(["hallway", "living_room"]), min_size=3, max_size=3),
     )
     def begin(self, second: bool, together: bool, cups: int, rooms: list[str]) -> None:
         robots = (manipulator(), carrier(), *((manipulator("r2"),) if second else ()))
-        self.model = FleetModel(robots, cups)
+        self.model = FleetModel(robots, cups, self.late)
         self.away: set[str] = set()
+        self.a_plan_was_cancelled = False
         self.finished: set[tuple[str, str]] = set()
+        self.promised: set[str] = set()
+        """Goals that the plan was said to take in."""
         goals = [bring(n, rooms[n - 1]) for n in range(1, cups + 1)]
         for share in [goals] if together else [[goal] for goal in goals]:
             self.model.plan(*share)
@@ -58,11 +73,21 @@ class Undisturbed(RuleBasedStateMachine):
     def start(self, pick: int) -> None:
         self.model.start(self.order(pick))
 
-    @precondition(lambda self: self.model.told)
+    @precondition(lambda self: self.model.reports)
     @rule(pick=PICK)
     def an_old_report_comes_again(self, pick: int) -> None:
-        report = self.model.told[pick % len(self.model.told)]
-        self.model.tell(events.ReportReceived, report=report)
+        report = self.model.reports[pick % len(self.model.reports)]
+        self.model.receive(events.ReportReceived, report=report)
+
+    @precondition(lambda self: self.model.answers)
+    @rule(pick=PICK)
+    def a_job_is_answered(self, pick: int) -> None:
+        self.model.answer(pick)
+
+    @precondition(lambda self: self.model.given_answers)
+    @rule(pick=PICK)
+    def an_answer_comes_again(self, pick: int) -> None:
+        self.model.answer_again(pick)
 
     @precondition(lambda self: any(order.cancelled for order in self.model.orders()))
     @rule()
@@ -74,7 +99,20 @@ class Undisturbed(RuleBasedStateMachine):
     def a_person_wants_another_plan(self) -> None:
         number = len(self.model.state.answers)
         request = ReplanRequest(request=f"again-{number}", plan="plan-1", reason="because")
-        self.model.tell(events.ReplanRequested, request=request)
+        self.model.receive(events.ReplanRequested, request=request)
+
+    @rule(plan=st.sampled_from(["plan-1", "plan-2", "plan-3"]))
+    def a_person_cancels_a_plan_that_is_being_made(self, plan: str) -> None:
+        entry = self.model.state.plans.get(plan)
+        if entry is not None and entry.job is not None:
+            number = len(self.model.state.answers)
+            request = ControlRequest(request=f"stop-{number}", control=Control.CANCEL, plan=plan)
+            self.model.receive(events.ControlRequested, request=request)
+            self.a_plan_was_cancelled = True
+
+    @rule()
+    def a_plan_for_what_waits_is_asked_for(self) -> None:
+        self.model.plan()
 
     @precondition(lambda self: self.model.orders())
     @rule(pick=PICK)
@@ -87,17 +125,19 @@ class Undisturbed(RuleBasedStateMachine):
         number = len(self.model.state.answers)
         wanted = Condition(relation="searched", subject=room, value=True)
         goal = Goal(goal=f"look-{number}", text="", conditions=(wanted,), ordinal=100 + number)
-        self.model.tell(events.GoalPut, goal=goal)
+        self.model.receive(events.GoalPut, goal=goal)
         request = ReplanRequest(
             request=f"more-{number}", plan="plan-1", reason="more", goals=(goal.goal,)
         )
-        self.model.tell(events.ReplanRequested, request=request)
+        self.model.receive(events.ReplanRequested, request=request)
+        if self.model.state.answers[request.request].accepted:
+            self.promised.add(goal.goal)
 
     @precondition(lambda self: len(self.model.state.goals) > 1)
     @rule(pick=PICK)
     def a_goal_is_deleted(self, pick: int) -> None:
         goals = sorted(self.model.state.goals)
-        self.model.tell(events.GoalDeleted, goal=goals[pick % len(goals)])
+        self.model.receive(events.GoalDeleted, goal=goals[pick % len(goals)])
 
     @rule()
     def the_planner_crashes(self) -> None:
@@ -106,7 +146,7 @@ class Undisturbed(RuleBasedStateMachine):
     @rule(seconds=st.sampled_from([20.0, 120.0, 2000.0]))
     def time_passes(self, seconds: float) -> None:
         self.model.time_s += seconds
-        self.model.tell(events.TimerFired)
+        self.model.receive(events.TimerFired)
 
     def teardown(self) -> None:
         if not hasattr(self, "model"):
@@ -114,11 +154,17 @@ class Undisturbed(RuleBasedStateMachine):
         for robot in sorted(self.away):
             self.model.return_(robot)
         self.model.finish()
+        self.met.update(self.model.met)
         state = self.model.state
         for entry in state.plans.values():
             assert entry.state in ENDED_PLANS, f"{entry.plan.plan} is {entry.state}: it never ends"
             assert not entry.outstanding()
         for goal, status in state.goal_states.items():
+            assert (
+                goal not in self.promised
+                or self.a_plan_was_cancelled
+                or any(goal in entry.plan.goals for entry in state.plans.values())
+            ), f"{goal} was asked for while a plan was being made, and is in none"
             waits = all(
                 goal not in entry.plan.goals or entry.state in UNDONE
                 for entry in state.plans.values()
@@ -173,7 +219,19 @@ class Disturbed(Undisturbed):
         self.model.learn(f"cup_{cup}", "at", room)
 
 
-TestUndisturbed = Undisturbed.TestCase
-TestUndisturbed.settings = settings(max_examples=40, stateful_step_count=25, deadline=None)
-TestDisturbed = Disturbed.TestCase
-TestDisturbed.settings = settings(max_examples=80, stateful_step_count=25, deadline=None)
+@pytest.mark.parametrize(("machine", "examples"), [(Undisturbed, 30), (Disturbed, 60)])
+def test_the_laws_hold_whatever_comes(machine: type[Undisturbed], examples: int) -> None:
+    how = settings(max_examples=examples, stateful_step_count=25, deadline=None)
+    run_state_machine_as_test(machine, settings=how)
+
+
+@pytest.mark.parametrize(("machine", "examples"), [(Undisturbed, 40), (Disturbed, 50)])
+def test_the_laws_hold_when_planning_jobs_are_answered_late_and_in_any_order(
+    machine: type[Undisturbed], examples: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    met: Counter[str] = Counter()
+    monkeypatch.setattr(machine, "met", met)
+    monkeypatch.setattr(machine, "late", True)
+    how = settings(max_examples=examples, stateful_step_count=25, deadline=None)
+    run_state_machine_as_test(machine, settings=how)
+    assert len(met) == 5 and all(met.values()), met

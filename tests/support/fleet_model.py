@@ -1,9 +1,11 @@
 """A model of everything outside the planner's core, for tests of its laws: robots that carry out
-orders, fail, crash and come back, and a desk that plans. No key, no clock, no process.
+orders, fail, crash and come back, and planning jobs that are answered at once, or late and in any
+order. No key, no clock, no process.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from typing import Any
 
@@ -11,32 +13,44 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.core import events
 from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry, PlanningJob
 from fleet.core.state import Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
 from fleet.service.planning_job import run_planning_job
 from keyexpr_schema.facts import Value
 from keyexpr_schema.keyspace import ORDER
-from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.goals import Goal, GoalState
 from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskState
 from keyexpr_schema.payloads.world import Fact
-from tests.support.household import PLACES, SKILLS, cup
+from tests.support.household import PLACES, SKILLS, bring, carrier, cup, manipulator
 
+Answer = events.PlanningSucceeded | events.PlanningFailed
 _ALL = compose()
-PARTS: Composition = replace(
+COMPOSITION: Composition = replace(
     _ALL,
     # What is searched for as long as there is time would differ from run to run.
     allocators={**_ALL.allocators, "makespan": MakespanAllocator(deadline_s=0.0, exact=False)},
 )
 
 
-class FleetModel:
-    """Feeds events to the core and keeps what it publishes; checks the laws on the way."""
+BOTH = (bring(1, "hallway"), bring(2, "living_room"))
 
-    def __init__(self, robots: tuple[RobotSpec, ...], cups: int) -> None:
+
+class FleetModel:
+    """Feeds events to the core and keeps what it publishes; checks the laws on the way.
+
+    With `late` answers, what planning jobs came to waits in `answers` until `answer` is called.
+    """
+
+    def __init__(self, robots: tuple[RobotSpec, ...], cups: int, late: bool = False) -> None:
+        self.late = late
+        self.answers: list[Answer] = []
+        self.given_answers: list[Answer] = []
+        self.met: Counter[str] = Counter()
+        """How often answers came in ways that matter."""
         self.state = State()
         self.journal: list[bytes] = []
         self.documents: dict[str, Any] = {}
@@ -47,28 +61,29 @@ class FleetModel:
         """Robot of every attempt ever ordered."""
         self.started: dict[tuple[str, str, int], float] = {}
         """When each attempt was started."""
-        self.told: list[Report] = []
+        self.reports: list[Report] = []
         self._truth: dict[tuple[str, str], Value] = {}
-        self.tell(events.PlannerStarted, epoch=1, incarnation="one")
+        self.receive(events.PlannerStarted, epoch=1, incarnation="one")
         for place in PLACES:
-            self.tell(events.PlacePut, place=place)
+            self.receive(events.PlacePut, place=place)
         for number in range(1, cups + 1):
-            self.tell(events.ObjectPut, object=cup(number))
+            self.receive(events.ObjectPut, object=cup(number))
             self.learn(f"cup_{number}", "at", "kitchen")
         for spec in robots:
-            self.tell(events.RobotRegistered, spec=spec)
-            self.tell(events.WorkerConnected, robot=spec.robot, incarnation="i1")
+            self.receive(events.RobotRegistered, spec=spec)
+            self.receive(events.WorkerConnected, robot=spec.robot, incarnation="i1")
             self.learn(spec.robot, "holding", "nothing")
 
     # --- what happens to the planner -------------------------------------------------------------
 
-    def tell(self, kind: type[Event], **fields: Any) -> None:
-        """One event into the core; its effects are carried out, planning jobs at once."""
+    def receive(self, kind: type[Event], **fields: Any) -> None:
+        """One event into the core; its effects are carried out."""
         self.time_s += 1.0
         self.wall_s += 0.01
-        self._apply(kind(time_s=self.time_s, wall_time_s=self.wall_s, **fields))
+        self.apply(kind(time_s=self.time_s, wall_time_s=self.wall_s, **fields))
 
-    def _apply(self, event: Event) -> None:
+    def apply(self, event: Event) -> None:
+        """An event into the core, as it is."""
         before = self.state
         self.state, effects = step(before, event, SKILLS)
         if self.state is before:
@@ -94,17 +109,53 @@ class FleetModel:
                 self.documents.pop(effect.key.build(effect.address), None)
         for effect in effects:
             if isinstance(effect, MakePlan):
-                at = {"time_s": self.time_s, "wall_time_s": self.wall_s}
-                self._apply(run_planning_job(effect.job, self.state, PARTS, at))
+                answer = self.run(effect.job)
+                if self.late:
+                    self.answers.append(answer)
+                else:
+                    self.apply(answer)
+
+    def run(self, job: PlanningJob) -> Answer:
+        """What a planning job comes to, from the state as it is now."""
+        at = {"time_s": self.time_s, "wall_time_s": self.wall_s}
+        return run_planning_job(job, self.state, COMPOSITION, at)
+
+    def answer(self, pick: int = 0) -> None:
+        """One of the planning jobs under way is answered."""
+        answer = self.answers.pop(pick % len(self.answers))
+        self.given_answers.append(answer)
+        self.met["in another order"] += any(other.job < answer.job for other in self.answers)
+        self._count(answer)
+        self.apply(answer)
+
+    def answer_again(self, pick: int) -> None:
+        """An answer comes a second time."""
+        answer = self.given_answers[pick % len(self.given_answers)]
+        self.met["a second time"] += 1
+        before = self.state.plans
+        self.apply(answer)
+        assert self.state.plans == before, "a job was answered twice"
+
+    def _count(self, answer: Answer) -> None:
+        entries = [e for e in self.state.plans.values() if e.job and e.job.job == answer.job]
+        self.met["superseded"] += not entries
+        for entry in entries:
+            assert entry.job is not None
+            ended = [t for t in entry.job.under_way if entry.records[t].state not in OUTSTANDING]
+            self.met["work ended meanwhile"] += bool(ended)
+            self.met["another reason meanwhile"] += entry.replan != entry.job.reason
 
     def _check_order(self, order: Any) -> None:
         assert isinstance(order, Order)
         attempt = (order.plan, order.task, order.attempt)
+        new = attempt not in self.given
         assert self.given.setdefault(attempt, order.robot) == order.robot, (
             "an attempt changed hands"
         )
         entry = self.state.plans[order.plan]
         record = entry.records[order.task]
+        if new:
+            assert record.goal in (None, *self.state.goals), "ordered for a goal that is no more"
         for before in (*record.after, *record.behind):
             if before in entry.records:
                 assert entry.records[before].state.value == "succeeded", "ordered before its time"
@@ -123,20 +174,24 @@ class FleetModel:
         fact = Fact(
             subject=subject, relation=relation, value=value, source="test", time_s=self.time_s
         )
-        self.tell(events.FactPut, fact=fact)
+        self.receive(events.FactPut, fact=fact)
 
     def plan(self, *goals: Goal, **more: Any) -> None:
         """Put goals and ask for a plan for all that wait."""
         for goal in goals:
-            self.tell(events.GoalPut, goal=goal)
+            self.receive(events.GoalPut, goal=goal)
         number = sum(b"PlanRequested" in line for line in self.journal)
-        self.tell(events.PlanRequested, request=PlanRequest(request=f"r{number}", **more))
+        self.receive(events.PlanRequested, request=PlanRequest(request=f"r{number}", **more))
 
     # --- what robots do --------------------------------------------------------------------------
 
     def orders(self) -> list[Order]:
         """Orders that stand, in a fixed order."""
         return [d for _, d in sorted(self.documents.items()) if isinstance(d, Order)]
+
+    def goal_state(self, goal: str) -> GoalState:
+        """How a goal stands."""
+        return self.state.goal_states[goal].state
 
     def report(self, order: Order, state: ReportState, **more: Any) -> None:
         """A worker reports on an order."""
@@ -151,8 +206,8 @@ class FleetModel:
             state=state,
             **more,
         )
-        self.told.append(report)
-        self.tell(events.ReportReceived, report=report)
+        self.reports.append(report)
+        self.receive(events.ReportReceived, report=report)
 
     def start(self, order: Order) -> None:
         """A worker starts an attempt; nobody may ever start it again."""
@@ -191,6 +246,10 @@ class FleetModel:
         self.start(order)
         self.report(order, ReportState.FAILED, reason=reason, ended_s=self.time_s)
 
+    def cancelled(self, order: Order) -> None:
+        """A robot confirms that it does no more about an order."""
+        self.report(order, ReportState.CANCELLED)
+
     def interrupt(self, order: Order, done: bool) -> None:
         """A worker crashed in the middle and is back; the work was done, or it was not."""
         self.start(order)
@@ -199,34 +258,42 @@ class FleetModel:
 
     def lose(self, robot: str) -> None:
         """A robot goes away for so long that it counts as lost."""
-        self.tell(events.WorkerDisconnected, robot=robot, incarnation="i1")
+        self.receive(events.WorkerDisconnected, robot=robot, incarnation="i1")
         self.wall_s += Policy().lost_after_s + 1.0
-        self.tell(events.TimerFired)
+        self.receive(events.TimerFired)
 
     def return_(self, robot: str) -> None:
         """A robot comes back."""
-        self.tell(events.WorkerConnected, robot=robot, incarnation="i1")
+        self.receive(events.WorkerConnected, robot=robot, incarnation="i1")
 
     def finish(self, limit: int = 500) -> None:
-        """Robots carry out everything they are told, until there is no order left."""
+        """Jobs are answered and orders carried out, until there are none left."""
         for _ in range(limit):
-            orders = self.orders()
-            if not orders:
+            if self.answers:
+                self.answer()
+            elif orders := self.orders():
+                self.succeed(orders[0])
+            else:
                 return
-            self.succeed(orders[0])
         raise AssertionError("the plan does not come to an end")
 
     # --- the planner crashes ---------------------------------------------------------------------
 
     def crash(self) -> None:
-        """The planner is killed; its journal is replayed by a new run."""
+        """The planner is killed, and its jobs with it; its journal is replayed by a new run."""
+        self.answers.clear()
         state = State()
         for line in self.journal:
             state, _ = step(state, decode_event(line), SKILLS)
         assert state == self.state, "the journal replays to another state"
         self.state = state
-        self.tell(events.PlannerStarted, epoch=state.epoch + 1, incarnation="again")
+        self.receive(events.PlannerStarted, epoch=state.epoch + 1, incarnation="again")
         self._take(effects_of(self.state))
+
+
+def fleet() -> FleetModel:
+    """One robot with a hand, one with a basket, and two cups in the kitchen."""
+    return FleetModel((manipulator(), carrier()), cups=2)
 
 
 def check_revision(old: PlanEntry, new: PlanEntry) -> None:

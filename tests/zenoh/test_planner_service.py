@@ -29,7 +29,7 @@ from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanAddress, PlanState, Task
 from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
 from keyexpr_schema.payloads.robots import AliveAddress, RobotAddress
-from keyexpr_schema.payloads.service import PlannerAddress
+from keyexpr_schema.payloads.system import PlannerAddress
 from keyexpr_schema.payloads.tasks import OrderAddress
 from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.session import SessionConfig, open_session

@@ -15,8 +15,11 @@ from pathlib import Path
 import pytest
 
 from fleet.timeline import viewer
+from fleet.timeline.drawing.sink import free_port
 from fleet.timeline.errors import UnreadableRecording
+from fleet.timeline.process import run_recorder
 from fleet.timeline.reader import Row, rows, summary
+from keyexpr_schema.errors import Unreachable
 from keyexpr_schema.keyspace import GOAL_SPEC, SIM_CLOCK, SIM_FRAMES, TASK_RECORD
 from keyexpr_schema.payloads.goals import Goal, GoalAddress
 from keyexpr_schema.payloads.simulation import Frame, Frames, SimAddress, SimClock
@@ -172,10 +175,6 @@ async def test_a_viewer_can_look_on_while_it_records(router, session_config, tmp
 
 
 def test_without_a_router_the_recorder_says_so(tmp_path):
-    from fleet.timeline.drawing.sink import free_port
-    from fleet.timeline.process import run_recorder
-    from keyexpr_schema.errors import Unreachable
-
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with pytest.raises(Unreachable, match=endpoint):
         run_recorder((endpoint,), "robotfleet", tmp_path / "x.rrd", connect_timeout_s=0.3)

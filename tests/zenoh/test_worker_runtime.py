@@ -410,7 +410,7 @@ async def test_a_hand_takes_one_thing_and_takes_it_once(
     fleet_of: MakeFleet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Nobody is going to answer: no need to wait ten seconds for it, three times.
-    monkeypatch.setattr(sys.modules["workers.skills.place_on_robot"], "WORD_S", 0.1)
+    monkeypatch.setattr(sys.modules["workers.skills.place_on_robot"], "STATE_S", 0.1)
     async with fleet_of() as fleet, fleet.worker("hsr"):
         first = await fleet.order("hsr", "t1", "pick", object="cup_1", place="kitchen")
         assert (await fleet.report(first)).state is ReportState.SUCCEEDED

@@ -56,7 +56,7 @@ class Unsent:
 
 
 class Journal:
-    """Orders, attempts and unsent words of one robot. Use it as a context manager.
+    """Orders, attempts and unsent facts and reports of one robot. Use it as a context manager.
 
     `ledger` holds the same attempts in memory; the journal keeps the two in step. At opening,
     attempts that were queued are forgotten: their orders, if they still stand, arrive again.
@@ -162,7 +162,7 @@ class Journal:
                 self._send(payload)
 
     def unsent(self) -> Unsent | None:
-        """The oldest word that waits to be sent.
+        """The oldest fact or report that waits to be sent.
 
         A report with a later one of the same attempt behind it is passed over and forgotten.
         """
@@ -180,7 +180,7 @@ class Journal:
             self.sent(number)
 
     def sent(self, number: int) -> None:
-        """The word was read back from the store."""
+        """It was read back from the store."""
         self._connection.execute("DELETE FROM outbox WHERE number=?", (number,))
 
     @property

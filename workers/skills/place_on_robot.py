@@ -10,9 +10,9 @@ from workers.context import SkillContext
 from workers.errors import SkillFailed
 from workers.skill_registry import ParameterKind, skill
 
-WORD_S = 10.0
-"""Wall seconds to wait for the carrier's worker to say where it stands or what it carries."""
-FIRST_WORD_S = 1.0
+STATE_S = 10.0
+"""Wall seconds to wait for a state of the carrier: where it stands, what it carries."""
+FIRST_STATE_S = 1.0
 """Wall seconds to wait for it before looking into the basket oneself."""
 STOOD_STILL_M = 0.05
 MOST_APPROACHES = 3
@@ -61,13 +61,13 @@ async def _stand_beside(ctx: SkillContext, carrier: str, place: str) -> None:
 
 
 async def _stands_at(ctx: SkillContext, carrier: str, place: str) -> PointM:
-    """Where the carrier stands, by its own worker's word."""
+    """Where the carrier stands, by the state that its worker publishes."""
 
     def there() -> bool:
         state = ctx.robot_state(carrier)
         return state is not None and state.pose_m_rad is not None and state.place == place
 
-    if not await ctx.world.until(there, WORD_S):
+    if not await ctx.world.until(there, STATE_S):
         state = ctx.robot_state(carrier)
         if state is None or state.pose_m_rad is None:
             raise SkillFailed(f"{carrier} does not say where it is: is its worker running?")
@@ -83,14 +83,14 @@ async def _stands_at(ctx: SkillContext, carrier: str, place: str) -> PointM:
 
 async def _arrived(ctx: SkillContext, object: str, carrier: str) -> bool:
     """Whether the object is in the basket: by the carrier's sensor, or by one's own eyes."""
-    if await ctx.world.until(lambda: _in_basket(ctx, object, carrier), FIRST_WORD_S):
+    if await ctx.world.until(lambda: _in_basket(ctx, object, carrier), FIRST_STATE_S):
         return True
     seen = {d.object: d for d in await ctx.look()}.get(object)
     if seen is not None:
         where = ctx.world.whereabouts(seen)
         ctx.observe(AT, object, where)
         return where == carrier
-    if await ctx.world.until(lambda: _in_basket(ctx, object, carrier), WORD_S):
+    if await ctx.world.until(lambda: _in_basket(ctx, object, carrier), STATE_S):
         return True
     ctx.observe(AT, object, None)
     return False

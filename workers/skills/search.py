@@ -13,14 +13,14 @@ from workers.skills.viewing import Viewing
 
 @skill("search", parameters={"place": ParameterKind.PLACE})
 async def search(ctx: SkillContext, place: str) -> None:
-    """Look all over a place and learn what lies in it.
+    """Look all over a place and observe what lies in it.
 
-    What was believed to lie here and was not seen becomes *unknown*, but only if every part of
+    What was expected to lie here and was not seen becomes *unknown*, but only if every part of
     the place came into the camera's range.
     """
     await ctx.be_in(place)
     viewing = Viewing.of(ctx.world.places[place], ctx.spec)
-    believed = set(ctx.world.objects_at(place))
+    expected = set(ctx.world.objects_at(place))
     found: dict[str, str | None] = {}
     async with aclosing(looks(ctx, viewing)) as every:
         async for seen in every:
@@ -31,7 +31,7 @@ async def search(ctx: SkillContext, place: str) -> None:
         if where is not None:
             ctx.observe(AT, thing, where)
     if viewing.complete:
-        for missing in sorted(believed - set(found)):
+        for missing in sorted(expected - set(found)):
             ctx.observe(AT, missing, None)
     await ctx.be_in(place)
     ctx.observe(SEARCHED, place, True)

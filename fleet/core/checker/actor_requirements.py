@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, field
 
 from fleet.core.model.skills import Action
@@ -40,7 +40,7 @@ class Candidates:
     def __init__(
         self,
         requirements: Mapping[str, Requirement],
-        leaves: Mapping[str, frozenset[Left]],
+        leaves: Mapping[str, Set[Left]],
         world: WorldModel,
     ) -> None:
         """`leaves` has for every actor the facts that it leaves of its robot."""
@@ -62,7 +62,7 @@ class Candidates:
                 if not missing:
                     offered[robot] |= {
                         (relation, value)
-                        for relation, value in leaves.get(actor, frozenset())
+                        for relation, value in leaves.get(actor, ())
                         if not isinstance(value, str) or world.kind_of(value) is None
                     }
         self.able: dict[str, tuple[str, ...]] = {

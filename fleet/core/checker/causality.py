@@ -6,7 +6,7 @@ The criterion is that of `fleet.core.checker.checked_plan`.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from fleet.core.checker.actor_requirements import Requirement
 from fleet.core.checker.quantities import BasketLoads
@@ -128,13 +128,12 @@ class Causality:
             for relation, (value, _) in requirement.facts.items():
                 final[FactKey(relation, actor)] = value
         for variable, rows in self._writers.items():
-            final[variable] = _agreed(
-                [
-                    value
-                    for writer, value in rows
-                    if not any(self._graph.precedes(writer, other) for other, _ in rows)
-                ]
-            )
+            last = {
+                value
+                for writer, value in rows
+                if not any(self._graph.precedes(writer, other) for other, _ in rows)
+            }
+            final[variable] = last.pop() if len(last) == 1 else None
         pinned = {actor_arg(actor): robot for actor, robot in self._plan.pins.items()}
         for variable in self._writers:
             value = final[variable]
@@ -143,7 +142,3 @@ class Causality:
             if variable.subject in pinned:
                 final[FactKey(variable.relation, pinned[variable.subject])] = value
         return final
-
-
-def _agreed(values: Sequence[Value]) -> Value:
-    return values[0] if all(value == values[0] for value in values) else None

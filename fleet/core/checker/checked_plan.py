@@ -14,8 +14,10 @@ will be it. The same check on the allocated plan takes robots for actors.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import ClassVar
 
 import msgspec
@@ -26,7 +28,7 @@ from fleet.core.checker.form import PlanForm
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import Cycle, TaskGraph
 from fleet.core.model.world import WorldModel
-from keyexpr_schema.facts import Value
+from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.ids import actor_arg, actor_in
 from keyexpr_schema.payloads.plans import Making, Plan, Violation
 
@@ -47,7 +49,12 @@ class CheckedPlan:
     able: Mapping[str, tuple[str, ...]]
     violations: ClassVar[tuple[Violation, ...]] = ()
 
-    def made_by(self, making: Making, strategy: str) -> CheckedPlan:
+    @cached_property
+    def effects(self) -> Mapping[FactKey, Value]:
+        """What tasks make of each variable; of several, the last in the graph's order."""
+        return _effects(self.graph, self.actions)
+
+    def with_making(self, making: Making, strategy: str) -> CheckedPlan:
         """The same plan, saying how it was made; no check depends on that."""
         return replace(
             self, plan=msgspec.structs.replace(self.plan, making=making, strategy=strategy)
@@ -84,7 +91,7 @@ def check_plan(plan: Plan, world: WorldModel) -> CheckedPlan | InvalidPlan:
         for name, each in causality.requirements.items()
         if (actor := actor_in(name)) is not None
     }
-    candidates = Candidates(requirements, _leaves(graph, actions), world)
+    candidates = Candidates(requirements, _leaves(_effects(graph, actions)), world)
     violations = (*causality.violations, *_actors_without_robot(candidates))
     able = {actor: candidates.able[actor] for actor in plan.actors}
     if violations:
@@ -130,14 +137,17 @@ def _read(
         return InvalidPlan(plan, world, (violation,))
 
 
-def _leaves(graph: TaskGraph, actions: Mapping[str, Action]) -> dict[str, frozenset[Left]]:
+def _effects(graph: TaskGraph, actions: Mapping[str, Action]) -> dict[FactKey, Value]:
+    return {key: value for task in graph.order for key, value in actions[task].after}
+
+
+def _leaves(effects: Mapping[FactKey, Value]) -> dict[str, set[Left]]:
     """What each actor leaves of its robot: its tasks have an order, and the last one holds."""
-    last: dict[str, dict[str, Value]] = {}
-    for task in graph.order:
-        for variable, value in actions[task].after:
-            if (actor := actor_in(variable.subject)) is not None:
-                last.setdefault(actor, {})[variable.relation] = value
-    return {actor: frozenset(rows.items()) for actor, rows in last.items()}
+    leaves: dict[str, set[Left]] = defaultdict(set)
+    for (relation, subject), value in effects.items():
+        if (actor := actor_in(subject)) is not None:
+            leaves[actor].add((relation, value))
+    return leaves
 
 
 def _actors_without_robot(candidates: Candidates) -> Iterable[Violation]:

@@ -9,7 +9,7 @@ from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import ReplanScope
 from fleet.core.state import State, put, without
-from fleet.core.updates import believe, set_goal, without_goal
+from fleet.core.updates import believe, cancel, set_entry, set_goal, without_goal
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, read_goal
 from keyexpr_schema.facts import AT, NOTHING, SEARCHED, Value
@@ -38,12 +38,12 @@ def goal_deleted(state: State, event: events.GoalDeleted, skills: Skills) -> Sta
         goals=without(state.goals, event.goal),
         goal_states=without(state.goal_states, event.goal),
     )
-    for plan, entry in state.plans.items():
+    for entry in state.plans.values():
         if event.goal in entry.plan.goals and not entry.ended:
             rest = without_goal(state, entry.plan, event.goal)
-            entry = replace(entry, plan=rest, cancelling=entry.cancelling or not rest.goals)
+            entry = replace(entry, plan=rest)
             entry = entry.to_replan(ReplanScope.REALLOCATE, f"goal {event.goal} was deleted")
-            state = replace(state, plans=put(state.plans, plan, entry))
+            state = set_entry(state, entry) if rest.goals else cancel(state, entry)
     return state
 
 

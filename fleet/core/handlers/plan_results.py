@@ -12,9 +12,9 @@ from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanReason
 from fleet.core.revision.reconcile import reconcile
 from fleet.core.state import State, put, without
-from fleet.core.updates import answer, give_up, mark_goals, set_entry
+from fleet.core.updates import answer, give_up, mark_goals, set_entry, without_goal
 from keyexpr_schema.payloads.goals import GoalState
-from keyexpr_schema.payloads.plans import PlanState
+from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
 
@@ -34,8 +34,9 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded, skills: Sk
         return set_entry(state, replace(entry, job=None, replan=newer, team=team))
     for goal, reason in event.left_out.items():
         state = mark_goals(state, (goal,), GoalState.FAILED, entry.plan.plan, reason)
-    event = replace(event, plan=replace(event.plan, autostart=entry.start))
+    event = replace(event, plan=_for_goals_of_now(state, entry, job, event))
     revision = reconcile(entry, event, state.world(skills), frozenset(job.under_way))
+    added = (goal for goal in entry.plan.goals if goal not in job.goals)
     to = entry.state
     if first:
         to = PlanState.PROPOSED if state.policy.approval else PlanState.READY
@@ -43,7 +44,7 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded, skills: Sk
         to = PlanState.RUNNING
     entry = replace(
         entry,
-        plan=revision.plan,
+        plan=replace(revision.plan, goals=(*revision.plan.goals, *added)),
         outcome=event.outcome,
         state=to,
         records=revision.records,
@@ -61,8 +62,19 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded, skills: Sk
     )
     state = set_entry(state, entry)
     goal_state = GoalState.RUNNING if to is PlanState.RUNNING else GoalState.PLANNED
-    state = mark_goals(state, entry.plan.goals, goal_state, entry.plan.plan)
+    state = mark_goals(state, event.plan.goals, goal_state, entry.plan.plan)
     return answer(state, job.request, True, _made_sentence(event), entry.plan.plan)
+
+
+def _for_goals_of_now(
+    state: State, entry: PlanEntry, job: PlanningJob, event: events.PlanningSucceeded
+) -> Plan:
+    """The plan without goals that were taken out of it while it was being made."""
+    plan = replace(event.plan, autostart=entry.start)
+    for goal in event.plan.goals:
+        if goal in job.goals and goal not in entry.plan.goals:
+            plan = without_goal(state, plan, goal)
+    return plan
 
 
 def _as_it_was(entry: PlanEntry, job: PlanningJob, event: events.PlanningSucceeded) -> bool:
@@ -129,7 +141,7 @@ def planning_failed(state: State, event: events.PlanningFailed, skills: Skills) 
     )
     if entry is None or entry.job is None:
         return state
-    request = entry.job.request
+    request, newer = entry.job.request, _newer_reason(entry, entry.job)
     entry = replace(
         entry,
         job=None,
@@ -138,7 +150,7 @@ def planning_failed(state: State, event: events.PlanningFailed, skills: Skills) 
     )
     if entry.amendment is not None:
         # The plan as it was still stands; only the addition is refused.
-        entry = replace(entry, amendment=None, amendment_request=None, replan=None)
+        entry = replace(entry, amendment=None, amendment_request=None, replan=newer)
         state = set_entry(state, entry)
         sentence = f"the task was not added: {event.reason}"
         return answer(state, request, False, sentence, entry.plan.plan, event.violations)

@@ -10,16 +10,33 @@ from fleet.core import events
 from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanScope
 from fleet.core.state import State, put, without
-from fleet.core.updates import active_plan_of, answer, mark_goals, set_entry
+from fleet.core.updates import active_plan_of, answer, cancel, mark_goals, set_entry
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState, Task
-from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest
+from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest, ReplanRequest
 
 
 def plan_requested(state: State, event: events.PlanRequested, skills: Skills) -> State:
     """Start to plan for the goals asked for, or say why not."""
     return _start_planning(state, event.request)
+
+
+def plan_waiting_goals(state: State) -> State:
+    """Goals that wait go into the running plan, or, where none runs, into a new one."""
+    waiting = tuple(g for g in _waiting_goals(state) if state.goal_states[g].reason is None)
+    if not waiting:
+        return state
+    if any(entry.state is PlanState.PLANNING for entry in state.plans.values()):
+        return state  # what comes meanwhile goes into the plan that is being made
+    for entry in state.plans.values():
+        if entry.state is PlanState.RUNNING and not entry.cancelling:
+            goals = (*entry.plan.goals, *waiting)
+            entry = replace(entry, plan=replace(entry.plan, goals=goals))
+            reason = f"{', '.join(waiting)} came up"
+            return set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason))
+    request = PlanRequest(request=f"auto-{state.jobs + 1}", goals=waiting)
+    return _start_planning(state, request, partial=True)
 
 
 def _start_planning(state: State, ask: PlanRequest, partial: bool = False) -> State:
@@ -36,24 +53,8 @@ def _start_planning(state: State, ask: PlanRequest, partial: bool = False) -> St
     goals = ask.goals or tuple(_waiting_goals(state))
     if reason := _why_not_plan(state, ask.plan, goals):
         return answer(state, ask.request, False, reason)
-    name = ask.plan or _new_plan_name(state)
-    job = PlanningJob(
-        job=state.jobs + 1,
-        plan=name,
-        revision=1,
-        goals=goals,
-        strategy=ask.strategy,
-        planner=ask.planner,
-        allocator=ask.allocator,
-        first_task=1,
-        request=ask.request,
-        dry_run=ask.dry_run,
-        partial=partial,
-    )
-    if ask.dry_run:
-        return replace(state, jobs=job.job, previews=put(state.previews, ask.request, job))
-    empty = Plan(
-        plan=name,
+    plan = Plan(
+        plan=ask.plan or _new_plan_name(state),
         goals=goals,
         conditions=(),
         tasks=(),
@@ -62,8 +63,29 @@ def _start_planning(state: State, ask: PlanRequest, partial: bool = False) -> St
         allocator=ask.allocator,
         autostart=ask.start,
     )
+    job = _first_job(state, plan, ask.planner)
+    job = replace(job, request=ask.request, dry_run=ask.dry_run, partial=partial)
+    if ask.dry_run:
+        return replace(state, jobs=job.job, previews=put(state.previews, ask.request, job))
+    return _planning(state, plan, job)
+
+
+def _first_job(state: State, plan: Plan, planner: str) -> PlanningJob:
+    return PlanningJob(
+        job=state.jobs + 1,
+        plan=plan.plan,
+        revision=plan.revision,
+        goals=plan.goals,
+        strategy=plan.strategy,
+        planner=planner,
+        allocator=plan.allocator,
+        first_task=1,
+    )
+
+
+def _planning(state: State, plan: Plan, job: PlanningJob) -> State:
     entry = PlanEntry(
-        plan=empty, state=PlanState.PLANNING, planner=ask.planner, start=ask.start, job=job
+        plan=plan, state=PlanState.PLANNING, planner=job.planner, start=plan.autostart, job=job
     )
     return set_entry(replace(state, jobs=job.job), entry)
 
@@ -108,19 +130,7 @@ def plan_proposed(state: State, event: events.PlanProposed, skills: Skills) -> S
     plan = event.plan
     if plan.plan in state.plans or plan.plan in state.past_plans:
         return state
-    job = PlanningJob(
-        job=state.jobs + 1,
-        plan=plan.plan,
-        revision=plan.revision,
-        goals=plan.goals,
-        strategy=plan.strategy,
-        planner="symbolic",
-        allocator=plan.allocator,
-        first_task=1,
-        proposal=plan,
-    )
-    entry = PlanEntry(plan=plan, state=PlanState.PLANNING, start=plan.autostart, job=job)
-    return set_entry(replace(state, jobs=job.job), entry)
+    return _planning(state, plan, replace(_first_job(state, plan, "symbolic"), proposal=plan))
 
 
 def replan_requested(state: State, event: events.ReplanRequested, skills: Skills) -> State:
@@ -128,16 +138,9 @@ def replan_requested(state: State, event: events.ReplanRequested, skills: Skills
     ask = event.request
     if ask.request in state.answers:
         return state
-    entry = state.plans.get(ask.plan)
-    if entry is None:
-        return answer(state, ask.request, False, _no_plan(state, ask.plan))
-    if entry.state is not PlanState.RUNNING:
-        sentence = f"plan {ask.plan} is {entry.state.value}, not running"
-        return answer(state, ask.request, False, sentence)
-    if entry.cancelling:
-        return answer(state, ask.request, False, f"plan {ask.plan} is being cancelled")
-    if ask.goals and (reason := _why_not_plan(state, None, ask.goals)):
-        return answer(state, ask.request, False, reason)
+    entry = _entry_to_replan(state, ask)
+    if isinstance(entry, str):
+        return answer(state, ask.request, False, entry)
     goals = tuple(dict.fromkeys([*entry.plan.goals, *ask.goals]))
     # What a person asks for is no sign that the world does not go along: counting begins anew.
     entry = replace(entry, plan=replace(entry.plan, goals=goals), fruitless_replans=0)
@@ -145,21 +148,16 @@ def replan_requested(state: State, event: events.ReplanRequested, skills: Skills
     return answer(state, ask.request, True, f"plan {ask.plan} is made again", ask.plan)
 
 
-def plan_waiting_goals(state: State) -> State:
-    """Goals that wait go into the running plan, or, where none runs, into a new one."""
-    waiting = tuple(g for g in _waiting_goals(state) if state.goal_states[g].reason is None)
-    if not waiting:
-        return state
-    if any(entry.state is PlanState.PLANNING for entry in state.plans.values()):
-        return state  # what comes meanwhile goes into the plan that is being made
-    for entry in state.plans.values():
-        if entry.state is PlanState.RUNNING and not entry.cancelling:
-            goals = (*entry.plan.goals, *waiting)
-            entry = replace(entry, plan=replace(entry.plan, goals=goals))
-            reason = f"{', '.join(waiting)} came up"
-            return set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason))
-    request = PlanRequest(request=f"auto-{state.jobs + 1}", goals=waiting)
-    return _start_planning(state, request, partial=True)
+def _entry_to_replan(state: State, ask: ReplanRequest) -> PlanEntry | str:
+    """The plan's entry, or a sentence on why it cannot be made again."""
+    entry = state.plans.get(ask.plan)
+    if entry is None:
+        return _no_plan(state, ask.plan)
+    if entry.state is not PlanState.RUNNING:
+        return f"plan {ask.plan} is {entry.state.value}, not running"
+    if entry.cancelling:
+        return f"plan {ask.plan} is being cancelled"
+    return (ask.goals and _why_not_plan(state, None, ask.goals)) or entry
 
 
 def _no_plan(state: State, plan: str) -> str:
@@ -174,24 +172,23 @@ def control_requested(state: State, event: events.ControlRequested, skills: Skil
     ):
         return state
     entry = state.plans.get(ask.plan)
-    if entry is None:
-        return answer(state, ask.request, False, _no_plan(state, ask.plan))
-    return _CONTROLS[ask.control](state, entry, ask)
+    done = _no_plan(state, ask.plan) if entry is None else _CONTROLS[ask.control](state, entry, ask)
+    return answer(state, ask.request, False, done) if isinstance(done, str) else done
 
 
-def _start(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
+def _start(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if entry.state is not PlanState.READY:
-        sentence = f"plan {ask.plan} is {entry.state.value}; only a ready plan can be started"
-        return answer(state, ask.request, False, sentence)
-    state = set_entry(state, replace(entry, state=PlanState.RUNNING, start=True))
-    state = mark_goals(state, entry.plan.goals, GoalState.RUNNING, ask.plan)
-    return answer(state, ask.request, True, f"plan {ask.plan} is running", ask.plan)
+        return f"plan {ask.plan} is {entry.state.value}; only a ready plan can be started"
+    return _release(state, replace(entry, start=True), ask)
 
 
-def _approve(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
+def _approve(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if entry.state is not PlanState.PROPOSED:
-        sentence = f"plan {ask.plan} is {entry.state.value}; only a proposed plan is approved"
-        return answer(state, ask.request, False, sentence)
+        return f"plan {ask.plan} is {entry.state.value}; only a proposed plan is approved"
+    return _release(state, entry, ask)
+
+
+def _release(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
     to = PlanState.RUNNING if entry.start else PlanState.READY
     state = set_entry(state, replace(entry, state=to))
     if entry.start:
@@ -199,45 +196,35 @@ def _approve(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
     return answer(state, ask.request, True, f"plan {ask.plan} is {to.value}", ask.plan)
 
 
-def _cancel(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
+def _cancel(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if entry.ended:
-        return answer(state, ask.request, False, f"plan {ask.plan} is {entry.state.value}")
-    waiting = entry.job.request if entry.job is not None else None
-    state = answer(state, waiting, False, f"plan {ask.plan} was cancelled while it was made")
-    state = set_entry(state, replace(entry, cancelling=True, job=None))
-    return answer(state, ask.request, True, f"plan {ask.plan} is being cancelled", ask.plan)
+        return f"plan {ask.plan} is {entry.state.value}"
+    sentence = f"plan {ask.plan} is being cancelled"
+    return answer(cancel(state, entry), ask.request, True, sentence, ask.plan)
 
 
-def _delete(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
+def _delete(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if not entry.ended and entry.state not in (PlanState.READY, PlanState.PROPOSED):
-        sentence = f"plan {ask.plan} is {entry.state.value}; cancel it before deleting it"
-        return answer(state, ask.request, False, sentence)
+        return f"plan {ask.plan} is {entry.state.value}; cancel it before deleting it"
     state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None)
     state = replace(state, plans=without(state.plans, ask.plan))
     return answer(state, ask.request, True, f"plan {ask.plan} is deleted")
 
 
-def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
+def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if entry.state not in (PlanState.READY, PlanState.RUNNING):
-        sentence = f"plan {ask.plan} is {entry.state.value}; tasks go to ready or running plans"
-        return answer(state, ask.request, False, sentence)
+        return f"plan {ask.plan} is {entry.state.value}; tasks go to ready or running plans"
     if ask.skill is None:
-        return answer(state, ask.request, False, "the request names no skill for the new task")
+        return "the request names no skill for the new task"
     if entry.amendment is not None or entry.job is not None:
-        sentence = f"plan {ask.plan} is being changed; add the task when that is done"
-        return answer(state, ask.request, False, sentence)
+        return f"plan {ask.plan} is being changed; add the task when that is done"
     for before in ask.after:
         if before not in entry.records:
-            sentence = (
-                f"the new task cannot wait for {before}: plan {ask.plan} has "
-                f"{', '.join(entry.records) or 'no tasks'}"
-            )
-            return answer(state, ask.request, False, sentence)
+            tasks = ", ".join(entry.records) or "no tasks"
+            return f"the new task cannot wait for {before}: plan {ask.plan} has {tasks}"
     if "robot" in ask.args:
-        sentence = (
-            f"name the robot that does it as the request's robot, not as robot={ask.args['robot']}"
-        )
-        return answer(state, ask.request, False, sentence)
+        robot = ask.args["robot"]
+        return f"name the robot that does it as the request's robot, not as robot={robot}"
     number = entry.next_task_number
     task = Task(
         task=f"t{number}",
@@ -247,12 +234,8 @@ def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State:
         after=ask.after,
     )
     pins = put(entry.plan.pins, task.actor, ask.robot) if ask.robot else entry.plan.pins
-    entry = replace(
-        entry,
-        plan=replace(entry.plan, pins=pins),
-        amendment=task,
-        amendment_request=ask.request,
-    )
+    plan = replace(entry.plan, pins=pins)
+    entry = replace(entry, plan=plan, amendment=task, amendment_request=ask.request)
     return set_entry(state, entry.to_replan(ReplanScope.REPAIR, f"task {task.task} is added"))
 
 

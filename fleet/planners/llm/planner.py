@@ -56,7 +56,7 @@ class LlmPlanner(Planner):
             log.exception("planning by language model")
             made = GivenUp(f"reading the answer failed: {error or type(error).__name__}")
         if isinstance(made, CheckedPlan):
-            return made.made_by(budget.making(self.name), problem.strategy)
+            return made.with_making(budget.making(self.name), problem.strategy)
         return self._fall_back(problem, made, budget)
 
     def _propose(self, problem: PlanningProblem, budget: Budget) -> CheckedPlan | GivenUp:
@@ -132,7 +132,7 @@ class LlmPlanner(Planner):
             )
         making = budget.making(self._fallback.name, failed.reason)
         # The strategy stays what was asked for: a new revision asks the model again.
-        return made.made_by(making, problem.strategy)
+        return made.with_making(making, problem.strategy)
 
 
 def _open_goals(problem: PlanningProblem) -> list[Goal]:

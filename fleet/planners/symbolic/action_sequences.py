@@ -49,14 +49,6 @@ class Subgoal:
 
 
 @dataclass(frozen=True)
-class Alternatives:
-    """Action sequences to choose one of, the cheapest first, and the facts after that one."""
-
-    sequences: tuple[ActionSequence, ...]
-    facts: Facts
-
-
-@dataclass(frozen=True)
 class Exploration:
     """Action sequences that are all needed to find one of `seeks`, and what they make true."""
 
@@ -87,8 +79,9 @@ def subgoals_in_order(problem: PlanningProblem, facts: Mapping[FactKey, Value]) 
 
 def alternatives_for(
     subgoal: Subgoal, facts: Facts, world: WorldModel, settled: frozenset[str] = frozenset()
-) -> Alternatives | None:
-    """Different sequences for a subgoal, or `None` where there is none.
+) -> tuple[tuple[ActionSequence, ...], Facts] | None:
+    """Different sequences for a subgoal, the cheapest first, and the facts after that one; `None`
+    where there is none.
 
     Where a robot stands is left open at the start, so that every actor begins with the way to its
     work, whatever its robot does before; `settled` robots are taken to be where `facts` say.
@@ -109,7 +102,7 @@ def alternatives_for(
         named = frozenset(robot for robot in world.robots if robot in spoken_of)
         content = tuple(_signature(action) for action in result.actions)
         sequences.setdefault(content, ActionSequence(subgoal.goal, result.actions, named))
-    return Alternatives(tuple(sequences.values())[:ALTERNATIVES], found[0][0].facts)
+    return tuple(sequences.values())[:ALTERNATIVES], found[0][0].facts
 
 
 def _unloading_s(found: Solution, condition: Condition, world: WorldModel) -> float:
@@ -235,6 +228,6 @@ def exploration_for(subgoals: Sequence[Subgoal], problem: PlanningProblem) -> Ex
         condition = Condition(relation=SEARCHED, subject=place, value=True)
         found = alternatives_for(Subgoal(subgoals[0].goal, condition), facts, world)
         if found is not None:
-            sequences.append(found.sequences[0])
+            sequences.append(found[0][0])
             conditions.append(condition)
     return Exploration(tuple(sequences), tuple(conditions), seeks) if sequences else None

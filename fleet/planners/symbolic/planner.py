@@ -95,10 +95,10 @@ class _Reached:
         found = alternatives_for(subgoal, self.facts, self.problem.world, settled)
         if found is None:
             return False
-        self.options.append(found.sequences)
-        self.facts = found.facts
+        sequences, self.facts = found
+        self.options.append(sequences)
         if self.problem.strategy == MONOLITHIC:
-            for action in found.sequences[0].actions:
+            for action in sequences[0].actions:
                 self.settled.update(action.participants)
         return True
 
@@ -149,7 +149,7 @@ class _Candidate:
 
 def _cost(schedule: PlanSchedule, checked: CheckedPlan) -> Cost:
     unloading_s = UNLOADING_S * len(carried_at_end(checked))
-    return round(schedule.makespan_s + unloading_s, 3), schedule.work_s
+    return round(schedule.makespan_s + unloading_s, 3), sum(schedule.durations_s.values())
 
 
 def _choose(

@@ -9,8 +9,8 @@ from keyexpr_schema.facts import render_value
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus
 from keyexpr_schema.payloads.robots import RobotActivity, RobotSpec, RobotState
-from keyexpr_schema.payloads.service import UndecodableValue
 from keyexpr_schema.payloads.simulation import Truth
+from keyexpr_schema.payloads.system import UndecodableValue
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskRecord, TaskState, Try
 from keyexpr_schema.payloads.world import Fact
 
@@ -69,7 +69,7 @@ def plan_status(now: PlanStatus, before: PlanStatus | None) -> Iterator[Line]:
 
 
 def task_record(now: TaskRecord, before: TaskRecord | None) -> Iterator[Line]:
-    """A task ended badly, or changed hands. The rest is told by orders and reports."""
+    """A task ended badly, or changed hands. Orders and reports have the rest."""
     if before is not None and before.robot and now.robot and before.robot != now.robot:
         yield WARN, f"task {now.task} goes from {before.robot} to {now.robot}"
     if before is not None and before.state is now.state:
@@ -81,7 +81,7 @@ def task_record(now: TaskRecord, before: TaskRecord | None) -> Iterator[Line]:
 
 
 def order(now: Order, before: Order | None) -> Iterator[Line]:
-    """A robot was told to do or to stop something."""
+    """An order was given or cancelled."""
     fence = (now.epoch, now.revision, now.attempt)
     if before is None or (before.epoch, before.revision, before.attempt) != fence:
         attempt = f", attempt {now.attempt}" if now.attempt > 1 else ""
@@ -97,12 +97,12 @@ def tries(now: Report, before: Report | None, what: str) -> Iterator[tuple[float
     known = len(before.tries) if before is not None else 0
     for one in now.tries[known:]:
         if one.reason is not None:
-            said = f"{now.robot}: {what}, try {one.number} failed: {one.reason}"
-            yield one.ended_s, (WARN, said)
+            sentence = f"{now.robot}: {what}, try {one.number} failed: {one.reason}"
+            yield one.ended_s, (WARN, sentence)
 
 
 def report(now: Report, before: Report | None, what: str) -> Iterator[Line]:
-    """A robot said how an attempt at `what` stands."""
+    """A robot reported on an attempt at `what`."""
     if before is not None and before.state is now.state:
         return
     if now.state is ReportState.STARTED:
@@ -115,7 +115,7 @@ def report(now: Report, before: Report | None, what: str) -> Iterator[Line]:
 
 
 def fact(now: Fact, before: Fact | None) -> Iterator[Line]:
-    """Someone said something about the world that was not known so."""
+    """A fact that is new, or has another value."""
     if before is not None and before.value == now.value:
         return
     was = f" (was {render_value(before.value)})" if before is not None else ""

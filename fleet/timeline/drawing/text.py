@@ -2,7 +2,7 @@
 
 Rerun 0.41 brings one font (Inter). Drawn without a screen, the viewer does not put a box for a
 glyph that it lacks: it ends. So what is written into a recording to be looked at is kept to
-characters that were all tried. The keys still hold every word as it was said.
+characters that were all tried. The keys still hold every text as it was written.
 """
 
 from __future__ import annotations

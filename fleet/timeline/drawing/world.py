@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
-
 import rerun as rr
 
 from fleet.timeline.drawing.palette import Palette, Rgba
+from fleet.timeline.drawing.poses import Poses
 from fleet.timeline.drawing.shapes import Bounds, log_shapes
 from fleet.timeline.drawing.sink import Sink, entity
 from fleet.timeline.drawing.text import drawable
 from fleet.timeline.drawing.trails import Trail
-from keyexpr_schema.payloads.motions import PointM
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
-from keyexpr_schema.payloads.simulation import Body, Frame, QuaternionWxyz, Scene, ShapeKind
+from keyexpr_schema.payloads.simulation import Body, Frame, Scene, Shape, ShapeKind
 from keyexpr_schema.payloads.world import Place
 
 FRAME_STEP_S = 0.05
 """Frames closer together than this [s, fleet time] are thinned out: 20 a second look smooth."""
-
-ROWS = 400
-"""Rows of one body that are sent at once, at the latest."""
 
 LABEL_M = 0.6
 """How far over a robot its label hangs: seen from above, a lower one hides its arm."""
@@ -29,23 +23,7 @@ LABEL_M = 0.6
 ROBOT_TRAIL_M = 0.025
 OBJECT_TRAIL_M = 0.015
 
-_STILL_M = 0.0005
-_STILL_QUATERNION = 0.0005
 _STAND_IN_M = (0.2, 0.5)  # radius, height of a robot that no scene describes
-
-Pose = tuple[PointM, QuaternionWxyz]
-
-
-@dataclass
-class _Column:
-    """Poses of one body that wait to be sent, and the last one that was taken."""
-
-    path: str
-    last: Pose | None = None
-    sim_s: list[float] = field(default_factory=list)
-    wall_s: list[float] = field(default_factory=list)
-    points: list[PointM] = field(default_factory=list)
-    quaternions: list[tuple[float, float, float, float]] = field(default_factory=list)  # x y z w
 
 
 class World:
@@ -55,7 +33,7 @@ class World:
         self._sink = sink
         self._palette = palette
         self._bodies: dict[str, Body] = {}
-        self._columns: dict[str, _Column] = {}
+        self.poses = Poses(sink)
         self._roots: dict[str, str] = {}  # owner -> the body that stands for it
         self._specs: dict[str, RobotSpec] = {}
         self._trails: dict[str, Trail] = {}
@@ -73,10 +51,10 @@ class World:
         """Draw the fixed bodies and the shapes of the moving ones."""
         if scene == self._scene:
             return
-        self.flush()
+        self.poses.flush()
         self._scene = scene
         self._bodies = {body.body: body for body in scene.bodies}
-        self._columns.clear()
+        self.poses.clear()
         self._roots.clear()
         for body in scene.bodies:
             fixed = scene.fixed.get(body.body)
@@ -150,22 +128,9 @@ class World:
             return
         self._frame_s = frame.time_s
         for name, pose in frame.poses.items():
-            column = self._columns.get(name)
-            if column is None:
-                body = self._bodies.get(name)
-                owner = (body.owner if body else None) or "world"
-                column = _Column(entity("world", "bodies", owner, name))
-                self._columns[name] = column
-            if column.last is not None and _still(column.last, pose):
-                continue
-            column.last = pose
-            point, (w, x, y, z) = pose
-            column.sim_s.append(frame.time_s)
-            column.wall_s.append(wall_s)
-            column.points.append(point)
-            column.quaternions.append((x, y, z, w))
-            if len(column.sim_s) >= ROWS:
-                self._send(column)
+            body = self._bodies.get(name)
+            owner = (body.owner if body else None) or "world"
+            self.poses.take(name, owner, pose, frame.time_s, wall_s)
         for owner, root in self._roots.items():
             there = frame.poses.get(root)
             if there is not None:
@@ -207,7 +172,7 @@ class World:
         """Write over the robot what it is called, and what it does (`None`: nothing)."""
         root = self._roots.get(robot)
         if root is None and robot not in self._stand_ins:
-            return  # nobody has said where it is
+            return  # its pose is not known
         path = entity("world", "bodies", robot, root) if root else entity("world", "robots", robot)
         spec = self._specs.get(robot)
         name = (spec.label if spec else "") or robot
@@ -229,28 +194,11 @@ class World:
             wall_s,
         )
 
-    def flush(self, at_least: int = 1) -> None:
-        """Send the poses that wait, of bodies with `at_least` so many."""
-        for column in self._columns.values():
-            if len(column.sim_s) >= at_least:
-                self._send(column)
-
     def _relabel(self) -> None:
         for robot in self._specs:
             self.robot_label(robot, self._doing.get(robot), self._sink.clock.now_s, None)
 
     # --- inside --------------------------------------------------------------------------------
-    def _send(self, column: _Column) -> None:
-        if not column.sim_s:
-            return
-        self._sink.columns(
-            column.path,
-            column.sim_s,
-            column.wall_s,
-            rr.Transform3D.columns(translation=column.points, quaternion=column.quaternions),
-        )
-        column.sim_s, column.wall_s, column.points, column.quaternions = [], [], [], []
-
     def _trail(self, owner: str) -> Trail:
         trail = self._trails.get(owner)
         if trail is None:
@@ -271,35 +219,23 @@ class World:
 
     def _height(self, robot: str) -> float:
         """Height [m] of a robot's highest shape over its root, as far as its frames tell."""
-        root = self._columns.get(self._roots.get(robot, ""))
-        base = root.last[0][2] if root is not None and root.last is not None else 0.0
+        root = self.poses.last(self._roots.get(robot, ""))
+        base = root[0][2] if root is not None else 0.0
         tops = [0.3]
         for name, body in self._bodies.items():
-            column = self._columns.get(name)
-            if body.owner == robot and column is not None and column.last is not None:
-                tops.append(column.last[0][2] - base + max(map(_top, _sizes(body)), default=0.0))
+            pose = self.poses.last(name)
+            if body.owner == robot and pose is not None:
+                tops.append(pose[0][2] - base + max(map(_top, body.shapes), default=0.0))
         # Kept from one call to the next, or the label would dance with the arm.
         self._heights[robot] = max(self._heights.get(robot, 0.0), *tops)
         return self._heights[robot]
 
 
-def _sizes(body: Body) -> Iterable[tuple[float, float]]:
-    for shape in body.shapes:
-        a, b, c = shape.size_m
-        half = {ShapeKind.BOX: c, ShapeKind.CYLINDER: b, ShapeKind.SPHERE: a}.get(shape.kind, a + b)
-        yield shape.point_m[2], half
-
-
-def _top(size: tuple[float, float]) -> float:
-    return size[0] + size[1]
-
-
-def _still(last: Pose, now: Pose) -> bool:
-    if last == now:
-        return True
-    moved = max(abs(a - b) for a, b in zip(last[0], now[0], strict=True))
-    turned = max(abs(a - b) for a, b in zip(last[1], now[1], strict=True))
-    return moved < _STILL_M and turned < _STILL_QUATERNION
+def _top(shape: Shape) -> float:
+    """How high a shape reaches over its body's origin, m, if the body stands upright."""
+    a, b, c = shape.size_m
+    half = {ShapeKind.BOX: c, ShapeKind.CYLINDER: b, ShapeKind.SPHERE: a}.get(shape.kind, a + b)
+    return shape.point_m[2] + half
 
 
 _TINTS: tuple[Rgba, ...] = (
@@ -309,4 +245,4 @@ _TINTS: tuple[Rgba, ...] = (
     (90, 70, 88, 255),
     (78, 78, 82, 255),
 )
-"""Floors of places, in the order in which those are told of."""
+"""Floors of places, in the order in which those come."""

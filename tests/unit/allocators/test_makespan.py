@@ -46,11 +46,10 @@ def test_it_is_no_longer_than_the_balanced_plan_and_says_how_far_from_optimal() 
     balanced = allocated(MinMaxLoadAllocator(TieBreak.TRAVEL), plan, world)
     found = allocated(QUICK, plan, world)
     assert found.schedule.makespan_s <= balanced.schedule.makespan_s + 1e-6
-    assert found.lower_bound_s is not None and found.gap is not None
-    assert found.lower_bound_s <= found.schedule.makespan_s + 1e-6
-    assert 0.0 <= found.gap < 1.0
+    assert found.lower_bound_s is not None
+    assert 0.0 < found.lower_bound_s <= found.schedule.makespan_s + 1e-6
     assert found.notes
-    assert balanced.lower_bound_s is None and balanced.gap is None
+    assert balanced.lower_bound_s is None
 
 
 def test_the_same_question_has_the_same_answer_where_it_is_settled_at_once() -> None:

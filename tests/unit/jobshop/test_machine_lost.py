@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from benchmarks.allocation.shops import random_shop
+from benchmarks.allocation.shops import random_shop, with_under_way, without_machines
 from fleet.jobshop.instance import Instance
 from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.portfolio import solve
-from fleet.jobshop.rescheduling import WITHIN, reschedule, without_machines
+from fleet.jobshop.rescheduling import WITHIN, reschedule
 from tests.support.searches import steps
 
 
@@ -33,15 +33,15 @@ def test_work_under_way_stays_and_comes_first() -> None:
     before = solve(shop, steps(0.1), exact=False)
     assert before is not None
     first = {before.machine_of[b]: b for b in reversed(before.order)}
-    frozen = frozenset(
+    begun = frozenset(
         block
         for machine, block in first.items()
         if machine != 1 and len(shop.blocks[block].operations) == 1
     )
-    left = without_machines(shop, frozenset({1}))
-    found = reschedule(left, before.machine_of, before.order, steps(0.3), frozen)
-    assert found is not None and frozen
-    for block in frozen:
+    left = with_under_way(without_machines(shop, frozenset({1})), before.machine_of, begun)
+    found = reschedule(left, before.machine_of, before.order, steps(0.3))
+    assert found is not None and begun
+    for block in begun:
         machine = before.machine_of[block]
         assert found.schedule.machine_of[block] == machine
         mine = [b for b in found.schedule.order if found.schedule.machine_of[b] == machine]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from fleet.core.model.task_graph import TaskGraph
@@ -96,3 +98,22 @@ def test_a_robot_that_the_plan_names_may_also_be_an_actor() -> None:
     schedule = allocated.valid_schedule()
     assert isinstance(schedule, PlanSchedule), schedule
     assert schedule.start_s["put"] >= schedule.end_s["turn"]
+
+
+def test_a_robot_that_the_plan_names_and_that_is_away_takes_no_time() -> None:
+    calls = (
+        ("go", "navigate", (), {"to": "kitchen"}),
+        ("pick", "pick", ("go",), CUP),
+        ("give", "place_on_robot", ("pick",), {**CUP, "carrier": "cart_1"}),
+    )
+    there = fact("cart_1", "at", "kitchen")
+    world = home((manipulator("arm_1"), carrier("cart_1")), facts=(there,))
+    tasks = tuple(
+        Task(task=t, skill=skill, actor="arm", after=after, args={"robot": "?arm", **args})
+        for t, skill, after, args in calls
+    )
+    plan = Plan(plan="p", goals=(), conditions=(), tasks=tasks)
+    away = replace(world, available=frozenset({"arm_1"}))
+    found = AllocatedPlan(checked(plan, away), {"arm": "arm_1"}).valid_schedule()
+    assert isinstance(found, PlanSchedule)
+    assert found.sequence == {"arm_1": ("arm",)}

@@ -20,8 +20,8 @@ from sim.navigation.steering import DECELERATION_M_S2, steer
 
 WORLD = load_mission("two-cups").world
 CLEARANCE = Clearance(WORLD)
-LATTICE = Lattice(WORLD, CLEARANCE)
-SPOTS = Spots(WORLD, LATTICE, CLEARANCE)
+SPOTS = Spots(WORLD)
+LATTICE = SPOTS.lattice
 
 
 def furnished(**changes: object) -> WorldFile:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from fleet.timeline.clock import Clock, wall_of
 from fleet.timeline.drawing.graph import Node, layout
-from fleet.timeline.drawing.lanes import Bar, Lane, call_text
+from fleet.timeline.drawing.lanes import Bar, Lane, Lanes, call_text
 from fleet.timeline.drawing.palette import Palette
 from fleet.timeline.drawing.sink import Sink, open_stream
 from fleet.timeline.drawing.text import DRAWN, drawable
@@ -135,8 +135,6 @@ def test_busy_time_is_never_counted_twice(
 
 def test_a_task_that_starts_as_another_ends_is_not_hidden(tmp_path: Path) -> None:
     """The planner's word on the next task can come before its word on the last one."""
-    from fleet.timeline.drawing.lanes import Lanes
-
     path = tmp_path / "lanes.rrd"
     stream = open_stream(path, "test")
     clock = Clock()

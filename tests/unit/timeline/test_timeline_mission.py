@@ -15,8 +15,8 @@ from fleet.timeline.recorder import Recorder
 from keyexpr_schema import keyspace as keys
 from keyexpr_schema.payloads.plans import PlanAddress
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
-from keyexpr_schema.payloads.service import UndecodableAddress, UndecodableValue
 from keyexpr_schema.payloads.simulation import Frame, Frames, SimAddress, SimClock
+from keyexpr_schema.payloads.system import UndecodableAddress, UndecodableValue
 from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState, TaskAddress, TaskState
 from keyexpr_schema.payloads.world import Fact, FactAddress
 from tests.support.timeline_mission import (

@@ -13,7 +13,7 @@ from keyexpr_schema.keyspace import (
     PLANNER_ALIVE,
 )
 from keyexpr_schema.payloads.goals import GoalAddress, GoalState, GoalStatus
-from keyexpr_schema.payloads.service import PlannerAliveAddress
+from keyexpr_schema.payloads.system import PlannerAliveAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from tests.support.robotctl import Robotctl
 

@@ -15,7 +15,7 @@ from keyexpr_schema.keyspace import (
 )
 from keyexpr_schema.payloads.plans import Plan, PlanAddress, PlanState, PlanStatus, Task, Violation
 from keyexpr_schema.payloads.requests import Answer, RequestAddress
-from keyexpr_schema.payloads.service import PlannerAliveAddress
+from keyexpr_schema.payloads.system import PlannerAliveAddress
 from keyexpr_schema.payloads.tasks import TaskAddress, TaskRecord, TaskState
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from tests.support.robotctl import Robotctl

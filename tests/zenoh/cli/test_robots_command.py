@@ -12,7 +12,7 @@ from keyexpr_schema.keyspace import (
     ROBOT_STATE,
 )
 from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotAddress, RobotState
-from keyexpr_schema.payloads.service import PlannerAddress, PlannerStatus
+from keyexpr_schema.payloads.system import PlannerAddress, PlannerStatus
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from tests.support.robotctl import Robotctl
 

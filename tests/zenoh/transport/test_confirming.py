@@ -10,7 +10,7 @@ from keyexpr_schema.errors import UndecodablePayload
 from keyexpr_schema.keyspace import GOAL_SPEC, PLAN_REQUEST, STORE_JOURNAL
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
-from keyexpr_schema.payloads.service import StoreAddress, StoreQuery
+from keyexpr_schema.payloads.system import StoreAddress, StoreQuery
 from keyexpr_schema.transport.session import open_session
 from tests.support.polling import until
 from tests.support.session_values import goal, not_connected

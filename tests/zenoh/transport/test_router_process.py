@@ -179,7 +179,7 @@ async def test_a_list_of_two_routers_survives_the_death_of_the_first(router, tmp
                 router.kill()
                 await session.confirm(GOAL_SPEC, GoalAddress("g2"), goal("g2"), 10)
                 assert session.connected
-            assert store.get("robotfleet/goals/g2/spec") is not None
+            assert store.select("robotfleet/goals/g2/spec")
 
 
 def test_the_data_directory_is_made_where_it_is_asked_for(router: object, tmp_path: Path):

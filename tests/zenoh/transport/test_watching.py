@@ -90,8 +90,7 @@ async def test_a_deletion_that_a_watch_missed_is_found_by_listing(router, sessio
 
 def _delete_in_store(data_dir: Any, keyexpr: str) -> None:
     with SqliteStore(data_dir) as store:
-        known = store.get(keyexpr)
-        assert known is not None
+        [known] = store.select(keyexpr)
         assert store.apply([Write(keyexpr, known.stamp + (1 << 128), True, "", b"")]) == 1
 
 

@@ -11,7 +11,7 @@ from tests.support.household import manipulator
 
 def say(model: FleetModel, text: str) -> GoalStatus:
     number = len(model.state.goals) + 1
-    model.tell(events.GoalPut, goal=Goal(goal=f"g{number}", text=text, ordinal=number))
+    model.receive(events.GoalPut, goal=Goal(goal=f"g{number}", text=text, ordinal=number))
     return model.state.goal_states[f"g{number}"]
 
 
@@ -42,7 +42,7 @@ def test_what_a_goal_presumes_against_belief_is_told_and_not_believed() -> None:
 
 def test_what_a_thing_lies_on_is_forgotten_once_it_is_elsewhere() -> None:
     model = FleetModel((manipulator(),), 1)
-    model.tell(
+    model.receive(
         events.StatementPut,
         statement=Statement(statement="s1", text="Cup 1 is in the kitchen"),
     )

@@ -93,8 +93,8 @@ def test_what_a_lost_robot_had_in_its_hand_fails_that_goal_only() -> None:
 
 def test_a_goal_that_cannot_be_reached_any_more_does_not_end_the_others() -> None:
     model = running(robots=2, cups=3)
-    model.tell(events.ObjectDeleted, object="cup_3")
-    model.tell(
+    model.receive(events.ObjectDeleted, object="cup_3")
+    model.receive(
         events.ReplanRequested, request=ReplanRequest(request="x", plan="plan-1", reason="it broke")
     )
     assert model.state.goal_states["g3"].state is GoalState.FAILED
@@ -107,7 +107,7 @@ def be_late(model: FleetModel, order: Order, more_s: float = 0.0) -> None:
     record = entry(model).records[order.task]
     model.start(order)
     model.time_s += FACTOR * record.duration_s + MARGIN_S + more_s
-    model.tell(events.TimerFired)
+    model.receive(events.TimerFired)
 
 
 def test_the_waiting_work_of_a_late_robot_goes_to_others_and_what_it_does_goes_on() -> None:
@@ -143,7 +143,7 @@ def test_a_plan_wakes_up_for_lateness_where_the_fleets_clock_is_unix_time() -> N
     due_s = record.started_s + FACTOR * record.duration_s + MARGIN_S
     assert next_timer(model.state) == next_lateness(model.state) == due_s
     model.wall_s += 1e6
-    model.tell(events.FactDeleted, subject="r2", relation="at")
+    model.receive(events.FactDeleted, subject="r2", relation="at")
     model.learn("cup_1", "washed", True)
     assert next_lateness(model.state) is None
 
@@ -156,7 +156,7 @@ def test_a_task_added_to_a_running_plan_leaves_orders_with_the_robots_that_have_
             request=name, control=Control.ADD_TASK, plan="plan-1", skill="navigate",
             args={"to": "hallway"},
         )  # fmt: skip
-        model.tell(events.ControlRequested, request=request)
+        model.receive(events.ControlRequested, request=request)
         assert model.state.answers[name].accepted
         for record in entry(model).current():
             assert record.robot == entry(model).outcome.allocation[record.actor]
@@ -191,7 +191,7 @@ def test_the_only_robot_is_planned_with_again_while_its_hand_is_full(strategy: s
     while model.state.facts[FactKey(HOLDING, "r1")].value == "nothing":
         model.succeed(order_of(model, "r1"))
     undisturbed = model.orders()
-    model.tell(
+    model.receive(
         events.ReplanRequested, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
     )
     assert model.orders() == undisturbed
@@ -238,12 +238,12 @@ def test_a_task_that_fails_changes_nothing_about_other_goals() -> None:
 
 def test_a_new_goal_is_planned_alone_and_put_beside_the_rest() -> None:
     model = running(robots=2, cups=4)
-    model.tell(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(auto_plan=True))
+    model.receive(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(auto_plan=True))
     before = {task.task for task in entry(model).plan.tasks}
     undisturbed = [(o.robot, o.task) for o in model.orders()]
-    model.tell(events.ObjectPut, object=cup(5))
+    model.receive(events.ObjectPut, object=cup(5))
     model.learn("cup_5", "at", "living_room")
-    model.tell(events.GoalPut, goal=bring(5, "hallway"))
+    model.receive(events.GoalPut, goal=bring(5, "hallway"))
     assert [(o.robot, o.task) for o in model.orders()] == undisturbed
     change = entry(model).change
     assert change is not None
@@ -258,7 +258,7 @@ def test_a_deleted_goal_takes_only_its_own_tasks_with_it() -> None:
     gone = {r.task for r in entry(model).current() if r.goal == "g4"}
     rest = {r.task for r in entry(model).current()} - gone
     begun = [order.task for order in orders_but(model, "g4")]
-    model.tell(events.GoalDeleted, goal="g4")
+    model.receive(events.GoalDeleted, goal="g4")
     for order in [o for o in model.orders() if o.cancelled]:
         assert order.task in gone
         model.report(order, ReportState.CANCELLED)
@@ -310,8 +310,8 @@ def test_plans_that_keep_robots_from_each_other_do_not_wait_for_ever() -> None:
         )  # fmt: skip
         return Plan(plan=plan, goals=(), conditions=(), tasks=tasks)
 
-    model.tell(events.PlanProposed, plan=hand_over("one", "cup_1", "pickup", "carrier"))
-    model.tell(events.PlanProposed, plan=hand_over("two", "cup_2", "carrier", "pickup"))
+    model.receive(events.PlanProposed, plan=hand_over("one", "cup_1", "pickup", "carrier"))
+    model.receive(events.PlanProposed, plan=hand_over("two", "cup_2", "carrier", "pickup"))
     assert [(o.plan, o.robot) for o in model.orders()] == [("two", "c1"), ("one", "r1")]
     model.finish()
     assert {each.state for each in model.state.plans.values()} == {PlanState.SUCCEEDED}
@@ -327,11 +327,11 @@ def test_work_that_is_being_cancelled_is_not_gone_on_with() -> None:
     model.succeed(order)
     (pick,) = model.orders()
     model.start(pick)
-    model.tell(events.GoalDeleted, goal=goal)
+    model.receive(events.GoalDeleted, goal=goal)
     assert [o.task for o in model.orders() if o.cancelled] == [pick.task]
     again = bring(int(goal.removeprefix("g")), "hallway")
-    model.tell(events.GoalPut, goal=again)
-    model.tell(
+    model.receive(events.GoalPut, goal=again)
+    model.receive(
         events.ReplanRequested,
         request=ReplanRequest(request="x", plan="plan-1", reason="after all", goals=(goal,)),
     )

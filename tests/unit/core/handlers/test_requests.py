@@ -1,0 +1,121 @@
+"""What people ask for: plans, replans, control of plans, and the answers they get."""
+
+from __future__ import annotations
+
+from fleet.core import events
+from fleet.core.state import Policy
+from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.plans import Plan, PlanState, Task
+from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
+from keyexpr_schema.payloads.tasks import ReportState, TaskState
+from tests.support.fleet_model import BOTH, fleet
+from tests.support.household import bring
+
+
+def test_a_ready_plan_waits_for_start_and_can_be_cancelled_and_deleted() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"), start=False)
+    assert model.orders() == []
+    assert model.goal_state("g1") is GoalState.PLANNED
+
+    def control(name: str, what: Control) -> bool:
+        request = ControlRequest(request=name, control=what, plan="plan-1")
+        model.receive(events.ControlRequested, request=request)
+        return model.state.answers[name].accepted
+
+    assert control("c1", Control.START)
+    (order,) = model.orders()
+    assert not control("c2", Control.DELETE)
+    assert control("c3", Control.CANCEL)
+    assert [o.cancelled for o in model.orders()] == [True]
+    model.report(order, ReportState.CANCELLED)
+    assert model.state.plans["plan-1"].state is PlanState.CANCELLED
+    assert model.goal_state("g1") is GoalState.WAITING
+    assert control("c4", Control.DELETE)
+    assert not [key for key in model.documents if key.startswith("plans/")]
+
+
+def test_a_task_can_be_added_to_a_running_plan() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    request = ControlRequest(
+        request="c", control=Control.ADD_TASK, plan="plan-1", skill="navigate",
+        args={"to": "living_room"}, robot="locobot",
+    )  # fmt: skip
+    model.receive(events.ControlRequested, request=request)
+    model.finish()
+    entry = model.state.plans["plan-1"]
+    assert entry.state is PlanState.SUCCEEDED
+    assert entry.records["t5"].robot == "locobot"
+    assert entry.records["t5"].state is TaskState.SUCCEEDED
+
+
+def test_a_task_that_cannot_be_added_leaves_the_plan_as_it_was() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    request = ControlRequest(
+        request="c", control=Control.ADD_TASK, plan="plan-1", skill="fly", args={}
+    )
+    model.receive(events.ControlRequested, request=request)
+    model.finish()
+    entry = model.state.plans["plan-1"]
+    assert entry.state is PlanState.SUCCEEDED
+    assert "there is no skill fly" in model.state.answers["c"].sentence
+    assert not model.state.answers["c"].accepted
+
+
+def test_a_plan_that_someone_proposes_is_checked_like_any_other() -> None:
+    model = fleet()
+    go = Task(task="t1", skill="navigate", args={"robot": "?a1", "to": "kitchen"}, actor="a1")
+    good = Plan(plan="mine", goals=(), conditions=(), tasks=(go,))
+    model.receive(events.PlanProposed, plan=good)
+    model.finish()
+    assert model.state.plans["mine"].state is PlanState.SUCCEEDED
+    grab = Task(task="t1", skill="grab", args={"robot": "?a1"}, actor="a1")
+    bad = Plan(plan="yours", goals=(), conditions=(), tasks=(grab,))
+    model.receive(events.PlanProposed, plan=bad)
+    status = model.state.plans["yours"]
+    assert status.state is PlanState.REJECTED
+    assert status.violations[0].code == "unknown-skill"
+
+
+def test_requests_are_answered_once_and_wrong_ones_with_the_reason() -> None:
+    model = fleet()
+    model.plan(goals=("nothing",))
+    assert "there is no goal nothing" in model.state.answers["r0"].sentence
+    model.plan()
+    assert "no goal that waits" in model.state.answers["r1"].sentence
+    model.plan(*BOTH)
+    model.plan(goals=("g1",))
+    assert "already in plan plan-1" in model.state.answers["r3"].sentence
+    replan = ReplanRequest(request="x", plan="nope", reason="because")
+    model.receive(events.ReplanRequested, request=replan)
+    assert "known are plan-1" in model.state.answers["x"].sentence
+    before = model.state
+    model.receive(events.ReplanRequested, request=replan)
+    assert model.state is before
+
+
+def test_a_plan_waits_for_approval_where_the_policy_says_so() -> None:
+    model = fleet()
+    model.receive(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(approval=True))
+    model.plan(bring(1, "hallway"))
+    assert model.state.plans["plan-1"].state is PlanState.PROPOSED
+    assert model.orders() == []
+    approve = ControlRequest(request="a", control=Control.APPROVE, plan="plan-1")
+    model.receive(events.ControlRequested, request=approve)
+    model.finish()
+    assert model.goal_state("g1") is GoalState.REACHED
+
+
+def test_a_dry_run_shows_the_plan_and_leaves_nothing_behind() -> None:
+    model = fleet()
+    model.plan(*BOTH, dry_run=True)
+    answer = model.state.answers["r0"]
+    assert answer.preview is not None
+    assert len(answer.preview.tasks) == 9
+    assert answer.preview_status is not None
+    assert set(answer.preview_status.allocation.values()) == {"hsr", "locobot"}
+    assert model.state.plans == {}
+    assert model.state.previews == {}
+    assert model.goal_state("g1") is GoalState.WAITING

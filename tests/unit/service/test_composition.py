@@ -1,0 +1,81 @@
+"""What a planner is made of: plug-ins of installed packages are in it, broken ones are left out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fleet.errors import BadSkillFile
+from fleet.service.composition import compose
+
+CODE = """
+from pathlib import Path
+from fleet.allocators import Assignment, RoundRobinAllocator
+from fleet.planners import NoPlan, Planner
+
+class Lazy(Planner):
+    name, strategies = "lazy", ("siesta",)
+    def _solve(self, problem):
+        return NoPlan("tomorrow")
+
+class Needy(Lazy):
+    def __init__(self, wish): ...
+
+class Turns(RoundRobinAllocator):
+    name = "turns"
+
+FILE = Path(__file__).with_name("wave.yaml")
+AGAIN = {"skills": {"wave": {"parameters": {"robot": "robot"}}}}
+"""
+ENTRIES = """
+[robotfleet.planners]
+lazy = theirs:Lazy
+needy = theirs:Needy
+turns = theirs:Turns
+[robotfleet.allocators]
+turns = theirs:Turns
+lazy = theirs:Lazy
+[robotfleet.skill_models]
+wave = theirs:FILE
+again = theirs:AGAIN
+"""
+WAVE = "skills: {wave: {parameters: {robot: robot}, after: [waved(robot) = true]}}\n"
+
+
+@pytest.fixture
+def theirs(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    site = tmp_path_factory.mktemp("site")
+    (site / "theirs.py").write_text(CODE)
+    (site / "wave.yaml").write_text(WAVE)
+    info = site / "theirs-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1\n")
+    (info / "entry_points.txt").write_text(ENTRIES)
+    monkeypatch.syspath_prepend(site)
+    return site
+
+
+def test_sound_plug_ins_are_there_and_each_broken_one_is_named(
+    theirs: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    made = compose()
+    assert {"symbolic", "llm", "lazy"} == set(made.planners)
+    assert "siesta" in made.strategies
+    assert {"makespan", "turns"} <= set(made.allocators) and "lazy" not in made.allocators
+    assert {"navigate", "wave"} <= set(made.skills)
+    warnings = [record.getMessage() for record in caplog.records]
+    assert len(warnings) == 4
+    for entry, what in (
+        ("theirs:Needy as 'needy'", "missing 1 required positional argument: 'wish'"),
+        ("theirs:Turns as 'turns' in robotfleet.planners", "which is no Planner"),
+        ("theirs:Lazy as 'lazy' in robotfleet.allocators", "which is no Allocator"),
+        ("theirs:AGAIN as 'again'", "skill wave is already modelled elsewhere"),
+    ):
+        (warning,) = [each for each in warnings if entry in each]
+        assert warning.startswith("package theirs offers") and what in warning
+
+
+def test_a_file_that_models_a_packages_skill_is_refused(theirs: Path) -> None:
+    with pytest.raises(BadSkillFile, match=r"wave\.yaml: skill wave is already modelled elsewhere"):
+        compose((theirs / "wave.yaml",))

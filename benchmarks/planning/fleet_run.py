@@ -306,4 +306,5 @@ class FleetRun:
         read = self._interpreter.interpret(effect.text, self.state.vocabulary())
         self.counts.planning_s += time.perf_counter() - began_s
         answer: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
-        self._pending.append(events.GoalInterpreted(**self._at(), goal=effect.goal, **answer))
+        answer |= self._at()
+        self._pending.append(events.GoalInterpreted(goal=effect.goal, **answer))

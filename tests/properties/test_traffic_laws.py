@@ -164,6 +164,7 @@ def test_robots_that_work_at_tables_keep_apart_and_face_what_they_work_at() -> N
 
     @settings(max_examples=6, deadline=None)
     @given(seed=st.integers(0, 10**6))
+    @example(seed=108)  # a stance a few centimetres from the one where it stands
     @example(seed=28050)  # two stances beside the lattice, and no node between them
     def law(seed: int) -> None:
         rnd, floor = scattered(4, seed)

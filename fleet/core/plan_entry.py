@@ -127,7 +127,7 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True):
         return (self.records[task.task] for task in self.plan.tasks if task.task in self.records)
 
     def outstanding(self) -> list[TaskRecord]:
-        """Tasks that a robot has been told to do and has not ended."""
+        """Tasks that a robot has an order for."""
         return [record for record in self.records.values() if record.state in OUTSTANDING]
 
     def to_replan(self, scope: ReplanScope, sentence: str) -> PlanEntry:

@@ -70,6 +70,23 @@ def test_no_test_sleeps_or_goes_by_the_clock(functions: set[str], allowed: dict[
     assert found == set(allowed)
 
 
+def uncounted_laws(tree: ast.AST) -> Iterator[str]:
+    """Functions by `@given` with branches, of which nobody notices that one is never taken."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef):
+            by = {ast.unparse(one).partition("(")[0] for one in node.decorator_list}
+            inside = list(ast.walk(node))
+            branches = any(isinstance(one, ast.If | ast.Match | ast.Try) for one in inside)
+            if "given" in by and "reaches" not in by and (branches or calls(node, {"assume"})):
+                yield f"line {node.lineno}: {node.name}"
+
+
+@pytest.mark.parametrize("path", TESTS, ids=name)
+def test_a_law_with_branches_fails_where_one_is_never_reached(path: Path) -> None:
+    """By `tests.support.reached`."""
+    assert list(uncounted_laws(ast.parse(path.read_text(encoding="utf-8")))) == []
+
+
 def test_private_uses_are_seen() -> None:
     text = "from a._b import c\nimport a._d\nx._e\nself._f\nx.__len__\nm.setattr('a._g', 1)"
     found = [line.rpartition(" ")[2] for line in private_uses(ast.parse(text))]

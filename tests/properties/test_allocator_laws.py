@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from itertools import product
@@ -18,6 +17,7 @@ from fleet.allocators.cost_based import assign_in_rounds
 from fleet.allocators.min_max_load import assign_balanced, assign_with_least_travel
 from fleet.allocators.round_robin import assign_in_turn
 from tests.support.household import checked, drives, fact, home, manipulator
+from tests.support.reached import Reached, reaches
 
 ROBOTS = {"r0": "kitchen", "r1": "hallway", "r2": "living_room"}
 WORLD = home(
@@ -76,53 +76,47 @@ def objective(tie_break: str, problem: AllocationProblem, chosen: dict[str, str]
         ("travel", partial(assign_with_least_travel, time_limit_s=LIMIT_S)),
     ],
 )
+@reaches("none possible", "decided by the tie-break")
+@settings(max_examples=80)
+@given(problems())
 def test_no_allocation_is_better(
+    reached: Reached,
     tie_break: str,
     assign: Callable[[AllocationProblem], Assignment | NotAllocated],
     monkeypatch: pytest.MonkeyPatch,
+    problem: AllocationProblem,
 ) -> None:
     monkeypatch.setattr(min_max_load, "TRAVEL_LIMIT_S", LIMIT_S)
-    reached: Counter[str] = Counter()
-
-    @settings(max_examples=80)
-    @given(problems())
-    def law(problem: AllocationProblem) -> None:
-        possible = every_allocation(problem)
-        found = assign(problem)
-        if isinstance(found, NotAllocated):
-            assert possible == []
-            reached["none possible"] += 1
-            return
-        assert found.notes == ()
-        chosen = dict(found.allocation)
-        assert chosen in possible
-        values = sorted(objective(tie_break, problem, other) for other in possible)
-        assert objective(tie_break, problem, chosen) == pytest.approx(values[0], rel=1e-3)
-        reached["decided by the tie-break"] += values[0][0] == values[-1][0] or (
-            len({tuple(value) for value in values if value[0] == values[0][0]}) > 1
-        )
-
-    law()
-    assert reached["none possible"] and reached["decided by the tie-break"], reached
+    possible = every_allocation(problem)
+    found = assign(problem)
+    if isinstance(found, NotAllocated):
+        assert possible == []
+        reached["none possible"] += 1
+        return
+    assert found.notes == ()
+    chosen = dict(found.allocation)
+    assert chosen in possible
+    values = sorted(objective(tie_break, problem, other) for other in possible)
+    assert objective(tie_break, problem, chosen) == pytest.approx(values[0], rel=1e-3)
+    reached["decided by the tie-break"] += values[0][0] == values[-1][0] or (
+        len({tuple(value) for value in values if value[0] == values[0][0]}) > 1
+    )
 
 
 @pytest.mark.parametrize("assign", [assign_in_turn, assign_in_rounds])
+@reaches("none possible", "apart")
+@settings(max_examples=100)
+@given(problems())
 def test_the_others_find_an_allocation_where_there_is_one(
+    reached: Reached,
     assign: Callable[[AllocationProblem], Assignment | NotAllocated],
+    problem: AllocationProblem,
 ) -> None:
-    reached: Counter[str] = Counter()
-
-    @settings(max_examples=100)
-    @given(problems())
-    def law(problem: AllocationProblem) -> None:
-        possible = every_allocation(problem)
-        found = assign(problem)
-        if isinstance(found, NotAllocated):
-            assert possible == []
-            reached["none possible"] += 1
-            return
-        assert dict(found.allocation) in possible
-        reached["apart"] += bool(problem.apart)
-
-    law()
-    assert reached["none possible"] and reached["apart"], reached
+    possible = every_allocation(problem)
+    found = assign(problem)
+    if isinstance(found, NotAllocated):
+        assert possible == []
+        reached["none possible"] += 1
+        return
+    assert dict(found.allocation) in possible
+    reached["apart"] += bool(problem.apart)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from itertools import permutations, product
 
 import pytest
@@ -23,6 +22,7 @@ from fleet.jobshop.search.list_scheduling import list_schedule
 from fleet.jobshop.search.warm_start import warm_start
 from fleet.jobshop.sequencing import sequences
 from fleet.jobshop.time_budget import TimeBudget
+from tests.support.reached import Reached, reaches
 from tests.support.searches import NEVER_S, steps
 
 NEAR = 1e-6
@@ -159,208 +159,182 @@ def sound(shop: Shop) -> bool:
     return True
 
 
-def test_schedules_are_right_and_bounds_hold() -> None:
-    reached: Counter[str] = Counter()
+@reaches(
+    "none found",
+    "optimal by another bound",
+    "better than the list schedule",
+    "meeting",
+    "with travel",
+)
+@settings(max_examples=150, deadline=None)
+@given(shops())
+def test_schedules_are_right_and_bounds_hold(reached: Reached, shop: Shop) -> None:
+    assume(sound(shop))
+    instance = Instance(shop)
+    found = solve(shop, steps(0.02), exact=False)
+    if found is None:
+        reached["none found"] += 1
+        return
+    assert wrong(shop, found) is None
+    least_s = min(one.makespan_s for one in every_schedule(shop))
+    assert lower_bound(instance) <= least_s + NEAR
+    assert bound_with_travel(instance) <= least_s + NEAR
+    assert found.lower_bound_s <= least_s + NEAR
+    assert least_s <= found.makespan_s + NEAR
+    listed = list_schedule(instance)
+    assert listed is None or found.makespan_s <= listed.makespan_s + NEAR
+    reached["optimal by another bound"] += lower_bound(instance) < least_s - NEAR
+    reached["better than the list schedule"] += (
+        listed is not None and found.makespan_s < listed.makespan_s - NEAR
+    )
+    reached["meeting"] += bool(instance.several)
+    reached["with travel"] += instance.travels
 
-    @settings(max_examples=150, deadline=None)
-    @given(shops())
-    def law(shop: Shop) -> None:
-        assume(sound(shop))
-        instance = Instance(shop)
-        found = solve(shop, steps(0.02), exact=False)
-        if found is None:
-            reached["none found"] += 1
-            return
-        assert wrong(shop, found) is None
+
+@reaches("several blocks")
+@settings(max_examples=100, deadline=None)
+@given(shops())
+def test_where_blocks_are_free_and_alone_there_is_always_an_answer(
+    reached: Reached, shop: Shop
+) -> None:
+    assume(sound(shop) and all(len(o.blocks) == 1 for o in shop.operations))
+    assume(all(block.position == Position.ANYWHERE for block in shop.blocks))
+    assume(not Instance(shop).several)
+    assert solve(shop, steps(0.0), exact=False) is not None
+    reached["several blocks"] += len(shop.blocks) > 2
+
+
+@reaches("shorter", "proven", "not proven")
+@settings(max_examples=150, deadline=None)
+@example(SHORTEST_IN_ANOTHER_ORDER)
+@given(shops())
+def test_what_looked_at_every_schedule_is_as_short_as_brute_force(
+    reached: Reached, shop: Shop
+) -> None:
+    assume(sound(shop))
+    instance = Instance(shop)
+    begin = list_schedule(instance)
+    assume(begin is not None)
+    assert begin is not None
+    found = branch_and_bound(instance, begin)
+    assert found is not None, "four blocks are not too many"
+    made = schedule_in_order(instance, found.solution)
+    assert wrong(shop, made) is None
+    assert made.makespan_s <= begin.makespan_s + NEAR
+    reached["shorter"] += made.makespan_s < begin.makespan_s - NEAR
+    reached["proven" if found.proven else "not proven"] += 1
+    if found.proven:
         least_s = min(one.makespan_s for one in every_schedule(shop))
-        assert lower_bound(instance) <= least_s + NEAR
-        assert bound_with_travel(instance) <= least_s + NEAR
-        assert found.lower_bound_s <= least_s + NEAR
-        assert least_s <= found.makespan_s + NEAR
-        listed = list_schedule(instance)
-        assert listed is None or found.makespan_s <= listed.makespan_s + NEAR
-        reached["optimal by another bound"] += lower_bound(instance) < least_s - NEAR
-        reached["better than the list schedule"] += (
-            listed is not None and found.makespan_s < listed.makespan_s - NEAR
-        )
-        reached["meeting"] += bool(instance.several)
-        reached["with travel"] += instance.travels
-
-    law()
-    assert len(+reached) == 5, reached
+        assert abs(made.makespan_s - least_s) <= NEAR
 
 
-def test_where_blocks_are_free_and_alone_there_is_always_an_answer() -> None:
-    reached: Counter[str] = Counter()
-
-    @settings(max_examples=100, deadline=None)
-    @given(shops())
-    def law(shop: Shop) -> None:
-        assume(sound(shop) and all(len(o.blocks) == 1 for o in shop.operations))
-        assume(all(block.position == Position.ANYWHERE for block in shop.blocks))
-        assume(not Instance(shop).several)
-        assert solve(shop, steps(0.0), exact=False) is not None
-        reached["several blocks"] += len(shop.blocks) > 2
-
-    law()
-    assert reached["several blocks"], reached
-
-
-def test_what_looked_at_every_schedule_is_as_short_as_brute_force() -> None:
-    reached: Counter[str] = Counter()
-
-    @settings(max_examples=150, deadline=None)
-    @example(SHORTEST_IN_ANOTHER_ORDER)
-    @given(shops())
-    def law(shop: Shop) -> None:
-        assume(sound(shop))
-        instance = Instance(shop)
-        begin = list_schedule(instance)
-        assume(begin is not None)
-        assert begin is not None
-        found = branch_and_bound(instance, begin)
-        assert found is not None, "four blocks are not too many"
-        made = schedule_in_order(instance, found.solution)
-        assert wrong(shop, made) is None
-        assert made.makespan_s <= begin.makespan_s + NEAR
-        reached["shorter"] += made.makespan_s < begin.makespan_s - NEAR
-        reached["proven" if found.proven else "not proven"] += 1
-        if found.proven:
-            least_s = min(one.makespan_s for one in every_schedule(shop))
-            assert abs(made.makespan_s - least_s) <= NEAR
-
-    law()
-    assert reached["shorter"] and reached["proven"] and reached["not proven"], reached
+@reaches("several", "one", "none")
+@settings(max_examples=100, deadline=None)
+@given(shops(most_machines=1))
+def test_orders_of_settled_blocks_are_right_and_the_first_is_the_best(
+    reached: Reached, shop: Shop
+) -> None:
+    assume(sound(shop))
+    machine_of = tuple(block.machines[0] for block in shop.blocks)
+    alone = all(len(operations) == 1 for operations in Instance(shop).operations_of)
+    alone = alone and not Instance(shop).several
+    least_s = min((one.makespan_s for one in every_schedule(shop)), default=None)
+    by_machine = set()
+    for number, order in enumerate(sequences(shop, steps(0.05))):
+        made = schedule_of(shop, order, machine_of)
+        assert made is not None and wrong(shop, made) is None
+        assert least_s is not None
+        assert number > 0 or not alone or made.makespan_s <= least_s + NEAR
+        mine = frozenset(tuple(b for b in order if machine_of[b] == m) for m in set(machine_of))
+        assert mine not in by_machine, "the same order twice"
+        by_machine.add(mine)
+    assert by_machine or not alone or least_s is None
+    reached["several" if len(by_machine) > 1 else "one" if by_machine else "none"] += 1
 
 
-def test_orders_of_settled_blocks_are_right_and_the_first_is_the_best() -> None:
-    reached: Counter[str] = Counter()
-
-    @settings(max_examples=100, deadline=None)
-    @given(shops(most_machines=1))
-    def law(shop: Shop) -> None:
-        assume(sound(shop))
-        machine_of = tuple(block.machines[0] for block in shop.blocks)
-        alone = all(len(operations) == 1 for operations in Instance(shop).operations_of)
-        alone = alone and not Instance(shop).several
-        least_s = min((one.makespan_s for one in every_schedule(shop)), default=None)
-        by_machine = set()
-        for number, order in enumerate(sequences(shop, steps(0.05))):
-            made = schedule_of(shop, order, machine_of)
-            assert made is not None and wrong(shop, made) is None
-            assert least_s is not None
-            assert number > 0 or not alone or made.makespan_s <= least_s + NEAR
-            mine = frozenset(tuple(b for b in order if machine_of[b] == m) for m in set(machine_of))
-            assert mine not in by_machine, "the same order twice"
-            by_machine.add(mine)
-        assert by_machine or not alone or least_s is None
-        reached["several" if len(by_machine) > 1 else "one" if by_machine else "none"] += 1
-
-    law()
-    assert len(reached) == 3, reached
-
-
-def test_cp_sat_agrees_with_brute_force() -> None:
-    reached: Counter[str] = Counter()
-
-    @settings(max_examples=12, deadline=None)
-    @given(shops(most_blocks=3))
-    def law(shop: Shop) -> None:
-        assume(sound(shop) and solve(shop, steps(0.0), exact=False) is not None)
-        found = solve(shop, TimeBudget(NEVER_S) if helps(Instance(shop)) else steps(0.05))
-        assert found is not None
-        assert wrong(shop, found) is None
-        least_s = min(one.makespan_s for one in every_schedule(shop))
-        assert found.lower_bound_s <= least_s + NEAR
-        if found.gap < NEAR:
-            assert found.makespan_s <= least_s + NEAR
-            reached["proven"] += 1
-
-    law()
-    assert reached["proven"], reached
+@reaches("proven")
+@settings(max_examples=12, deadline=None)
+@given(shops(most_blocks=3))
+def test_cp_sat_agrees_with_brute_force(reached: Reached, shop: Shop) -> None:
+    assume(sound(shop) and solve(shop, steps(0.0), exact=False) is not None)
+    found = solve(shop, TimeBudget(NEVER_S) if helps(Instance(shop)) else steps(0.05))
+    assert found is not None
+    assert wrong(shop, found) is None
+    least_s = min(one.makespan_s for one in every_schedule(shop))
+    assert found.lower_bound_s <= least_s + NEAR
+    if found.gap < NEAR:
+        assert found.makespan_s <= least_s + NEAR
+        reached["proven"] += 1
 
 
 @pytest.mark.skipif(not installed(), reason="OR-Tools is an extra: cp-sat")
-def test_the_model_of_cp_sat_has_the_optimum_of_brute_force() -> None:
+@reaches("with travel", "without travel")
+@settings(max_examples=100, deadline=None)
+@example(TWO_THAT_MUST_BE_FIRST)
+@given(shops(most_blocks=3) | shops(most_blocks=3, always_travels=True))
+def test_the_model_of_cp_sat_has_the_optimum_of_brute_force(reached: Reached, shop: Shop) -> None:
     """The whole of it, cuts included, solved to the end; times are whole seconds."""
     from ortools.sat.python import cp_model
 
-    reached: Counter[str] = Counter()
-
-    @settings(max_examples=100, deadline=None)
-    @example(TWO_THAT_MUST_BE_FIRST)
-    @given(shops(most_blocks=3) | shops(most_blocks=3, always_travels=True))
-    def law(shop: Shop) -> None:
-        assume(sound(shop))
-        instance = Instance(shop)
-        hint = list_schedule(instance)
-        if hint is None or not helps(instance):
-            return
-        data = request_of(instance, hint, lower_bound(instance), until_s=0.0, seed=0)
-        solver = cp_model.CpSolver()
-        solver.parameters.num_workers = 1
-        assert solver.solve(Model(cp_model, data).model) == cp_model.OPTIMAL
-        least_s = min(one.makespan_s for one in every_schedule(shop))
-        assert solver.objective_value <= least_s + NEAR
-        if all(o.target is None or o.arrives is not None for o in shop.operations):
-            # Who drives somewhere and is not there afterwards has only his first way in the model.
-            assert solver.objective_value == pytest.approx(least_s)
-            reached["with travel" if instance.travels else "without travel"] += 1
-
-    law()
-    assert reached["with travel"] and reached["without travel"], reached
+    assume(sound(shop))
+    instance = Instance(shop)
+    hint = list_schedule(instance)
+    if hint is None or not helps(instance):
+        return
+    data = request_of(instance, hint, lower_bound(instance), until_s=0.0, seed=0)
+    solver = cp_model.CpSolver()
+    solver.parameters.num_workers = 1
+    assert solver.solve(Model(cp_model, data).model) == cp_model.OPTIMAL
+    least_s = min(one.makespan_s for one in every_schedule(shop))
+    assert solver.objective_value <= least_s + NEAR
+    if all(o.target is None or o.arrives is not None for o in shop.operations):
+        # Who drives somewhere and is not there afterwards has only his first way in the model.
+        assert solver.objective_value == pytest.approx(least_s)
+        reached["with travel" if instance.travels else "without travel"] += 1
 
 
-def test_who_can_stay_stays() -> None:
+@reaches("could move")
+@settings(max_examples=150, deadline=None)
+@given(shops())
+def test_who_can_stay_stays(reached: Reached, shop: Shop) -> None:
     """With no machine gone and the old makespan as the target nobody moves, and nothing is late."""
-    reached: Counter[str] = Counter()
-
-    @settings(max_examples=150, deadline=None)
-    @given(shops())
-    def law(shop: Shop) -> None:
-        assume(sound(shop))
-        instance = Instance(shop)
-        listed = list_schedule(instance)
-        assume(listed is not None)
-        assert listed is not None
-        again = warm_start(instance, listed.order, listed.machine_of, listed.makespan_s)
-        assert again is not None
-        assert again.machine_of == listed.machine_of
-        assert again.makespan_s <= listed.makespan_s + NEAR
-        reached["could move"] += any(len(block.machines) > 1 for block in shop.blocks)
-
-    law()
-    assert reached["could move"], reached
+    assume(sound(shop))
+    instance = Instance(shop)
+    listed = list_schedule(instance)
+    assume(listed is not None)
+    assert listed is not None
+    again = warm_start(instance, listed.order, listed.machine_of, listed.makespan_s)
+    assert again is not None
+    assert again.machine_of == listed.machine_of
+    assert again.makespan_s <= listed.makespan_s + NEAR
+    reached["could move"] += any(len(block.machines) > 1 for block in shop.blocks)
 
 
-def test_a_repaired_schedule_is_right_and_moves_little() -> None:
-    reached: Counter[str] = Counter()
-
-    @settings(max_examples=60, deadline=None)
-    @given(shops(), st.data())
-    def law(shop: Shop, data: st.DataObject) -> None:
-        assume(sound(shop) and len(shop.machines) > 1)
-        planned = solve(shop, steps(0.0), exact=False)
-        assume(planned is not None)
-        assert planned is not None
-        lost = data.draw(st.sampled_from(range(len(shop.machines))))
-        try:
-            left = without_machines(shop, frozenset({lost}))
-        except BadShop:
-            return
-        found = reschedule(left, planned.machine_of, planned.order, steps(0.03))
-        if found is None:
-            return
-        assert wrong(left, found.schedule) is None
-        orphans = {b for b, machine in enumerate(planned.machine_of) if machine == lost}
-        assert orphans <= set(found.moved)
-        assert found.schedule.makespan_s <= found.best_makespan_s * (1 + WITHIN) + NEAR
-        assert found.schedule.lower_bound_s <= found.schedule.makespan_s + NEAR
-        assert set(found.moved) == {
-            b for b, m in enumerate(found.schedule.machine_of) if m != planned.machine_of[b]
-        }
-        reached["orphans"] += bool(orphans)
-        reached["some stayed"] += len(found.moved) < len(shop.blocks)
-
-    law()
-    assert reached["orphans"] and reached["some stayed"], reached
+@reaches("orphans", "some stayed")
+@settings(max_examples=60, deadline=None)
+@given(shops(), st.data())
+def test_a_repaired_schedule_is_right_and_moves_little(
+    reached: Reached, shop: Shop, data: st.DataObject
+) -> None:
+    assume(sound(shop) and len(shop.machines) > 1)
+    planned = solve(shop, steps(0.0), exact=False)
+    assume(planned is not None)
+    assert planned is not None
+    lost = data.draw(st.sampled_from(range(len(shop.machines))))
+    try:
+        left = without_machines(shop, frozenset({lost}))
+    except BadShop:
+        return
+    found = reschedule(left, planned.machine_of, planned.order, steps(0.03))
+    if found is None:
+        return
+    assert wrong(left, found.schedule) is None
+    orphans = {b for b, machine in enumerate(planned.machine_of) if machine == lost}
+    assert orphans <= set(found.moved)
+    assert found.schedule.makespan_s <= found.best_makespan_s * (1 + WITHIN) + NEAR
+    assert found.schedule.lower_bound_s <= found.schedule.makespan_s + NEAR
+    assert set(found.moved) == {
+        b for b, m in enumerate(found.schedule.machine_of) if m != planned.machine_of[b]
+    }
+    reached["orphans"] += bool(orphans)
+    reached["some stayed"] += len(found.moved) < len(shop.blocks)

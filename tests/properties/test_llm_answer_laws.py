@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
 from typing import Any
 
 import msgspec
@@ -20,6 +19,7 @@ from fleet.planners.llm.candidate import candidate_of, merged
 from fleet.planners.llm.verification import verify
 from keyexpr_schema.payloads.plans import Plan
 from tests.support.household import bring, home, manipulator
+from tests.support.reached import Reached, reaches
 
 WORLD = home((manipulator("r1"), manipulator("r2")))
 GOALS = (bring(1, "hallway"), bring(2, "living_room"))
@@ -93,45 +93,39 @@ def consider(answer: dict[str, Any], flat: bool) -> Plan | set[str]:
     return made
 
 
-def test_anything_at_all() -> None:
-    outcomes: Counter[str] = Counter()
-
-    @given(st.lists(TASKS, max_size=6), PINS, st.booleans())
-    def law(tasks: list[dict[str, Any]], pins: list[dict[str, str]], flat: bool) -> None:
-        if flat:
-            tasks = [{name: row[name] for name in ("skill", "args", "goal")} for row in tasks]
-        made = consider({"tasks": tasks, "pins": pins}, flat)
-        outcomes.update(made if isinstance(made, set) else {"plan"})
-
-    law()
-    assert len(outcomes) > 2, outcomes
+@reaches("wrong-arguments", "unknown-goal", "goal-unmet")
+@given(st.lists(TASKS, max_size=6), PINS, st.booleans())
+def test_anything_at_all(
+    reached: Reached, tasks: list[dict[str, Any]], pins: list[dict[str, str]], flat: bool
+) -> None:
+    if flat:
+        tasks = [{name: row[name] for name in ("skill", "args", "goal")} for row in tasks]
+    made = consider({"tasks": tasks, "pins": pins}, flat)
+    reached.update(made if isinstance(made, set) else {"plan"})
 
 
-def test_a_good_plan_with_anything_mixed_in() -> None:
-    outcomes: Counter[str] = Counter()
-
-    @given(
-        st.one_of(st.lists(TASKS, max_size=3), st.lists(DETOURS, min_size=1, max_size=2)),
-        st.sampled_from(["?a", "?b"]),
-        st.booleans(),
-        st.randoms(use_true_random=False),
-    )
-    def law(extra: list[dict[str, Any]], second: str, joined: bool, random: Any) -> None:
-        good = [*carry(1, "hallway", "?a"), *carry(2, "living_room", second)]
-        if second == "?a" or joined:
-            good[4]["after"] = ["13"]
-        assert isinstance(consider({"tasks": good}, flat=False), Plan)
-        mixed = [*good, *extra]
-        random.shuffle(mixed)
-        made = consider({"tasks": mixed}, flat=False)
-        outcomes["thinned" if isinstance(made, Plan) and extra else type(made).__name__] += 1
-        if isinstance(made, Plan):
-            assert sorted(task.skill for task in made.tasks) == sorted(
-                ["navigate", "pick", "navigate", "place"] * 2
-            ), "nothing that no goal needs"
-
-    law()
-    assert outcomes["set"] and outcomes["thinned"], outcomes
+@reaches("set", "thinned")
+@given(
+    st.one_of(st.lists(TASKS, max_size=3), st.lists(DETOURS, min_size=1, max_size=2)),
+    st.sampled_from(["?a", "?b"]),
+    st.booleans(),
+    st.randoms(use_true_random=False),
+)
+def test_a_good_plan_with_anything_mixed_in(
+    reached: Reached, extra: list[dict[str, Any]], second: str, joined: bool, random: Any
+) -> None:
+    good = [*carry(1, "hallway", "?a"), *carry(2, "living_room", second)]
+    if second == "?a" or joined:
+        good[4]["after"] = ["13"]
+    assert isinstance(consider({"tasks": good}, flat=False), Plan)
+    mixed = [*good, *extra]
+    random.shuffle(mixed)
+    made = consider({"tasks": mixed}, flat=False)
+    reached["thinned" if isinstance(made, Plan) and extra else type(made).__name__] += 1
+    if isinstance(made, Plan):
+        assert sorted(task.skill for task in made.tasks) == sorted(
+            ["navigate", "pick", "navigate", "place"] * 2
+        ), "nothing that no goal needs"
 
 
 @given(st.recursive(st.text(), lambda inner: st.dictionaries(st.text(), inner)))

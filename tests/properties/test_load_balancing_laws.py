@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from itertools import combinations, product
 
 import pulp
@@ -18,6 +17,7 @@ from fleet.allocators.load_balancing import (
 from fleet.allocators.load_balancing.robot_sets import bits, classes_of, mask_of, projection
 from fleet.allocators.load_balancing.semi_matching import loads_of, semi_matching
 from fleet.allocators.min_max_load_program import MinMaxLoadProgram, Status, solve
+from tests.support.reached import Reached, reaches
 
 LIMIT_S = 600.0
 """So small a program takes milliseconds."""
@@ -107,25 +107,22 @@ def test_unit_tasks_have_the_least_maximum_load_that_the_program_finds(
     assert made.loads[0] == by_cbc(problem) == by_scipy(problem)
 
 
-def test_unequal_and_apart_actors_have_the_programs_maximum_load() -> None:
-    reached: Counter[str] = Counter()
-
-    @settings(max_examples=100)
-    @given(problem=problems(actors=8, robots=4, heaviest=5, pairs=5))
-    def law(problem: LoadBalancingProblem) -> None:
-        made, least = balance(problem), by_cbc(problem)
-        assert least == by_scipy(problem)
-        reached["infeasible"] += least is None
-        if isinstance(made, NoAssignment):
-            assert made.proven and least is None
-            return
-        check_assignment(problem, made)
-        assert made.optimal
-        assert made.loads[0] == least
-        reached["unequal and apart"] += len(set(problem.load)) > 1 and bool(problem.apart)
-
-    law()
-    assert reached["infeasible"] and reached["unequal and apart"], reached
+@reaches("infeasible", "unequal and apart")
+@settings(max_examples=100)
+@given(problem=problems(actors=8, robots=4, heaviest=5, pairs=5))
+def test_unequal_and_apart_actors_have_the_programs_maximum_load(
+    reached: Reached, problem: LoadBalancingProblem
+) -> None:
+    made, least = balance(problem), by_cbc(problem)
+    assert least == by_scipy(problem)
+    reached["infeasible"] += least is None
+    if isinstance(made, NoAssignment):
+        assert made.proven and least is None
+        return
+    check_assignment(problem, made)
+    assert made.optimal
+    assert made.loads[0] == least
+    reached["unequal and apart"] += len(set(problem.load)) > 1 and bool(problem.apart)
 
 
 @settings(max_examples=300)
@@ -137,46 +134,39 @@ def test_unit_loads_are_lexicographically_least(problem: LoadBalancingProblem) -
     assert list(made.loads) == by_force(problem)
 
 
-def test_all_loads_of_small_problems_are_lexicographically_least() -> None:
-    reached: Counter[str] = Counter()
-
-    @settings(max_examples=300)
-    @example(problem=FIVE_IN_A_RING)
-    @given(problem=problems(actors=6, robots=4, heaviest=4, pairs=8))
-    def law(problem: LoadBalancingProblem) -> None:
-        made, best = balance(problem), by_force(problem)
-        if isinstance(made, BalancedAssignment):
-            check_assignment(problem, made)
-            assert made.optimal
-            assert list(made.loads) == best
-            reached["balanced"] += bool(problem.apart)
-            return
-        assert made.proven and best is None
-        for actor in made.clique:
-            others = {b if a == actor else a for a, b in problem.apart if actor in (a, b)}
-            assert set(made.clique) <= others | {actor}
-        able = {robot for actor in made.clique for robot in bits(problem.able[actor])}
-        assert not made.clique or len(able) < len(made.clique)
-        reached["pair" if len(made.clique) == 2 else "clique" if made.clique else "no clique"] += 1
-
-    law()
-    for kind in ("balanced", "pair", "clique", "no clique"):
-        assert reached[kind], reached
+@reaches("balanced", "pair", "clique", "no clique")
+@settings(max_examples=300)
+@example(problem=FIVE_IN_A_RING)
+@given(problem=problems(actors=6, robots=4, heaviest=4, pairs=8))
+def test_all_loads_of_small_problems_are_lexicographically_least(
+    reached: Reached, problem: LoadBalancingProblem
+) -> None:
+    made, best = balance(problem), by_force(problem)
+    if isinstance(made, BalancedAssignment):
+        check_assignment(problem, made)
+        assert made.optimal
+        assert list(made.loads) == best
+        reached["balanced"] += bool(problem.apart)
+        return
+    assert made.proven and best is None
+    for actor in made.clique:
+        others = {b if a == actor else a for a, b in problem.apart if actor in (a, b)}
+        assert set(made.clique) <= others | {actor}
+    able = {robot for actor in made.clique for robot in bits(problem.able[actor])}
+    assert not made.clique or len(able) < len(made.clique)
+    reached["pair" if len(made.clique) == 2 else "clique" if made.clique else "no clique"] += 1
 
 
-def test_large_answers_are_right_and_their_bound_too() -> None:
-    reached: Counter[str] = Counter()
-
-    @settings(max_examples=60)
-    @given(problem=problems(actors=90, robots=12, heaviest=7, pairs=30, least=40))
-    def law(problem: LoadBalancingProblem) -> None:
-        made = balance(problem)
-        if isinstance(made, BalancedAssignment):
-            check_assignment(problem, made)
-            reached["large"] += len(problem.able) > 20
-
-    law()
-    assert reached["large"], reached
+@reaches("large")
+@settings(max_examples=60)
+@given(problem=problems(actors=90, robots=12, heaviest=7, pairs=30, least=40))
+def test_large_answers_are_right_and_their_bound_too(
+    reached: Reached, problem: LoadBalancingProblem
+) -> None:
+    made = balance(problem)
+    if isinstance(made, BalancedAssignment):
+        check_assignment(problem, made)
+        reached["large"] += len(problem.able) > 20
 
 
 @settings(max_examples=200)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -15,6 +13,7 @@ from fleet.service.composition import compose
 from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.payloads.goals import Goal
 from tests.support.household import bring, carrier, home, manipulator
+from tests.support.reached import Reached, reaches
 
 PARTS = compose()
 PLACES = ("kitchen", "hallway", "living_room")
@@ -80,31 +79,27 @@ def done_by_a_helper() -> tuple[WorldModel, tuple[Goal, ...]]:
     return world, (bring(1, "kitchen"), bring(3, "hallway"))
 
 
-def test_what_can_be_done_is_planned_and_allocated() -> None:
-    seen: Counter[str] = Counter()
-
-    @settings(max_examples=60, deadline=None)
-    @given(missions(), st.sampled_from(STRATEGIES))
-    @example(undone_by_a_helper(), "monolithic")
-    @example(undone_by_a_helper(), "big-dag")
-    @example(undone_by_a_helper(), "per-goal")
-    @example(done_by_a_helper(), "monolithic")
-    def law(mission: tuple[WorldModel, tuple[Goal, ...]], strategy: str) -> None:
-        world, goals = mission
-        problem = PlanningProblem("p", goals, world, strategy=strategy)
-        made = PARTS.planners["symbolic"].plan(problem)
-        assert isinstance(made, CheckedPlan), made.reason
-        assert isinstance(check_plan(made.plan, world), CheckedPlan)
-        found = PARTS.allocators["milp"].allocate(made)
-        assert isinstance(found, Allocated), found.violations
-        order = found.schedule.extra_after
-        assert check_allocation(made.plan, world, found.allocation, order) == ()
-        seen.update({strategy, *(task.skill for task in made.plan.tasks)})
-        seen["pinned"] += bool(made.plan.pins)
-        seen["one goal after the other"] += any(
-            len(row) > 1 for row in found.schedule.sequence.values()
-        )
-
-    law()
-    kinds = (*STRATEGIES, "pick", "place", "place_on_robot", "pinned", "one goal after the other")
-    assert all(seen[kind] for kind in kinds), seen
+@reaches(*STRATEGIES, "pick", "place", "place_on_robot", "pinned", "one goal after the other")
+@settings(max_examples=60, deadline=None)
+@given(missions(), st.sampled_from(STRATEGIES))
+@example(undone_by_a_helper(), "monolithic")
+@example(undone_by_a_helper(), "big-dag")
+@example(undone_by_a_helper(), "per-goal")
+@example(done_by_a_helper(), "monolithic")
+def test_what_can_be_done_is_planned_and_allocated(
+    reached: Reached, mission: tuple[WorldModel, tuple[Goal, ...]], strategy: str
+) -> None:
+    world, goals = mission
+    problem = PlanningProblem("p", goals, world, strategy=strategy)
+    made = PARTS.planners["symbolic"].plan(problem)
+    assert isinstance(made, CheckedPlan), made.reason
+    assert isinstance(check_plan(made.plan, world), CheckedPlan)
+    found = PARTS.allocators["milp"].allocate(made)
+    assert isinstance(found, Allocated), found.violations
+    order = found.schedule.extra_after
+    assert check_allocation(made.plan, world, found.allocation, order) == ()
+    reached.update({strategy, *(task.skill for task in made.plan.tasks)})
+    reached["pinned"] += bool(made.plan.pins)
+    reached["one goal after the other"] += any(
+        len(row) > 1 for row in found.schedule.sequence.values()
+    )

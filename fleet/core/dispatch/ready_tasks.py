@@ -1,16 +1,16 @@
-"""The ready set: a waiting task is ordered once its turn has come and its robots are free."""
+"""The ready set: tasks whose turn has come and whose robots are free, ordered at once."""
 
 from __future__ import annotations
 
 from msgspec.structs import replace
 
-from fleet.core.dispatch.free_robots import is_free
 from fleet.core.model.preconditions import action_of, unmet_before
 from fleet.core.model.skills import Action, Skills
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
 from fleet.core.state import State
 from fleet.core.updates import give_up, set_entry, set_record
 from keyexpr_schema.facts import AT
+from keyexpr_schema.payloads.goals import ENDED_GOALS
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 
@@ -19,7 +19,7 @@ def order_if_ready(
 ) -> State:
     """Order a waiting task if nothing holds it back; replan if the world is not as it must be.
 
-    See `is_free` for `reservations`.
+    See `_is_free` for `reservations`.
     """
     entry = state.plans[plan]
     befores = (*record.after, *record.behind)
@@ -33,7 +33,7 @@ def order_if_ready(
     if action is None:
         reason = f"{record.task} cannot start: there is no skill {record.skill} any more"
         return give_up(state, entry, reason)
-    if not all(is_free(state, robot, plan, reservations) for robot in action.participants):
+    if not all(_is_free(state, robot, plan, reservations) for robot in action.participants):
         return state
     if _touches_unwanted_work(entry, action, skills):
         return state
@@ -70,3 +70,44 @@ def _way_s(state: State, action: Action, skills: Skills) -> float | None:
     if here is None or here.value not in state.places:
         return None
     return state.world(skills).way_s(action.actor, here.value, action.args[action.skill.travel_to])
+
+
+def _is_free(state: State, robot: str, plan: str, reservations: bool) -> bool:
+    """Whether a robot is connected, and neither works now nor is reserved by another plan.
+
+    A robot that carries what a plan wants brought somewhere is that plan's until it is delivered:
+    between a pick and its place no other plan may have the hand. Without a load, a robot that has
+    begun an actor's work stays reserved by that plan until it has nothing left to do there, unless
+    `reservations` are not to count.
+    """
+    if not state.connected.get(robot):
+        return False
+    carries = _carries_for(state, robot, state.plans[plan])
+    for entry in state.plans.values():
+        begun: set[str] = set()
+        unfinished: set[str] = set()
+        for record in entry.records.values():
+            if robot not in (record.robot, *record.args.values()):
+                continue
+            if record.state in OUTSTANDING:
+                return False
+            if record.robot == robot and record.state is TaskState.SUCCEEDED:
+                begun.add(record.actor)
+            elif record.robot == robot and record.state is TaskState.WAITING:
+                unfinished.add(record.actor)
+        if entry.plan.plan == plan or entry.ended or carries:
+            continue
+        if (reservations and begun & unfinished) or _carries_for(state, robot, entry):
+            return False
+    return True
+
+
+def _carries_for(state: State, robot: str, entry: PlanEntry) -> bool:
+    """Whether a robot has something with it that an open goal of the plan is about."""
+    return any(
+        (fact := state.fact(AT, subject)) is not None and fact.value == robot
+        for goal in entry.plan.goals
+        if goal in state.goal_states and state.goal_states[goal].state not in ENDED_GOALS
+        for condition in state.goal_states[goal].conditions
+        for subject in condition.subjects
+    )

@@ -54,22 +54,19 @@ def reconcile(
             records[task.task] = replace(
                 records[task.task], state=TaskState.SUCCEEDED, reason="it is so already"
             )
-    wanted = {task.task for task in plan.tasks}
-    unwanted: list[str] = []
-    dropped = 0
-    for name, record in entry.records.items():
-        if name in wanted:
-            continue
-        if record.state in OUTSTANDING:
-            unwanted.append(name)
-            dropped += 1
-        elif record.state is TaskState.WAITING:
-            dropped += 1
-            records[name] = replace(record, state=TaskState.CANCELLED, reason="not in the new plan")
+    rest = entry.records.keys() - {task.task for task in plan.tasks}
+    unwanted = tuple(n for n, r in entry.records.items() if n in rest and r.state in OUTSTANDING)
+    waiting = [name for name in rest if entry.records[name].state is TaskState.WAITING]
+    for name in waiting:
+        records[name] = replace(
+            records[name], state=TaskState.CANCELLED, reason="not in the new plan"
+        )
     # A task that is so already may have been waiting: then it is kept, and counts once.
     added = sum(task.task not in {*names, *skipped} for task in event.plan.tasks)
-    change = PlanChange(kept=len(names), dropped=dropped, added=added)
-    return Revision(plan, records, tuple(unwanted), change)
+    dropped = len(unwanted) + len(waiting)
+    return Revision(
+        plan, records, unwanted, PlanChange(kept=len(names), dropped=dropped, added=added)
+    )
 
 
 def _call(task: Task, allocation: Mapping[str, str]) -> Call:

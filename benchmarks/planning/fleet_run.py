@@ -1,4 +1,4 @@
-"""One mission, run: the planner's core and desk, robots with real skills, a kinematic world."""
+"""One mission, run: the planner's core and jobs, real skills, a kinematic world."""
 
 from __future__ import annotations
 

@@ -137,7 +137,7 @@ Written by `{command}` in {took_s:.0f} s on {machine()} ({packages}).
 
 {missions} missions, written by hand in `benchmarks/planning/missions`: plain sentences, a world,
 what the planner is told of it, and what must really be true at the end. They go through the
-planner's own core and desk; robots carry the orders out with the workers' own skills and retries
+planner's own core and jobs; robots carry the orders out with the workers' own skills and retries
 in a kinematic world (`sim.kinematic.backend`: drives take the route's length, things do not fall).
 A mission succeeds if that world is then as the mission file says, if nothing was moved that the
 mission does not speak of, and if the planner's own statuses agree. Those that must be refused

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 from fleet.allocators.min_max_load_program import MinMaxLoadProgram, solve
 from fleet.jobshop.instance import Instance
-from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.problem import Shop
+from fleet.jobshop.search.list_scheduling import list_schedule
 
 MILP_S = 10.0
 """Wall time of a solver, s."""

@@ -22,10 +22,10 @@ from benchmarks.allocation.alternatives import big_m, in_turn, makespan_s, neare
 from benchmarks.allocation.shop_files import NAMES, load
 from benchmarks.allocation.shops import random_shop, with_under_way, without_machines
 from fleet.jobshop.instance import Instance
-from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.portfolio import solve
 from fleet.jobshop.problem import Machine, Shop
 from fleet.jobshop.rescheduling import reschedule
+from fleet.jobshop.search.list_scheduling import list_schedule
 from fleet.jobshop.time_budget import TimeBudget
 
 SIZES = ((8, 3), (10, 3), (20, 4), (50, 5), (100, 10), (1000, 50), (10_000, 1000))

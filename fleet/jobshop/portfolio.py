@@ -6,14 +6,14 @@ import time
 from dataclasses import replace
 from math import ceil
 
-from fleet.jobshop.annealing import anneal
 from fleet.jobshop.bounds import bound_with_travel, lower_bound
-from fleet.jobshop.branch_and_bound import branch_and_bound
-from fleet.jobshop.cpsat import CpSat, helps, installed
 from fleet.jobshop.forward_pass import Solution, schedule_of
 from fleet.jobshop.instance import Instance
-from fleet.jobshop.list_scheduling import dispatching_rules, list_schedule, random_restarts
 from fleet.jobshop.problem import Schedule, Shop
+from fleet.jobshop.search.annealing import anneal
+from fleet.jobshop.search.branch_and_bound import branch_and_bound
+from fleet.jobshop.search.cpsat import CpSat, helps, installed
+from fleet.jobshop.search.list_scheduling import dispatching_rules, list_schedule, random_restarts
 from fleet.jobshop.time_budget import TimeBudget
 
 RULES_SHARE = 0.3

@@ -13,15 +13,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
-from fleet.jobshop.annealing import anneal
 from fleet.jobshop.bounds import lower_bound
 from fleet.jobshop.forward_pass import Solution, evaluate
 from fleet.jobshop.instance import Instance
-from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.portfolio import schedule_in_order
 from fleet.jobshop.problem import Position, Schedule, Shop
+from fleet.jobshop.search.annealing import anneal
+from fleet.jobshop.search.list_scheduling import list_schedule
+from fleet.jobshop.search.warm_start import warm_start
 from fleet.jobshop.time_budget import TimeBudget
-from fleet.jobshop.warm_start import warm_start
 
 WITHIN = 0.02
 """Share of the best makespan that fewer moves may cost."""

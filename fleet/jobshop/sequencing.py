@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import permutations
 
-from fleet.jobshop.annealing import anneal
-from fleet.jobshop.branch_and_bound import branch_and_bound
 from fleet.jobshop.forward_pass import Solution, evaluate
 from fleet.jobshop.instance import Instance
-from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.problem import Shop
+from fleet.jobshop.search.annealing import anneal
+from fleet.jobshop.search.branch_and_bound import branch_and_bound
+from fleet.jobshop.search.list_scheduling import list_schedule
 from fleet.jobshop.time_budget import TimeBudget
 
 FEW = 5

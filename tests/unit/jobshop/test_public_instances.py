@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from benchmarks.allocation.shop_files import INSTANCES, BadInstance, load, read_instance
-from fleet.jobshop.cpsat import installed
 from fleet.jobshop.portfolio import solve
+from fleet.jobshop.search.cpsat import installed
 from fleet.jobshop.time_budget import StepClock, TimeBudget
 
 KNOWN = {

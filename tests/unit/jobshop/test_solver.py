@@ -7,11 +7,11 @@ import time
 import pytest
 
 from benchmarks.allocation.shops import random_shop, without_machines
-from fleet.jobshop.cpsat import CpSat, installed
 from fleet.jobshop.instance import Instance
-from fleet.jobshop.list_scheduling import list_schedule
 from fleet.jobshop.portfolio import solve
 from fleet.jobshop.problem import BadShop, Block, Machine, Operation, Shop
+from fleet.jobshop.search.cpsat import CpSat, installed
+from fleet.jobshop.search.list_scheduling import list_schedule
 from fleet.jobshop.time_budget import TimeBudget
 from tests.support.searches import NEVER_S, steps
 

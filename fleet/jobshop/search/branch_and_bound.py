@@ -41,10 +41,11 @@ def _one_order(instance: Instance) -> bool:
     """Whether no schedule is lost by all machines taking components in one order.
 
     A block that waits for one of two that meet can stand before the other one on its machine; and
-    three that meet can be taken in different orders. Otherwise machines would wait in a circle.
+    three that meet can be taken in different orders. So can what comes after the beginning of a
+    block and what its end waits for. Otherwise machines would wait in a circle.
     """
     return all(
-        len(blocks) == 1
+        (len(blocks) == 1 and _waits_before_it_gives(instance, blocks[0]))
         or (
             len(blocks) == 2
             and not instance.component_predecessors[component]
@@ -52,6 +53,14 @@ def _one_order(instance: Instance) -> bool:
         )
         for component, blocks in enumerate(instance.component_blocks)
     )
+
+
+def _waits_before_it_gives(instance: Instance, block: int) -> bool:
+    """Whether no operation of another block comes after one of this, and before a later one."""
+    mine = instance.operations_of[block]
+    waits = [i for i, op in enumerate(mine) if not set(mine).issuperset(instance.predecessors[op])]
+    gives = [i for i, op in enumerate(mine) if not set(mine).issuperset(instance.successors[op])]
+    return not waits or not gives or waits[-1] <= gives[0]
 
 
 class _Search:

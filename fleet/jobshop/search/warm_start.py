@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 from fleet.jobshop.forward_pass import Solution
 from fleet.jobshop.instance import Instance
-from fleet.jobshop.list_scheduling import GreedySchedule, Placement
+from fleet.jobshop.search.list_scheduling import GreedySchedule, Placement
 
 NEAR = 1e-9
 

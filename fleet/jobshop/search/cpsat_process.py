@@ -1,6 +1,6 @@
 """A process that runs CP-SAT: a shop as JSON on standard input, solutions as JSON lines out.
 
-Run as a script by `fleet.jobshop.cpsat`, with nothing of this package imported. A line
+Run as a script by `fleet.jobshop.search.cpsat`, with nothing of this package imported. A line
 is printed for every better solution, so that whoever ends the process early has the best so far;
 the last line has the status and the proven bound.
 

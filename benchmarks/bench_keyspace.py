@@ -156,7 +156,8 @@ async def _puts(session: Session) -> list[tuple[str, float]]:
 
 
 async def _journaled(session: Session) -> int:
-    return (await session.query(STORE_JOURNAL, StoreAddress(), StoreQuery(limit=0))).last
+    reply = await session.query(STORE_JOURNAL, StoreAddress(), StoreQuery(limit=0))
+    return int(reply.last)
 
 
 async def _listed(writer: Session, reader: Session) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from msgspec.structs import replace
@@ -64,7 +64,7 @@ def main() -> None:
         )
         changed = entry.change or PlanChange()
         changes = [str(n) for n in (changed.kept, changed.dropped, changed.added)]
-        least = next((n.split(" is ")[-1] for n in entry.notes if "least found" in n), "")
+        least = next((n.split(" is ")[-1] for n in entry.outcome.notes if "least found" in n), "")
         table.add_row(
             (happens.__doc__ or "").split(".")[0],
             f"{made.planning_time_s:.2f} s",
@@ -80,14 +80,15 @@ def main() -> None:
 
 @dataclass
 class Running:
-    """The planner in the middle of a plan; robots do what they are told, as long as predicted."""
+    """The planner in the middle of a plan; robots take as long as predicted."""
 
-    parts: Composition
+    composition: Composition
     robots: int
     goals: int
+    made: PlanningSucceeded = field(init=False)
 
     def __post_init__(self) -> None:
-        self.state, self.time_s, self.made = State(), 0.0, PlanningSucceeded
+        self.state, self.time_s = State(), 0.0
         self.receive(events.PlannerStarted, epoch=1, incarnation="bench")
         for number in range(PLACES):
             ways = {f"room_{n}": abs(n - number) * STEP_M for n in range(PLACES) if n != number}
@@ -101,14 +102,14 @@ class Running:
             )  # fmt: skip
             self.receive(events.RobotRegistered, spec=spec)
             self.receive(events.WorkerConnected, robot=spec.robot, incarnation="i1")
-            self.learn(spec.robot, HOLDING, NOTHING)
-            self.learn(spec.robot, AT, f"room_{number % PLACES}")
+            self.put_fact(spec.robot, HOLDING, NOTHING)
+            self.put_fact(spec.robot, AT, f"room_{number % PLACES}")
         for number in range(self.goals):
             self.receive(
                 events.ObjectPut,
                 object=Object(object=f"c{number}", kind="cup", label=f"c{number}"),
             )
-            self.learn(f"c{number}", AT, f"room_{number % PLACES}")
+            self.put_fact(f"c{number}", AT, f"room_{number % PLACES}")
             wanted = f"room_{(number + 1 + number // PLACES % (PLACES - 1)) % PLACES}"
             condition = Condition(relation=AT, subject=f"c{number}", value=wanted)
             goal = Goal(goal=f"g{number}", text="", conditions=(condition,), ordinal=number)
@@ -124,17 +125,17 @@ class Running:
         """One event; planning jobs are done at once."""
         self.time_s += wait_s
         at = {"time_s": self.time_s, "wall_time_s": self.time_s}
-        self.state, effects = step(self.state, kind(**at, **fields), self.parts.skills)
+        self.state, effects = step(self.state, kind(**at, **fields), self.composition.skills)
         for effect in effects:
             if isinstance(effect, MakePlan):
-                made = run_planning_job(effect.job, self.state, self.parts, at)
+                made = run_planning_job(effect.job, self.state, self.composition, at)
                 if not isinstance(made, PlanningSucceeded):
                     raise SystemExit(f"there is no plan: {made.reason}")
                 self.made = made
-                self.state, _ = step(self.state, made, self.parts.skills)
+                self.state, _ = step(self.state, made, self.composition.skills)
 
-    def learn(self, subject: str, relation: str, value: str) -> None:
-        """Something is told."""
+    def put_fact(self, subject: str, relation: str, value: str) -> None:
+        """A fact is put."""
         fact = Fact(subject=subject, relation=relation, value=value, source="bench")
         self.receive(events.FactPut, fact=fact)
 

@@ -137,7 +137,7 @@ HEAD = (
 
 def rows(found: Sequence[Run], scenario: str) -> list[tuple[str, ...]]:
     """The table of a scenario: mean ± standard deviation over households."""
-    made = []
+    made: list[tuple[str, ...]] = []
     mine = [run for run in found if run.scenario == scenario]
     for strategy in STRATEGIES:
         for name in dict.fromkeys(run.allocator for run in mine):

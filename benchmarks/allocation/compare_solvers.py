@@ -80,9 +80,11 @@ def measured(
     assert isinstance(known, BalancedAssignment)
     start = {str(actor): str(robot) for actor, robot in enumerate(known.robot)}
     program = program_of(problem)
+    travel_s: dict[tuple[str, str], float] = {}
+    begin: dict[str, float] = {}
+    gap = 0.0
     if step == "max load":
         program.minimise_max_load()
-        gap, travel_s, begin = 0.0, {}, None
     else:
         chance = random.Random(7)
         places = [(chance.uniform(0, SIDE_M), chance.uniform(0, SIDE_M)) for _ in range(PLACES)]
@@ -122,11 +124,11 @@ def measured(
 
 
 def _by_pulp(
-    model: Any, solver: str, limit_s: float, gap: float, start: dict[str, float] | None
+    model: Any, solver: str, limit_s: float, gap: float, start: dict[str, float]
 ) -> tuple[dict[str, float], bool]:
     import pulp
 
-    for variable in model.variables() if start else ():
+    for variable in model.variables() if start else []:
         variable.setInitialValue(start[variable.name])
     options = {"msg": False, "timeLimit": limit_s, "gapRel": gap, "warmStart": bool(start)}
     cbc = pulp.PULP_CBC_CMD.pulp_cbc_path  # the one in PuLP's wheel

@@ -25,7 +25,7 @@ from rich.table import Table
 
 from benchmarks.bench_planner import goals_of, household
 from benchmarks.engines import pddl
-from fleet.allocators.base import Allocated, Allocator
+from fleet.allocators.base import Allocated, AllocationProblem, Allocator, Assignment
 from fleet.core.checker.checked_plan import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
@@ -67,7 +67,7 @@ def main() -> None:
     console = Console(width=140)
     rows: list[Row] = []
 
-    def tell(row: Row) -> None:
+    def announce(row: Row) -> None:
         """As it comes: the table is there only at the end."""
         rows.append(row)
         spent = row.outcome if row.planning_s is None else f"{row.planning_s:.2f} s"
@@ -77,9 +77,9 @@ def main() -> None:
     given_up: set[str] = set()
     for size in (size for size in SIZES if size[0] <= chosen.largest):
         for row in _own(size, parts):
-            tell(row)
+            announce(row)
         for engine in (engine for engine in ENGINES if engine not in given_up):
-            tell(row := _engine(size, engine, parts, chosen.python, chosen.timeout))
+            announce(row := _engine(size, engine, parts, chosen.python, chosen.timeout))
             if row.planning_s is None:
                 given_up.add(engine)
     console.print(_table(rows))
@@ -153,8 +153,8 @@ class _Bound(Allocator):
     def __init__(self, bound: dict[str, str]) -> None:
         self._bound = bound
 
-    def _assign(self, problem: object) -> dict[str, str]:
-        return self._bound
+    def _assign(self, problem: AllocationProblem) -> Assignment:
+        return Assignment(self._bound)
 
 
 def _sequences(actions: Sequence[Action], world: WorldModel) -> list[ActionSequence]:

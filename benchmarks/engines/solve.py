@@ -22,27 +22,27 @@ def main() -> None:
         from unified_planning.io import PDDLReader
         from unified_planning.shortcuts import OneshotPlanner
     except ImportError:
-        return tell(status="not installed")
+        return answer(status="not installed")
     up.shortcuts.get_environment().credits_stream = None
     task = PDDLReader().parse_problem(domain, problem)
     try:
         planner = OneshotPlanner(name=engine)
     except Exception as error:  # it says in many ways that an engine is not there
-        return tell(status="not installed", why=str(error).splitlines()[0])
+        return answer(status="not installed", why=str(error).splitlines()[0])
     began_s = processor_s()
     try:
         with planner:
             result = planner.solve(task, timeout=float(timeout_s))
     except Exception as error:
-        return tell(status="failed", why=f"{type(error).__name__}: {error}".splitlines()[0])
+        return answer(status="failed", why=f"{type(error).__name__}: {error}".splitlines()[0])
     took_s = processor_s() - began_s
     if result.plan is None:
-        return tell(status=result.status.name.lower(), seconds=took_s)
+        return answer(status=result.status.name.lower(), seconds=took_s)
     steps = [
         (step.action.name, [str(argument) for argument in step.actual_parameters])
         for step in _sequence(result.plan)
     ]
-    return tell(status="solved", seconds=took_s, steps=steps)
+    return answer(status="solved", seconds=took_s, steps=steps)
 
 
 def processor_s() -> float:
@@ -59,7 +59,7 @@ def _sequence(plan: Any) -> list[Any]:
     return list(next(iter(plan.all_sequential_plans())).actions)
 
 
-def tell(**what: Any) -> None:
+def answer(**what: Any) -> None:
     """One line of JSON, the last of the output."""
     print("\n" + json.dumps(what))
 

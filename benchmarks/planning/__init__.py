@@ -1,1 +1,1 @@
-"""A suite of household missions that judges whole planners by what came to be in the world."""
+"""A suite of household missions for whole planners; the verdict is what came to be in the world."""

@@ -1,4 +1,4 @@
-"""One mission, run: the planner's core and jobs, real skills, a kinematic world."""
+"""One mission: the planner's core and planning jobs, robots with real skills, a kinematic world."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from benchmarks.planning.bodies import KinematicBody, SharedWorld
+from benchmarks.planning.embodiments import KinematicEmbodiment, SharedWorld
+from benchmarks.planning.expectations import GroundTruth
 from benchmarks.planning.missions import Mission
-from benchmarks.planning.robots import INCARNATION, Robot
-from benchmarks.planning.simulated_time import SimulatedLoop, Stuck
-from benchmarks.planning.truth import Witness
+from benchmarks.planning.robot_worker import INCARNATION, RobotWorker
+from benchmarks.planning.simulated_time import Deadlock, SimulatedLoop
 from fleet.core import events
 from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract
 from fleet.core.events import Event
@@ -63,7 +63,7 @@ class FleetRun:
     def __init__(
         self,
         mission: Mission,
-        parts: Composition,
+        composition: Composition,
         planner: str,
         strategy: str,
         loop: SimulatedLoop,
@@ -74,22 +74,29 @@ class FleetRun:
         self.counts = Counts()
         self.stage = 0
         """How many of the mission's stages have held, in their order."""
-        self._parts, self._planner, self._strategy = parts, planner, strategy
+        self._composition, self._planner, self._strategy = composition, planner, strategy
         self._interpreter = interpreter
-        self.backend = KinematicBackend(mission.real_world(), mission.robots, seed=SEED)
+        self.backend = KinematicBackend(mission.existing_world(), mission.robots, seed=SEED)
         self.shared = SharedWorld(self.backend)
         self._ended: asyncio.Future[None] = loop.create_future()
-        loop.drive(self._go_on, lambda: self._fail(Stuck("everybody waits for somebody else")))
+        loop.drive(
+            self._advance,
+            lambda: self._fail(Deadlock("a deadlock: no motion runs and no timer is set")),
+        )
         self._places = {place.place: place for place in mission.places}
-        self._view = WorldCache()
+        self._world = WorldCache()
         registry = SkillRegistry(HOUSEHOLD)
         self._robots = {
-            spec.robot: Robot(
-                spec, KinematicBody(self.shared, spec.robot), self._view, registry, self._hear
+            spec.robot: RobotWorker(
+                spec,
+                KinematicEmbodiment(self.shared, spec.robot),
+                self._world,
+                registry,
+                self._receive,
             )
             for spec, _ in mission.robots
         }
-        self._news: deque[Event] = deque()
+        self._pending: deque[Event] = deque()
         self._busy = False
 
     async def run(self) -> str | None:
@@ -100,18 +107,20 @@ class FleetRun:
         self._introduce()
         for robot in self._robots.values():
             await robot.introduce_itself()
-        self._tell_beliefs()
+        self._put_beliefs()
         working = [asyncio.ensure_future(robot.work()) for robot in self._robots.values()]
         for number, text in enumerate(self.mission.entry.goals, 1):
-            self._tell(events.GoalPut, goal=Goal(goal=f"goal_{number}", text=text, ordinal=number))
+            self._handle(
+                events.GoalPut, goal=Goal(goal=f"goal_{number}", text=text, ordinal=number)
+            )
         request = PlanRequest(request="r1", planner=self._planner, strategy=self._strategy)
-        self._tell(events.PlanRequested, request=request)
-        self._note_stage()
+        self._handle(events.PlanRequested, request=request)
+        self._advance_stage()
         wrong: str | None = None
         try:
             if not self._done():
                 await self._ended
-        except (Stuck, TimeoutError) as error:
+        except (Deadlock, TimeoutError) as error:
             wrong = str(error)
         for task in working:
             task.cancel()
@@ -122,10 +131,10 @@ class FleetRun:
                 self.counts.reasons.append(entry.reason)
         return wrong
 
-    def witness(self) -> Witness:
+    def ground_truth(self) -> GroundTruth:
         """What is really so now."""
         see_m = {spec.robot: spec.capabilities.get("see", 0.0) for spec, _ in self.mission.robots}
-        return Witness(
+        return GroundTruth(
             objects={truth.object: truth for truth in self.backend.truths()},
             robots={robot: self.backend.senses(robot) for robot in self.backend.robots},
             places=self._places,
@@ -138,37 +147,39 @@ class FleetRun:
         )
 
     def refusals(self) -> list[str]:
-        """What the fleet says of goals that it did not reach, and of requests it refused."""
-        said = [
+        """Why goals were not reached and requests were refused, as the fleet puts it."""
+        reasons = [
             f"{status.goal}: {status.reason}"
             for status in self.state.goal_states.values()
             if status.reason
         ]
-        said += [a.sentence for a in self.state.answers.values() if not a.accepted]
-        said += [b.reason for b in self.state.plans.values() if b.reason]
-        return list(dict.fromkeys(said))
+        reasons += [a.sentence for a in self.state.answers.values() if not a.accepted]
+        reasons += [b.reason for b in self.state.plans.values() if b.reason]
+        return list(dict.fromkeys(reasons))
 
     # --- the world goes on -----------------------------------------------------------------------
 
-    def _go_on(self) -> float | None:
-        went_s = self.shared.go_on()
-        if went_s is not None:
-            self._show_robots()
-            self._note_stage()
+    def _advance(self) -> float | None:
+        passed_s = self.shared.advance()
+        if passed_s is not None:
+            self._update_robots()
+            self._advance_stage()
             if self.backend.time_s > MOST_SIMULATED_S:
                 self._fail(TimeoutError(f"not done after {MOST_SIMULATED_S:g} simulated seconds"))
-        return went_s
+        return passed_s
 
-    def _note_stage(self) -> None:
-        stages, witness = self.mission.stages, self.witness()
-        while self.stage < len(stages) and all(witness.sees(t) for t in stages[self.stage]):
+    def _advance_stage(self) -> None:
+        stages, ground_truth = self.mission.stages, self.ground_truth()
+        while self.stage < len(stages) and all(
+            ground_truth.satisfies(one) for one in stages[self.stage]
+        ):
             self.stage += 1
 
     def _fail(self, error: Exception) -> None:
         if not self._ended.done():
             self._ended.set_exception(error)
 
-    def _show_robots(self) -> None:
+    def _update_robots(self) -> None:
         for name in self._robots:
             senses = self.backend.senses(name)
             state = RobotState(
@@ -181,39 +192,39 @@ class FleetRun:
                 basket=senses.basket,
                 time_s=senses.time_s,
             )
-            if self._view.robots.get(name) != state:
-                self._view.apply(Change(ROBOT_STATE, RobotAddress(name), state, ""))
+            if self._world.robots.get(name) != state:
+                self._world.apply(Change(ROBOT_STATE, RobotAddress(name), state, ""))
 
-    # --- what the planner hears ------------------------------------------------------------------
+    # --- what the planner receives ---------------------------------------------------------------
 
     def _introduce(self) -> None:
         policy = Policy(interpreter=self._interpreter is not None)
-        self._tell(events.PlannerStarted, epoch=1, incarnation=INCARNATION, policy=policy)
+        self._handle(events.PlannerStarted, epoch=1, incarnation=INCARNATION, policy=policy)
         for place in self._places.values():
-            self._view.apply(Change(PLACE, PlaceAddress(place.place), place, ""))
-            self._tell(events.PlacePut, place=place)
+            self._world.apply(Change(PLACE, PlaceAddress(place.place), place, ""))
+            self._handle(events.PlacePut, place=place)
         for thing in object_payloads(self.mission.world):
-            self._view.apply(Change(OBJECT, ObjectAddress(thing.object), thing, ""))
-            self._tell(events.ObjectPut, object=thing)
+            self._world.apply(Change(OBJECT, ObjectAddress(thing.object), thing, ""))
+            self._handle(events.ObjectPut, object=thing)
         for spec, _ in self.mission.robots:
-            self._view.apply(Change(ROBOT_SPEC, RobotAddress(spec.robot), spec, ""))
-            self._tell(events.RobotRegistered, spec=spec)
-            self._tell(events.WorkerConnected, robot=spec.robot, incarnation=INCARNATION)
-        self._show_robots()
+            self._world.apply(Change(ROBOT_SPEC, RobotAddress(spec.robot), spec, ""))
+            self._handle(events.RobotRegistered, spec=spec)
+            self._handle(events.WorkerConnected, robot=spec.robot, incarnation=INCARNATION)
+        self._update_robots()
 
-    def _tell_beliefs(self) -> None:
-        for thing, place in self.mission.told().items():
-            self._learn(Fact(subject=thing, relation=AT, value=place, source="person"))
-        for thing, surface in self.mission.told_on().items():
-            self._learn(Fact(subject=thing, relation=ON, value=surface, source="person"))
+    def _put_beliefs(self) -> None:
+        for thing, place in self.mission.believed_places().items():
+            self._put_fact(Fact(subject=thing, relation=AT, value=place, source="person"))
+        for thing, surface in self.mission.believed_supports().items():
+            self._put_fact(Fact(subject=thing, relation=ON, value=surface, source="person"))
         for number, text in enumerate(self.mission.entry.statements, 1):
-            self._tell(
-                events.StatementPut, statement=Statement(statement=f"said_{number}", text=text)
+            self._handle(
+                events.StatementPut, statement=Statement(statement=f"statement_{number}", text=text)
             )
 
-    def _hear(self, facts: tuple[Fact, ...], report: Report | None) -> None:
+    def _receive(self, facts: tuple[Fact, ...], report: Report | None) -> None:
         for fact in facts:
-            self._learn(fact)
+            self._put_fact(fact)
         if report is None:
             return
         if report.state is ReportState.STARTED:
@@ -221,13 +232,13 @@ class FleetRun:
         elif report.state in FINAL_REPORTS and report.state is not ReportState.SUCCEEDED:
             self.counts.failed_tasks += 1
             self.counts.reasons.append(f"{report.task} {report.state.value}: {report.reason}")
-        self._tell(events.ReportReceived, report=report)
+        self._handle(events.ReportReceived, report=report)
         if self._done() and not self._ended.done():
             self._ended.set_result(None)
 
-    def _learn(self, fact: Fact) -> None:
-        self._view.apply(Change(FACT, FactAddress.of(fact.key), fact, ""))
-        self._tell(events.FactPut, fact=fact)
+    def _put_fact(self, fact: Fact) -> None:
+        self._world.apply(Change(FACT, FactAddress.of(fact.key), fact, ""))
+        self._handle(events.FactPut, fact=fact)
 
     def _done(self) -> bool:
         """Whether nothing more will happen by itself."""
@@ -240,15 +251,15 @@ class FleetRun:
         """Whether every goal has come to an end, good or bad."""
         return all(s.state in ENDED_GOALS for s in self.state.goal_states.values())
 
-    def _tell(self, kind: type[Event], **fields: Any) -> None:
+    def _handle(self, kind: type[Event], **fields: Any) -> None:
         """One event into the core; what it causes follows, until there is nothing left to do."""
-        self._news.append(kind(**self._at(), **fields))
+        self._pending.append(kind(**self._at(), **fields))
         if self._busy:
             return
         self._busy = True
-        while self._news:
+        while self._pending:
             before = self.state
-            self.state, effects = step(before, self._news.popleft(), self._parts.skills)
+            self.state, effects = step(before, self._pending.popleft(), self._composition.skills)
             # All of a step's effects hold together: what ends makes room for what begins.
             for effect in sorted(effects, key=lambda e: not isinstance(e, Retract)):
                 self._carry_out(effect)
@@ -269,7 +280,7 @@ class FleetRun:
             payload: Any = effect.payload
             self._robots[payload.robot].order(payload)
         elif isinstance(effect, Publish) and effect.key is FACT:
-            self._view.apply(Change(FACT, effect.address, effect.payload, ""))
+            self._world.apply(Change(FACT, effect.address, effect.payload, ""))
 
     def _plan(self, effect: MakePlan) -> None:
         """The simulated clock stands still meanwhile: what planning takes is counted by itself."""
@@ -277,7 +288,7 @@ class FleetRun:
             self._fail(TimeoutError(f"not done after {MOST_REVISIONS} revisions"))
             return
         began_s = time.perf_counter()
-        made = run_planning_job(effect.job, self.state, self._parts, self._at())
+        made = run_planning_job(effect.job, self.state, self._composition, self._at())
         self.counts.planning_s += time.perf_counter() - began_s
         self.counts.revisions += 1
         if isinstance(made, events.PlanningSucceeded):
@@ -287,12 +298,13 @@ class FleetRun:
             self.counts.fallbacks += making.fallback is not None
         else:
             self.counts.reasons.append(made.reason)
-        self._news.append(made)
+        self._pending.append(made)
 
     def _interpret(self, effect: Interpret) -> None:
         assert self._interpreter is not None
         began_s = time.perf_counter()
         read = self._interpreter.interpret(effect.text, self.state.vocabulary())
         self.counts.planning_s += time.perf_counter() - began_s
-        told: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
-        self._news.append(events.GoalInterpreted(**self._at(), goal=effect.goal, **told))
+        answer: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
+        answer |= self._at()
+        self._pending.append(events.GoalInterpreted(goal=effect.goal, **answer))

@@ -1,4 +1,4 @@
-"""Reads missions: a world, what the planner is told of it, sentences, and what must come true."""
+"""Reads missions: a world, what the planner believes of it, sentences, and what must come true."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Literal
 import msgspec
 from msgspec.structs import replace
 
-from benchmarks.planning.truth import Truth, parse_truth
+from benchmarks.planning.expectations import Expectation, parse_expectation
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.world import Place
 from sim.errors import BadFile
@@ -22,31 +22,32 @@ from sim.files.yaml_file import FileEntry, read_yaml
 
 HERE = Path(__file__).parent
 CLASSES = ("simple", "compound", "complex", "vague")
-Expected = Literal["done", "refused", "given-up"]
+Outcome = Literal["done", "refused", "given-up"]
 """`refused`: nothing may be done; `given-up`: tried in vain. Both want a sentence that says why."""
 
 
 class MissionEntry(FileEntry, frozen=True):
     """One mission as it is written down.
 
-    The planner is told where every object is and what it lies on, but for those in `unknown`, and
-    with what `wrong` says of some. `lies` puts objects elsewhere: `[table or floor, x_m, y_m]`.
-    Objects in `missing` are spoken of and exist nowhere. `truth` must hold at the end, `stages` one
-    after the other on the way there. What neither names must not have been moved.
+    The planner believes what is so of every object's place and support, but for those in `unknown`
+    and those that it believes elsewhere (`believed`). `placed` puts objects elsewhere than the
+    world file: `[table or floor, x_m, y_m]`. Objects in `missing` exist in sentences only. `final`
+    must hold at the end, `stages` one after the other on the way there. What neither names must not
+    have been moved.
     """
 
     mission: str
     setting: str
     robots: tuple[str, ...]
     goals: tuple[str, ...]
-    lies: dict[str, tuple[str, float, float]] = {}
+    placed: dict[str, tuple[str, float, float]] = {}
     missing: tuple[str, ...] = ()
     unknown: tuple[str, ...] = ()
-    wrong: dict[str, str] = {}
+    believed: dict[str, str] = {}
     statements: tuple[str, ...] = ()
-    truth: tuple[str, ...] = ()
+    final: tuple[str, ...] = ()
     stages: tuple[tuple[str, ...], ...] = ()
-    expect: Expected = "done"
+    outcome: Outcome = "done"
 
 
 class _File(FileEntry, frozen=True):
@@ -75,15 +76,15 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True):
     world: WorldFile
     places: tuple[Place, ...]
     robots: tuple[tuple[RobotSpec, PoseMRad], ...]
-    truth: tuple[Truth, ...]
-    stages: tuple[tuple[Truth, ...], ...]
+    final: tuple[Expectation, ...]
+    stages: tuple[tuple[Expectation, ...], ...]
 
     @property
     def name(self) -> str:
         """The mission's id."""
         return self.entry.mission
 
-    def real_world(self) -> WorldFile:
+    def existing_world(self) -> WorldFile:
         """The world without what only exists in sentences."""
         there = {
             name: entry
@@ -96,20 +97,20 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True):
         """The place in which an object lies at the start."""
         return self.world.place_at(*self.world.start_point_m(thing)[:2])
 
-    def told(self) -> dict[str, str]:
-        """Where the planner is told that objects are."""
+    def believed_places(self) -> dict[str, str]:
+        """Where the planner believes objects to be at first."""
         known = {
-            thing: self.entry.wrong.get(thing) or self.start_of(thing)
+            thing: self.entry.believed.get(thing) or self.start_of(thing)
             for thing in self.world.object_entries
             if thing not in self.entry.unknown and thing not in self.entry.missing
         }
         return {thing: place for thing, place in known.items() if place is not None}
 
-    def told_on(self) -> dict[str, str]:
-        """What the planner is told that those lie on of which it is told rightly where they are."""
+    def believed_supports(self) -> dict[str, str]:
+        """What it believes to support those objects whose place it believes rightly."""
         return {
             thing: self.world.object_entries[thing].on
-            for thing, place in self.told().items()
+            for thing, place in self.believed_places().items()
             if place == self.start_of(thing)
         }
 
@@ -153,10 +154,10 @@ def _mission(entry: MissionEntry, kind: str, path: Path) -> Mission:
     world, places, robots = _setting(entry.setting)
     where = f"{path}: {entry.mission}"
     objects = dict(world.object_entries)
-    for name in (*entry.lies, *entry.missing, *entry.unknown, *entry.wrong):
+    for name in (*entry.placed, *entry.missing, *entry.unknown, *entry.believed):
         if name not in objects:
             raise BadFile(f"{where}: there is no object {name!r}; there are {', '.join(objects)}")
-    for thing, (table, x_m, y_m) in entry.lies.items():
+    for thing, (table, x_m, y_m) in entry.placed.items():
         if table != "floor" and table not in world.furniture:
             raise BadFile(f"{where}: there is no table {table!r}")
         objects[thing] = replace(objects[thing], on=table, at_m=(x_m, y_m))
@@ -170,11 +171,11 @@ def _mission(entry: MissionEntry, kind: str, path: Path) -> Mission:
         world=replace(world, object_entries=objects),
         places=places,
         robots=tuple(robots[robot] for robot in entry.robots),
-        truth=tuple(parse_truth(text, names, where) for text in entry.truth),
+        final=tuple(parse_expectation(text, names, where) for text in entry.final),
         stages=tuple(
-            tuple(parse_truth(text, names, where) for text in stage) for stage in entry.stages
+            tuple(parse_expectation(text, names, where) for text in stage) for stage in entry.stages
         ),
     )
-    if entry.expect == "done" and not made.truth:
-        raise BadFile(f"{where}: it must say what is true at the end (`truth`)")
+    if entry.outcome == "done" and not made.final:
+        raise BadFile(f"{where}: it must say what is true at the end (`final`)")
     return made

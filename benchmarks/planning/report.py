@@ -9,8 +9,8 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
-from benchmarks.planning.judge import Result
 from benchmarks.planning.missions import CLASSES
+from benchmarks.planning.verdict import MissionResult
 
 HEAD = (
     "planner",
@@ -28,7 +28,7 @@ HEAD = (
 Row = tuple[str, ...]
 
 
-def rows_of(results: Sequence[Result]) -> list[Row]:
+def rows_of(results: Sequence[MissionResult]) -> list[Row]:
     """A row for each planner, strategy and class, and one for all classes together.
 
     Tasks, revisions, rounds and makespan [simulated s] are means over those missions to be done
@@ -63,18 +63,20 @@ def rows_of(results: Sequence[Result]) -> list[Row]:
     return rows
 
 
-def variants(results: Sequence[Result]) -> tuple[tuple[str, str], ...]:
+def variants(results: Sequence[MissionResult]) -> tuple[tuple[str, str], ...]:
     """Every planner and strategy there is a result of, in the order of the results."""
     return tuple(dict.fromkeys((r.planner, r.strategy) for r in results))
 
 
-def comparable_missions(results: Sequence[Result]) -> frozenset[str]:
+def comparable_missions(results: Sequence[MissionResult]) -> frozenset[str]:
     """Missions to be done that every planner and strategy carried out."""
-    failed = {r.mission for r in results if not r.success or r.expect != "done"}
+    failed = {r.mission for r in results if not r.success or r.outcome != "done"}
     return frozenset(r.mission for r in results) - failed
 
 
-def _mean(results: Sequence[Result], of: Callable[[Result], float], unit: str = "") -> str:
+def _mean(
+    results: Sequence[MissionResult], of: Callable[[MissionResult], float], unit: str = ""
+) -> str:
     if not results:
         return "-"
     return f"{sum(of(r) for r in results) / len(results):.1f}{unit}"
@@ -103,8 +105,8 @@ def as_markdown(head: Sequence[str], rows: Sequence[Row]) -> str:
     return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
 
 
-def failures_of(results: Sequence[Result]) -> list[Row]:
-    """A row for each mission that did not come out right: what is wrong, and what was said."""
+def failures_of(results: Sequence[MissionResult]) -> list[Row]:
+    """A row for each mission that did not come out right: what is wrong, and the reasons given."""
     rows: list[Row] = []
     for mission in dict.fromkeys(r.mission for r in results if not r.success):
         failed = [r for r in results if r.mission == mission and not r.success]
@@ -114,8 +116,8 @@ def failures_of(results: Sequence[Result]) -> list[Row]:
             (
                 mission,
                 "everywhere" if every else ", ".join(where),
-                _cell("; ".join(failed[0].wrong)),
-                _cell("; ".join(failed[0].said[:2])),
+                _cell("; ".join(failed[0].faults)),
+                _cell("; ".join(failed[0].reasons[:2])),
             )
         )
     return rows
@@ -126,7 +128,7 @@ def _cell(text: str, most: int = 300) -> str:
     return short.replace("|", "\\|").replace("\n", " ")
 
 
-def write_page(path: Path, results: Sequence[Result], command: str, took_s: float) -> None:
+def write_page(path: Path, results: Sequence[MissionResult], command: str, took_s: float) -> None:
     """The page about the suite, with the picture beside it."""
     missions = len({r.mission for r in results})
     comparable = len(comparable_missions(results))
@@ -136,11 +138,11 @@ def write_page(path: Path, results: Sequence[Result], command: str, took_s: floa
 Written by `{command}` in {took_s:.0f} s on {machine()} ({packages}).
 
 {missions} missions, written by hand in `benchmarks/planning/missions`: plain sentences, a world,
-what the planner is told of it, and what must really be true at the end. They go through the
-planner's own core and jobs; robots carry the orders out with the workers' own skills and retries
-in a kinematic world (`sim.kinematic.backend`: drives take the route's length, things do not fall).
-A mission succeeds if that world is then as the mission file says, if nothing was moved that the
-mission does not speak of, and if the planner's own statuses agree. Those that must be refused
+what the planner believes of it, and what must really be true at the end. They go through the
+planner's own core and planning jobs; robots carry the orders out with the workers' own skills and
+retries in a kinematic world (`sim.kinematic.backend`: drives take the route's length, things do not
+fall). A mission succeeds if that world is then as the mission file says, if nothing was moved that
+the mission does not speak of, and if the planner's own statuses agree. Those that must be refused
 succeed if nothing is done and a reason is given; those to be given up, if a reason is given. Random
 seeds are fixed; the simulated clock stands still while the planner thinks.
 
@@ -155,12 +157,12 @@ missions in which the symbolic planner had to take over from it.
 
 ## What did not come out right
 
-{as_markdown(("mission", "with", "what is wrong", "what the fleet said"), failures_of(results))}
+{as_markdown(("mission", "with", "what is wrong", "reasons given"), failures_of(results))}
 """
     path.write_text(text, encoding="utf-8")
 
 
-def draw(path: Path, results: Sequence[Result]) -> None:
+def draw(path: Path, results: Sequence[MissionResult]) -> None:
     """Four small charts by class, a bar for each planner and strategy."""
     import matplotlib as mpl
 
@@ -168,7 +170,7 @@ def draw(path: Path, results: Sequence[Result]) -> None:
     import matplotlib.pyplot as plt
 
     comparable = comparable_missions(results)
-    charts: tuple[tuple[str, Callable[[list[Result]], float], bool], ...] = (
+    charts: tuple[tuple[str, Callable[[list[MissionResult]], float], bool], ...] = (
         ("missions that came out right, %", _success_percent, False),
         ("tasks begun, mean", lambda rs: _average([r.tasks for r in rs]), True),
         ("makespan, simulated s, mean", lambda rs: _average([r.makespan_s for r in rs]), True),
@@ -208,7 +210,7 @@ def _short(value: float) -> str:
     return f"{value:.2f}" if value < 1 else f"{value:.1f}".removesuffix(".0")
 
 
-def _success_percent(results: list[Result]) -> float:
+def _success_percent(results: list[MissionResult]) -> float:
     return 100.0 * _average([float(r.success) for r in results])
 
 

@@ -18,9 +18,9 @@ import msgspec
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.planning.judge import Result, run_mission
 from benchmarks.planning.missions import CLASSES, Mission, load_missions
 from benchmarks.planning.report import HEAD, draw, failures_of, rows_of, write_page
+from benchmarks.planning.verdict import MissionResult, run_mission
 from fleet.llm import LanguageModel, LlmConfig, load_llm_config
 from fleet.planners import LlmInterpreter, LlmPlanner
 from fleet.service.composition import Composition, compose
@@ -45,10 +45,10 @@ def main() -> int:
     work = [(m.name, options.planner, strategy) for strategy in strategies for m in missions]
     console = Console(width=None if sys.stdout.isatty() else 160)
     began_s = time.perf_counter()
-    results: list[Result] = []
+    results: list[MissionResult] = []
     for result in _run(work, options, console):
         results.append(result)
-        _tell(console, result, options.verbose)
+        _print(console, result, options.verbose)
     took_s = time.perf_counter() - began_s
     _show(console, results, took_s)
     _write(results, _out(options), took_s, console)
@@ -58,7 +58,7 @@ def main() -> int:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.planning.run",
-        description="Run household missions and judge them by what came to be in the world.",
+        description="Run household missions; the verdict is by what came to be in the world.",
     )
     parser.add_argument("--planner", choices=("symbolic", "llm"), default="symbolic")
     parser.add_argument("--strategy", choices=(*STRATEGIES, "all"), default="all")
@@ -88,7 +88,9 @@ def _out(options: argparse.Namespace) -> Path:
     return Path("docs/benchmarks") if whole else Path("runs/benchmarks")
 
 
-def _run(work: Sequence[Work], options: argparse.Namespace, console: Console) -> Iterator[Result]:
+def _run(
+    work: Sequence[Work], options: argparse.Namespace, console: Console
+) -> Iterator[MissionResult]:
     if options.planner == "symbolic":
         with ProcessPoolExecutor(PROCESSES) as pool:
             yield from pool.map(_symbolic, work)
@@ -123,12 +125,12 @@ def _parts() -> Composition:
     return compose()
 
 
-def _symbolic(work: Work) -> Result:
+def _symbolic(work: Work) -> MissionResult:
     mission, planner, strategy = work
     return run_mission(_missions()[mission], _parts(), planner, strategy)
 
 
-def _tell(console: Console, result: Result, verbose: bool) -> None:
+def _print(console: Console, result: MissionResult, verbose: bool) -> None:
     mark = "[green]ok  [/green]" if result.success else "[red]FAIL[/red]"
     console.print(
         f"{mark} {result.mission:12} {result.strategy:10} {result.tasks:3} tasks "
@@ -137,14 +139,14 @@ def _tell(console: Console, result: Result, verbose: bool) -> None:
         highlight=False,
     )
     if verbose and not result.success:
-        for sentence in (*result.wrong, *(f"said: {text}" for text in result.said[:3])):
+        for sentence in (*result.faults, *(f"reason: {text}" for text in result.reasons[:3])):
             console.print(f"       {sentence}", highlight=False, markup=False)
 
 
-def _show(console: Console, results: Sequence[Result], took_s: float) -> None:
+def _show(console: Console, results: Sequence[MissionResult], took_s: float) -> None:
     for head, rows in (
         (HEAD, rows_of(results)),
-        (("mission", "with", "what is wrong", "what the fleet said"), failures_of(results)),
+        (("mission", "with", "what is wrong", "reasons given"), failures_of(results)),
     ):
         table = Table(*head)
         for row in rows:
@@ -153,7 +155,7 @@ def _show(console: Console, results: Sequence[Result], took_s: float) -> None:
     console.print(f"{len(results)} runs in {took_s:.0f} s", highlight=False)
 
 
-def _write(results: Sequence[Result], out: Path, took_s: float, console: Console) -> None:
+def _write(results: Sequence[MissionResult], out: Path, took_s: float, console: Console) -> None:
     out.mkdir(parents=True, exist_ok=True)
     command = shlex.join(["python", "-m", "benchmarks.planning.run", *sys.argv[1:]])
     write_page(out / "planning.md", results, command, took_s)

@@ -1,6 +1,6 @@
 """An asyncio loop that waits for nothing: simulated time passes when nobody has anything to do.
 
-Where a loop would sleep in the operating system, this one lets the world go on to its next event,
+Where a loop would sleep in the operating system, this one advances the world to its next event,
 or, while nothing moves, jumps to its next timer. So missions of minutes take milliseconds, always
 in the same order, with the very coroutines that drive real robots.
 """
@@ -16,31 +16,31 @@ SPEED = 1000.0
 """Simulated seconds that pass while the loop's own clock goes on by one second."""
 
 
-class Stuck(Exception):
+class Deadlock(Exception):
     """Everybody waits for somebody else: no motion runs and no timer is set."""
 
 
 class _Selector(selectors.DefaultSelector):
-    """Sleeps by letting the world go on."""
+    """Sleeps by advancing the world."""
 
     def __init__(self) -> None:
         super().__init__()
         self.now_s = 0.0
-        self.go_on: Callable[[], float | None] = lambda: None
+        self.advance: Callable[[], float | None] = lambda: None
         """Lets the world reach its next event; how long that took [s], or `None`: nothing moves."""
-        self.stuck: Callable[[], None] = lambda: None
+        self.deadlocked: Callable[[], None] = lambda: None
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         ready = super().select(0)
         if ready or (timeout is not None and timeout <= 0):
             return ready
-        went_s = self.go_on()
-        if went_s is not None:
-            self.now_s += went_s / SPEED
+        passed_s = self.advance()
+        if passed_s is not None:
+            self.now_s += passed_s / SPEED
         elif timeout is not None:
             self.now_s += timeout
         else:
-            self.stuck()
+            self.deadlocked()
         return []
 
 
@@ -55,13 +55,13 @@ class SimulatedLoop(asyncio.SelectorEventLoop):
         """Seconds on the loop's own clock."""
         return self._sleeper.now_s
 
-    def drive(self, go_on: Callable[[], float | None], stuck: Callable[[], None]) -> None:
-        """Use this world; `stuck` is called when nothing will ever happen again.
+    def drive(self, advance: Callable[[], float | None], deadlocked: Callable[[], None]) -> None:
+        """Use this world; `deadlocked` is called when nothing will ever happen again.
 
-        `go_on` takes the world to its next event and says how many simulated seconds that took,
+        `advance` takes the world to its next event and says how many simulated seconds that took,
         or `None` where nothing moves.
         """
-        self._sleeper.go_on, self._sleeper.stuck = go_on, stuck
+        self._sleeper.advance, self._sleeper.deadlocked = advance, deadlocked
 
 
 def run(main: Callable[[SimulatedLoop], Any]) -> Any:

@@ -21,6 +21,9 @@ PATIENCE_S = 60.0
 LINGER_S = 10.0
 """How long a robot that reached a stance is left alone there, since it came to do something."""
 
+SAME_STANCE_M = 0.01
+"""Stances nearer to each other are one: what is in reach from the one is from the other, too."""
+
 LOOKAHEAD_NODES = 3
 """Promised ahead of a robot: 1.2 m to 1.8 m, more than three times its braking distance."""
 
@@ -282,7 +285,6 @@ class Navigator:
         self, name: str, task: _Task, around: list[float], taken: frozenset[int]
     ) -> None:
         traveller = self._robots[name]
-        here = self._poses[name]
         parked = traveller.parked
         others = [other for other in self._robots.values() if other is not traveller]
         idle = [other for other in others if other.goal is None]
@@ -291,7 +293,7 @@ class Navigator:
             if (
                 parked is not None
                 and not traveller.leaving
-                and math.dist(dock.point_m, here[:2]) < 0.04
+                and math.dist(dock.point_m, parked.point_m) < SAME_STANCE_M
             ):
                 # It stands there already: turning on the spot needs nobody's room.
                 traveller.parked = Dock(parked.node, parked.point_m, dock.yaw_rad, parked.owned)

@@ -15,11 +15,11 @@ SLEEPS = {
     "tests/support/polling.py": "between two looks at a condition",
     "tests/support/worker_world.py": "the world goes on by itself, a tick at a time",
     "tests/zenoh/cli/test_planner_by_robotctl.py": "a clock that ticks while a command runs",
-    "tests/zenoh/test_timeline_recording.py": "a stream keeps its pace",
+    "tests/zenoh/timeline/test_timeline_recording.py": "a stream keeps its pace",
 }
 READS_CLOCK = {
     "tests/e2e/test_demo_two_cups.py": "what the demo says it took is no more than what it took",
-    "tests/zenoh/test_sim_server.py": "paced time is no faster than the wall: load only slows it",
+    "tests/zenoh/sim/test_sim_server.py": "paced time is no faster than the wall under any load",
 }
 
 
@@ -85,6 +85,15 @@ def uncounted_laws(tree: ast.AST) -> Iterator[str]:
 def test_a_law_with_branches_fails_where_one_is_never_reached(path: Path) -> None:
     """By `tests.support.reached`."""
     assert list(uncounted_laws(ast.parse(path.read_text(encoding="utf-8")))) == []
+
+
+@pytest.mark.parametrize("kind", ["unit", "zenoh"])
+def test_tests_lie_in_the_rooms_that_they_test(kind: str) -> None:
+    """Below `fleet`, or below the top for the other packages."""
+    rooms = {path.parent.relative_to(ROOT / "tests" / kind) for path in TESTS if kind in path.parts}
+    tops = [ROOT / "fleet", ROOT / "keyexpr_schema", ROOT]
+    nowhere = {room for room in rooms if not any((top / room).is_dir() for top in tops)}
+    assert nowhere | (rooms & {Path()}) == set()
 
 
 def test_private_uses_are_seen() -> None:

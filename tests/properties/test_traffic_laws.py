@@ -168,6 +168,7 @@ def test_in_a_crowd_robots_wait_and_make_way_and_arrive(reached: Reached, seed: 
 @reaches(least={"stands at a table": 16})
 @settings(max_examples=6, deadline=None)
 @given(seed=st.integers(0, 10**6))
+@example(seed=108)  # a stance a few centimetres from the one where it stands
 @example(seed=28050)  # two stances beside the lattice, and no node between them
 def test_robots_that_work_at_tables_keep_apart_and_face_what_they_work_at(
     reached: Reached, seed: int

@@ -20,8 +20,8 @@ from fleet.service.event_journal import EventJournal
 from tests.support.household import SKILLS
 
 HERE = Path(__file__).parent
-TOLD = ("state", "revision", "robot", "attempt", "epoch", "cancelled", "accepted", "value")
-"""Fields of documents that an effect's line tells."""
+SHOWN = ("state", "revision", "robot", "attempt", "epoch", "cancelled", "accepted", "value")
+"""Fields of documents that an effect's line shows."""
 
 
 def events_in(name: str) -> list[Event]:
@@ -38,12 +38,12 @@ def effects_of(journal: list[Event]) -> Iterator[str]:
         for effect in effects:
             match effect:
                 case Publish(key, address, payload):
-                    told = [
+                    shown = [
                         f"{field}={getattr(payload, field)}"
-                        for field in TOLD
+                        for field in SHOWN
                         if hasattr(payload, field)
                     ]
-                    yield f"put {key.build(address)} {' '.join(told)}"
+                    yield f"put {key.build(address)} {' '.join(shown)}"
                 case Retract(key, address):
                     yield f"delete {key.build(address)}"
                 case MakePlan(job):

@@ -13,7 +13,7 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Said:
+class Finished:
     """What a run of robotctl printed and how it ended."""
 
     code: int
@@ -37,7 +37,7 @@ class Robotctl:
         }
         self.folder = folder
 
-    def __call__(self, *arguments: str) -> Said:
+    def __call__(self, *arguments: str) -> Finished:
         done = subprocess.run(
             [sys.executable, "-m", "cli.main", *arguments],
             capture_output=True,
@@ -47,7 +47,7 @@ class Robotctl:
             timeout=60,
         )
         assert "Traceback" not in done.stderr, done.stderr
-        return Said(done.returncode, done.stdout, done.stderr)
+        return Finished(done.returncode, done.stdout, done.stderr)
 
-    async def soon(self, *arguments: str) -> Said:
+    async def soon(self, *arguments: str) -> Finished:
         return await asyncio.to_thread(self, *arguments)

@@ -1,4 +1,4 @@
-"""The mission suite: its files are right, its judge can fail a mission, and it runs."""
+"""The mission suite: its files are right, its verdict can be that a mission failed, and it runs."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import replace as changed
 import pytest
 from msgspec.structs import replace
 
-from benchmarks.planning.judge import Result, run_mission
+from benchmarks.planning.expectations import GroundTruth, parse_expectation
 from benchmarks.planning.missions import CLASSES, Mission, load_missions
 from benchmarks.planning.report import as_markdown, comparable_missions, failures_of, rows_of
-from benchmarks.planning.simulated_time import SimulatedLoop, Stuck, run
-from benchmarks.planning.truth import Witness, parse_truth
+from benchmarks.planning.simulated_time import Deadlock, SimulatedLoop, run
+from benchmarks.planning.verdict import MissionResult, run_mission
 from fleet.allocators.makespan import MakespanAllocator
 from fleet.jobshop.time_budget import StepClock
 from fleet.service.composition import Composition, compose
@@ -55,12 +55,12 @@ def test_there_are_enough_missions_of_every_class() -> None:
 @pytest.mark.parametrize("mission", MISSIONS.values(), ids=MISSIONS)
 def test_a_mission_asks_for_something_that_is_not_so_yet(mission: Mission) -> None:
     """Or a planner that does nothing would succeed; but for those that say so."""
-    if mission.entry.expect == "done" and mission.name != "simple-16":
+    if mission.entry.outcome == "done" and mission.name != "simple-16":
         objects = {
-            name: lying(mission.start_of(name)) for name in mission.real_world().object_entries
+            name: lying(mission.start_of(name)) for name in mission.existing_world().object_entries
         }
-        witness = Witness(objects, {}, {place.place: place for place in mission.places})
-        assert not all(witness.sees(truth) for truth in mission.truth)
+        ground_truth = GroundTruth(objects, {}, {place.place: place for place in mission.places})
+        assert not all(ground_truth.satisfies(expected) for expected in mission.final)
     assert mission.entry.goals
     assert mission.robots
 
@@ -68,7 +68,7 @@ def test_a_mission_asks_for_something_that_is_not_so_yet(mission: Mission) -> No
 @pytest.mark.parametrize("name", ["simple-01", "compound-02", "complex-05", "vague-02"])
 def test_missions_of_every_class_come_out_right(name: str) -> None:
     result = run_mission(MISSIONS[name], PARTS)
-    assert result.wrong == ()
+    assert result.faults == ()
     assert result.tasks > 0
     assert result.makespan_s > 10.0
 
@@ -76,23 +76,27 @@ def test_missions_of_every_class_come_out_right(name: str) -> None:
 @pytest.mark.parametrize("name", ["simple-18", "simple-19"])
 def test_what_cannot_be_done_is_refused_with_a_reason(name: str) -> None:
     result = run_mission(MISSIONS[name], PARTS)
-    assert result.wrong == ()
+    assert result.faults == ()
     assert result.tasks == 0
-    assert result.said
+    assert result.reasons
 
 
-def test_the_world_judges_and_not_the_planner() -> None:
-    """One mission's sentences, judged by another's truth: the planner says that all is well."""
+def test_the_verdict_is_the_worlds_and_not_the_planners() -> None:
+    """One mission's sentences, with another's expectations: the planner says that all is well."""
     mission = MISSIONS["simple-01"]
-    mistaken = replace(mission, truth=MISSIONS["simple-02"].truth)
-    wrong = run_mission(mistaken, PARTS).wrong
+    mistaken = replace(mission, final=MISSIONS["simple-02"].final)
+    wrong = run_mission(mistaken, PARTS).faults
     assert "not so: cup_2 in living_room" in wrong
     assert "moved for no reason: cup_1 is in hallway" in wrong
 
 
 def test_the_same_mission_runs_the_same_way_twice() -> None:
     one, other = (run_mission(MISSIONS["complex-05"], PARTS) for _ in range(2))
-    assert (one.tasks, one.makespan_s, one.said) == (other.tasks, other.makespan_s, other.said)
+    assert (one.tasks, one.makespan_s, one.reasons) == (
+        other.tasks,
+        other.makespan_s,
+        other.reasons,
+    )
 
 
 def test_phrases_about_the_world() -> None:
@@ -101,8 +105,8 @@ def test_phrases_about_the_world() -> None:
     def holds(text: str, there: Truth) -> bool:
         places = {"kitchen": Place(place="kitchen", label="", region_m=((0, 0, 4, 4),))}
         looks = [("kitchen", 2.0, 2.0, 4.0)]
-        witness = Witness({"cup": there}, {}, places, {"cup": "kitchen"}, looks)
-        return witness.sees(parse_truth(text, names, "here"))
+        ground_truth = GroundTruth({"cup": there}, {}, places, {"cup": "kitchen"}, looks)
+        return ground_truth.satisfies(parse_expectation(text, names, "here"))
 
     assert holds("cup in kitchen or hallway", lying("hallway"))
     assert not holds("cup in kitchen", lying("hallway"))
@@ -113,18 +117,18 @@ def test_phrases_about_the_world() -> None:
     assert not holds("cup found", lying("hallway"))
     assert holds("kitchen looked over", lying("kitchen"))
     with pytest.raises(BadFile, match="nothing called 'spoon'"):
-        parse_truth("spoon in kitchen", names, "here")
+        parse_expectation("spoon in kitchen", names, "here")
     with pytest.raises(BadFile, match="must look like"):
-        parse_truth("the cup is fine", names, "here")
+        parse_expectation("the cup is fine", names, "here")
 
 
 def test_a_loop_in_which_nothing_can_happen_says_so() -> None:
     async def main(loop: SimulatedLoop) -> str:
         ended = loop.create_future()
-        loop.drive(lambda: None, lambda: ended.set_exception(Stuck("for ever")))
+        loop.drive(lambda: None, lambda: ended.set_exception(Deadlock("for ever")))
         try:
             await ended
-        except Stuck as stuck:
+        except Deadlock as stuck:
             return str(stuck)
         return ""
 
@@ -132,14 +136,14 @@ def test_a_loop_in_which_nothing_can_happen_says_so() -> None:
 
 
 def test_tables_compare_only_what_everybody_did() -> None:
-    def result(mission: str, strategy: str, tasks: int, *wrong: str) -> Result:
-        return Result(
+    def result(mission: str, strategy: str, tasks: int, *wrong: str) -> MissionResult:
+        return MissionResult(
             mission=mission,
             kind="simple",
             planner="symbolic",
             strategy=strategy,
-            expect="done",
-            wrong=wrong,
+            outcome="done",
+            faults=wrong,
             tasks=tasks,
         )
 

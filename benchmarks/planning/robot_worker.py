@@ -20,36 +20,36 @@ from workers.skill_registry import SkillRegistry
 from workers.world_cache import WorldCache
 
 INCARNATION = "benchmark"
-Say = Callable[[tuple[Fact, ...], Report | None], None]
-"""Hears facts, and the report that they belong to."""
+Publish = Callable[[tuple[Fact, ...], Report | None], None]
+"""Takes facts, and the report that they belong to."""
 
 
-class Robot:
+class RobotWorker:
     """Carries out one order after the other; what `workers.runtime.Worker` does over Zenoh."""
 
     def __init__(
         self,
         spec: RobotSpec,
-        body: Embodiment,
+        embodiment: Embodiment,
         world: WorldCache,
         registry: SkillRegistry,
-        say: Say,
+        publish: Publish,
     ) -> None:
         self.spec = spec
-        self._body = body
+        self._embodiment = embodiment
         self._world = world
         self._registry = registry
-        self._say = say
-        self._orders: asyncio.Queue[tuple[str, str, int]] = asyncio.Queue()
-        self._standing: dict[tuple[str, str, int], Order] = {}
+        self._publish = publish
+        self._queue: asyncio.Queue[tuple[str, str, int]] = asyncio.Queue()
+        self._orders_by_attempt: dict[tuple[str, str, int], Order] = {}
         self._current: tuple[str, str, int] | None = None
         self._cancelled = asyncio.Event()
 
     async def introduce_itself(self) -> None:
         """Say where the robot is and what it holds."""
-        ctx = SkillContext(self.spec, self._body, self._world)
+        ctx = SkillContext(self.spec, self._embodiment, self._world)
         await observe_robot(ctx)
-        self._say(ctx.observed, None)
+        self._publish(ctx.observed, None)
 
     def order(self, order: Order) -> None:
         """Take an order, or the cancellation of one."""
@@ -57,23 +57,23 @@ class Robot:
         if order.cancelled and name == self._current:
             self._cancelled.set()
             return
-        if name not in self._standing:
-            self._orders.put_nowait(name)
-        self._standing[name] = order
+        if name not in self._orders_by_attempt:
+            self._queue.put_nowait(name)
+        self._orders_by_attempt[name] = order
 
     def withdraw(self, plan: str, task: str) -> None:
         """An order is no longer there: do not begin it."""
-        for name in [name for name in self._standing if name[:2] == (plan, task)]:
+        for name in [name for name in self._orders_by_attempt if name[:2] == (plan, task)]:
             if name != self._current:
-                self._standing[name] = _cancelled(self._standing[name])
+                self._orders_by_attempt[name] = _cancelled(self._orders_by_attempt[name])
 
     async def work(self) -> None:
         """Carry out orders for ever."""
         while True:
-            name = await self._orders.get()
-            order = self._standing[name]
+            name = await self._queue.get()
+            order = self._orders_by_attempt[name]
             if order.cancelled:
-                self._say((), make_report(order, INCARNATION, ReportState.CANCELLED))
+                self._publish((), make_report(order, INCARNATION, ReportState.CANCELLED))
                 continue
             self._current = name
             self._cancelled.clear()
@@ -88,23 +88,23 @@ class Robot:
             refusal = make_report(
                 order, INCARNATION, ReportState.REFUSED, str(error), retryable=False
             )
-            self._say((), refusal)
+            self._publish((), refusal)
             return
-        ctx = SkillContext(self.spec, self._body, self._world)
-        started_s = self._body.now_s()
+        ctx = SkillContext(self.spec, self._embodiment, self._world)
+        started_s = self._embodiment.now_s()
         started = make_report(order, INCARNATION, ReportState.STARTED, started_s=started_s)
-        self._say((), started)
+        self._publish((), started)
         ended = await run_attempt(
             started,
             order.skill,
             lambda: skill(ctx, **arguments),
-            now_s=self._body.now_s,
-            make_safe=lambda: make_safe(self._body),
+            now_s=self._embodiment.now_s,
+            make_safe=lambda: make_safe(self._embodiment),
             deadline_s=order.deadline_s,
             cancelled=self._cancelled,
             on_failure=ctx.observe_failure,
         )
-        self._say(ctx.observed, replace(ended, facts=ctx.observed))
+        self._publish(ctx.observed, replace(ended, facts=ctx.observed))
 
 
 def _cancelled(order: Order) -> Order:

@@ -1,6 +1,6 @@
 """What must really be so: short phrases about the simulated world, and whether they hold in it.
 
-The phrases are the suite's own, so that a planner that misreads a sentence cannot judge itself.
+The phrases are the suite's own, so that a planner that misreads a sentence is not its own referee.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from math import dist
 
 from keyexpr_schema.payloads.motions import Senses
-from keyexpr_schema.payloads.simulation import Truth as ObjectTruth
+from keyexpr_schema.payloads.simulation import Truth
 from keyexpr_schema.payloads.world import Place
 from sim.errors import BadFile
 
@@ -29,7 +29,7 @@ _FORMS: tuple[tuple[str, re.Pattern[str]], ...] = (
 
 
 @dataclass(frozen=True)
-class Truth:
+class Expectation:
     """One phrase. Of several in `subjects` (and, for `held`, `values`) one is enough.
 
     `in`: an object lies in a place, on furniture, the floor or in the basket of a robot there; or a
@@ -43,7 +43,7 @@ class Truth:
     text: str
 
 
-def parse_truth(text: str, names: Collection[str], where: str) -> Truth:
+def parse_expectation(text: str, names: Collection[str], where: str) -> Expectation:
     """A phrase such as `red_cup or blue_cup in kitchen`, `kitchen looked over`.
 
     Raises:
@@ -57,7 +57,7 @@ def parse_truth(text: str, names: Collection[str], where: str) -> Truth:
             for name in (*subjects, *values):
                 if name not in names:
                     raise BadFile(f"{where}: {text!r}: there is nothing called {name!r}")
-            return Truth(form, subjects, values, text)
+            return Expectation(form, subjects, values, text)
     raise BadFile(
         f"{where}: {text!r} must look like `cup in kitchen`, `cup on board robot`, "
         "`cup held by robot`, `kitchen looked over` or `cup found`"
@@ -65,10 +65,10 @@ def parse_truth(text: str, names: Collection[str], where: str) -> Truth:
 
 
 @dataclass
-class Witness:
-    """What can be seen of the world at one moment, and what was ever looked at."""
+class GroundTruth:
+    """The simulated world at one moment, and what was ever looked at."""
 
-    objects: Mapping[str, ObjectTruth]
+    objects: Mapping[str, Truth]
     robots: Mapping[str, Senses]
     places: Mapping[str, Place]
     believed: Mapping[str, object] = field(default_factory=dict)
@@ -76,32 +76,32 @@ class Witness:
     looks: Collection[tuple[str, float, float, float]] = ()
     """Every look so far: place, x [m], y [m], range [m]."""
 
-    def sees(self, truth: Truth) -> bool:
+    def satisfies(self, expected: Expectation) -> bool:
         """Whether the phrase holds now."""
-        if truth.form == "seen":
-            return self._looked_over(truth.values[0])
-        return any(self._holds(truth, subject) for subject in truth.subjects)
+        if expected.form == "seen":
+            return self._looked_over(expected.values[0])
+        return any(self._holds(expected, subject) for subject in expected.subjects)
 
     def place_of(self, thing: str) -> str | None:
         """The place where an object lies, in a basket or not; `None` in a hand or nowhere."""
         there = self.objects.get(thing)
         return None if there is None or there.held_by is not None else there.place
 
-    def _holds(self, truth: Truth, subject: str) -> bool:
-        if truth.form == "in":
+    def _holds(self, expected: Expectation, subject: str) -> bool:
+        if expected.form == "in":
             if subject in self.robots:
-                return self.robots[subject].place in truth.values
-            return self.place_of(subject) in truth.values
+                return self.robots[subject].place in expected.values
+            return self.place_of(subject) in expected.values
         there = self.objects.get(subject)
         if there is None:
             return False
-        if truth.form == "carried":
-            return there.support in truth.values
-        if truth.form == "held":
-            return there.held_by in truth.values
+        if expected.form == "carried":
+            return there.support in expected.values
+        if expected.form == "held":
+            return there.held_by in expected.values
         return self.believed.get(subject) in self._whereabouts(there)
 
-    def _whereabouts(self, there: ObjectTruth) -> tuple[str, ...]:
+    def _whereabouts(self, there: Truth) -> tuple[str, ...]:
         """What may be said of where an object is: its place, or the robot that has it."""
         holder = there.held_by or (there.support if there.support in self.robots else None)
         return (holder,) if holder is not None else (there.place or "",)

@@ -1,4 +1,4 @@
-"""Runs a mission and judges it by the simulated world, not by what the planner says of it."""
+"""Runs a mission; its verdict is by the simulated world, not by what the planner says of it."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from fleet.service.composition import Composition
 from keyexpr_schema.payloads.goals import GoalState
 
 
-class Result(msgspec.Struct, frozen=True, kw_only=True):
-    """How one mission went. `wrong` lists what should be true and is not; empty is success.
+class MissionResult(msgspec.Struct, frozen=True, kw_only=True):
+    """How one mission went. `faults` lists what should be so and is not; empty is success.
 
     `planning_s` is wall time; `makespan_s` simulated. `tasks` counts the tasks that robots began.
     """
@@ -24,9 +24,9 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     kind: str
     planner: str
     strategy: str
-    expect: str
-    wrong: tuple[str, ...]
-    said: tuple[str, ...] = ()
+    outcome: str
+    faults: tuple[str, ...]
+    reasons: tuple[str, ...] = ()
     """What the fleet gave as reasons."""
     tasks: int = 0
     failed_tasks: int = 0
@@ -40,7 +40,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def success(self) -> bool:
         """Whether what should be true is."""
-        return not self.wrong
+        return not self.faults
 
 
 def run_mission(
@@ -49,23 +49,23 @@ def run_mission(
     planner: str = "symbolic",
     strategy: str = "big-dag",
     interpreter: LlmInterpreter | None = None,
-) -> Result:
+) -> MissionResult:
     """Run one mission from its beginning to its end and look at the world then."""
 
-    async def main(loop: SimulatedLoop) -> Result:
+    async def main(loop: SimulatedLoop) -> MissionResult:
         fleet = FleetRun(mission, parts, planner, strategy, loop, interpreter)
         broken = await fleet.run()
         counts = fleet.counts
-        wrong = [broken] if broken else []
-        wrong += _wrong(mission, fleet)
-        return Result(
+        faults = [broken] if broken else []
+        faults += _faults(mission, fleet)
+        return MissionResult(
             mission=mission.name,
             kind=mission.kind,
             planner=planner,
             strategy=strategy,
-            expect=mission.entry.expect,
-            wrong=tuple(wrong),
-            said=tuple(dict.fromkeys([*fleet.refusals(), *counts.reasons])),
+            outcome=mission.entry.outcome,
+            faults=tuple(faults),
+            reasons=tuple(dict.fromkeys([*fleet.refusals(), *counts.reasons])),
             tasks=counts.tasks,
             failed_tasks=counts.failed_tasks,
             revisions=counts.revisions,
@@ -76,35 +76,35 @@ def run_mission(
             makespan_s=fleet.backend.time_s,
         )
 
-    result: Result = run(main)
+    result: MissionResult = run(main)
     return result
 
 
-def _wrong(mission: Mission, fleet: FleetRun) -> Iterator[str]:
-    expect = mission.entry.expect
-    witness = fleet.witness()
-    for truth in mission.truth:
-        if not witness.sees(truth):
-            yield f"not so: {truth.text}"
+def _faults(mission: Mission, fleet: FleetRun) -> Iterator[str]:
+    outcome = mission.entry.outcome
+    ground_truth = fleet.ground_truth()
+    for expected in mission.final:
+        if not ground_truth.satisfies(expected):
+            yield f"not so: {expected.text}"
     for number, stage in enumerate(mission.stages[fleet.stage :], fleet.stage + 1):
-        yield f"stage {number} never came to be: {', '.join(truth.text for truth in stage)}"
+        yield f"stage {number} never came to be: {', '.join(expected.text for expected in stage)}"
     named = {
         subject
-        for truth in (*mission.truth, *(t for stage in mission.stages for t in stage))
-        if truth.form != "known"
-        for subject in truth.subjects
+        for expected in (*mission.final, *(e for stage in mission.stages for e in stage))
+        if expected.form != "known"
+        for subject in expected.subjects
     }
-    for thing in witness.objects:
-        if thing not in named and witness.place_of(thing) != mission.start_of(thing):
-            yield f"moved for no reason: {thing} is in {witness.place_of(thing) or 'a hand'}"
+    for thing in ground_truth.objects:
+        if thing not in named and ground_truth.place_of(thing) != mission.start_of(thing):
+            yield f"moved for no reason: {thing} is in {ground_truth.place_of(thing) or 'a hand'}"
     reached = [s.state is GoalState.REACHED for s in fleet.state.goal_states.values()]
-    if expect == "done":
+    if outcome == "done":
         if not all(reached):
             yield "the planner does not say that every goal is reached"
         return
     if all(reached):
-        yield f"it should be {expect}, and the planner says that every goal is reached"
+        yield f"it should be {outcome}, and the planner says that every goal is reached"
     if not fleet.refusals():
-        yield f"it should be {expect} with a reason, and there is none"
-    if expect == "refused" and fleet.counts.tasks:
+        yield f"it should be {outcome} with a reason, and there is none"
+    if outcome == "refused" and fleet.counts.tasks:
         yield f"it should be refused, and robots began {fleet.counts.tasks} tasks"

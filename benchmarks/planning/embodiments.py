@@ -17,8 +17,8 @@ class SharedWorld:
         """Place, x [m], y [m], and the robot that looked."""
         self._waiting: dict[str, asyncio.Future[MotionOutcome]] = {}
 
-    def go_on(self) -> float | None:
-        """To the world's next event; the seconds that took, or `None` while nothing moves."""
+    def advance(self) -> float | None:
+        """To the world's next event; the seconds that takes, or `None` while nothing moves."""
         if not self._waiting:
             return None
         before_s = self.backend.time_s
@@ -53,7 +53,7 @@ class SharedWorld:
         return outcome
 
 
-class KinematicBody:
+class KinematicEmbodiment:
     """`workers.embodiment.Embodiment` for one robot of a shared world."""
 
     def __init__(self, world: SharedWorld, robot: str) -> None:

@@ -19,7 +19,7 @@ from sim.server.sim_server import SimServer
 from tests.support.router_process import RouterProcess
 from tests.support.worker_world import DEADLINE_S, Planner
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "custom_skill.py"
+EXAMPLE = Path(__file__).parents[3] / "examples" / "custom_skill.py"
 
 
 async def test_the_example_counts_two_cups_in_the_kitchen(

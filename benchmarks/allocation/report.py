@@ -13,7 +13,7 @@ from rich.console import Console
 
 from benchmarks.allocation import bench_household, bench_makespan, plots
 from benchmarks.allocation.household import REAL, UNIT, scenarios
-from benchmarks.planning.report import as_markdown
+from benchmarks.tables import as_markdown
 
 Rows = bench_makespan.Rows
 

@@ -21,7 +21,7 @@ from typing import Any
 from rich.console import Console
 
 from benchmarks.allocation import bench_balanced, bench_household, bench_makespan, report
-from benchmarks.planning.report import machine
+from benchmarks.tables import machine
 from fleet.allocators.makespan import DEADLINE_S
 
 QUICK_SEEDS = 3

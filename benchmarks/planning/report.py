@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import platform
 from collections.abc import Callable, Sequence
-from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
 from benchmarks.planning.missions import CLASSES
 from benchmarks.planning.verdict import MissionResult
+from benchmarks.tables import as_markdown, machine
 
 HEAD = (
     "planner",
@@ -80,29 +78,6 @@ def _mean(
     if not results:
         return "-"
     return f"{sum(of(r) for r in results) / len(results):.1f}{unit}"
-
-
-def machine() -> str:
-    """What it was measured on, in a line."""
-    name = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        models = [
-            line.partition(":")[2].strip()
-            for line in cpuinfo.read_text(encoding="utf-8").splitlines()
-            if line.startswith("model name")
-        ]
-        name = models[0] if models else name
-    return (
-        f"{name}, {os.cpu_count()} cores, {platform.system()} {platform.release()}, "
-        f"Python {platform.python_version()}, {datetime.now(UTC):%Y-%m-%d}"
-    )
-
-
-def as_markdown(head: Sequence[str], rows: Sequence[Row]) -> str:
-    """A table."""
-    lines = ["| " + " | ".join(head) + " |", "| " + " | ".join("---" for _ in head) + " |"]
-    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
 
 
 def failures_of(results: Sequence[MissionResult]) -> list[Row]:

@@ -10,9 +10,10 @@ from msgspec.structs import replace
 
 from benchmarks.planning.expectations import GroundTruth, parse_expectation
 from benchmarks.planning.missions import CLASSES, Mission, load_missions
-from benchmarks.planning.report import as_markdown, comparable_missions, failures_of, rows_of
+from benchmarks.planning.report import comparable_missions, failures_of, rows_of
 from benchmarks.planning.simulated_time import Deadlock, SimulatedLoop, run
 from benchmarks.planning.verdict import MissionResult, run_mission
+from benchmarks.tables import as_markdown
 from fleet.allocators.makespan import MakespanAllocator
 from fleet.jobshop.time_budget import StepClock
 from fleet.service.composition import Composition, compose

@@ -14,7 +14,7 @@ from math import inf
 from typing import NamedTuple
 
 from fleet.jobshop.merging import Row, merged, single, with_chains
-from fleet.jobshop.problem import Position, Shop, topological
+from fleet.jobshop.problem import BadShop, Position, Shop, topological
 
 
 class MergedOperation(NamedTuple):
@@ -217,13 +217,16 @@ class Instance:
 
 
 def _strong_components(predecessors: Sequence[set[int]]) -> list[int]:
-    """The strongly connected component of each node."""
+    """The strongly connected component of each node; without circles each is its own."""
+    try:
+        topological([sorted(befores) for befores in predecessors])
+        return list(range(len(predecessors)))
+    except BadShop:
+        pass
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
     columns = [before for befores in predecessors for before in befores]
-    if not columns:
-        return list(range(len(predecessors)))
     ends = [0]
     for befores in predecessors:
         ends.append(ends[-1] + len(befores))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import permutations
+from itertools import chain, islice, permutations
 
 from fleet.jobshop.forward_pass import Solution, evaluate
 from fleet.jobshop.instance import Instance
@@ -15,48 +15,46 @@ from fleet.jobshop.time_budget import TimeBudget
 
 FEW = 5
 """Components of which every order is given (120), behind those that were searched for."""
-ALPHAS = (0.1, 1.0)
-"""Dispatching rules that a search begins from."""
+ALPHAS = (None, 0.1, 1.0)
+"""Rules to begin from: the first that leads to a schedule."""
 MOST_NODES = 1000
 """Placements looked at for the best order of a small shop."""
 
 
 def sequences(shop: Shop, budget: TimeBudget) -> Iterator[list[int]]:
-    """Orders of all blocks, the best first, each different on some machine.
+    """Orders of all blocks, each different on some machine; the first is the best.
 
-    Every block has one machine. They are those of dispatching rules, and the best there is in a
-    small shop, or in a larger one what annealing finds within the `budget`.
+    Every block has one machine. The search begins from list scheduling: in a small shop it finds
+    the best there is, in a larger one what annealing comes to within the `budget`. Behind it come
+    what it began from, other rules, and every order of a few components.
     """
     instance = Instance(shop)
-    found = [list_schedule(instance, alpha) for alpha in ALPHAS]
-    solutions = [solution for solution in found if solution is not None]
-    if solutions:
-        best = min(solutions, key=_cost)
-        optimum = branch_and_bound(instance, best, MOST_NODES)
-        if optimum is not None:
-            solutions.append(optimum.solution)
-        else:
-            solutions.append(anneal(instance, best, budget))
+    found = (list_schedule(instance, alpha) for alpha in ALPHAS)
+    rules = (solution for solution in found if solution is not None)
+    searched: list[Solution] = []
+    for begin in islice(rules, 1):
+        optimum = branch_and_bound(instance, begin, MOST_NODES)
+        best = anneal(instance, begin, budget) if optimum is None else optimum.solution
+        searched = [best, begin]
     given: set[tuple[tuple[int, ...], ...]] = set()
-    for solution in sorted(solutions, key=_cost):
+    for solution in chain(searched, rules, _every_order(instance)):
         yield from _new(instance, solution.order, given)
-    if len(instance.component_blocks) <= FEW:
-        for solution in sorted(_every_order(instance), key=_cost):
-            yield from _new(instance, solution.order, given)
 
 
 def _every_order(instance: Instance) -> Iterator[Solution]:
+    """The shortest first; none where there are more than a few components."""
+    count = len(instance.component_blocks)
     machine_of = [block.machines[0] for block in instance.shop.blocks]
-    for order in permutations(range(len(instance.component_blocks))):
+    found = []
+    for order in permutations(range(count)) if count <= FEW else ():
         at = {component: i for i, component in enumerate(order)}
         if all(
             at[before] < at[component]
             for component in order
             for before in instance.component_predecessors[component]
         ):
-            solution = evaluate(instance, list(order), machine_of)
-            if solution is not None:
-                yield solution
+            found.append(evaluate(instance, list(order), machine_of))
+    yield from sorted((s for s in found if s is not None), key=lambda solution: solution.cost)
 
 
 def _new(
@@ -71,7 +69,3 @@ def _new(
     if signature not in given:
         given.add(signature)
         yield blocks
-
-
-def _cost(solution: Solution) -> float:
-    return solution.cost

@@ -15,8 +15,8 @@ from keyexpr_schema.payloads.plans import Violation
 
 MAX_SEQUENCES_CHECKED = 24
 """Sequences put to the checker before an allocation is given up, the shortest first."""
-QUICK_S, THOROUGH_S = 2.0**-5, 2.0**-2
-"""Of a `StepClock`: a hundred moves to compare plans, a thousand to carry one out."""
+QUICK_S, THOROUGH_S = 2.0**-6, 2.0**-2
+"""Of a `StepClock`: some thirty moves to compare plans, a thousand to carry one out."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from fleet.allocators.base import Allocated
-from fleet.core.checker.checked_plan import check_plan
+from fleet.core.checker.plan_checker import check_plan
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.service.composition import Composition, compose

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cli.command_line import Command, Group
 from cli.errors import CliError
-from cli.parsing import Command, Group
 from cli.settings import Settings, load_settings
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ import typer.core
 import typer.main
 
 from cli.command import GlobalFlags, JsonOption, RealmOption, RouterOption
-from cli.parsing import Group
+from cli.command_line import Group
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "status": ("cli.commands.overview:status", "The whole fleet on one page."),

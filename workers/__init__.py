@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 from keyexpr_schema.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from workers.context import *  # noqa: F403
     from workers.embodiment import *  # noqa: F403
     from workers.errors import *  # noqa: F403
     from workers.process import *  # noqa: F403
+    from workers.skill_context import *  # noqa: F403
     from workers.skill_registry import *  # noqa: F403
     from workers.skills.household import *  # noqa: F403
     from workers.world_cache import *  # noqa: F403
@@ -19,7 +19,7 @@ else:
     __all__, __getattr__ = lazy_names(
         __name__,
         {
-            "context": "SkillContext",
+            "skill_context": "SkillContext",
             "embodiment": "Embodiment EmbodimentFactory",
             "errors": (
                 "BadArguments BadSkill JournalBusy JournalUnreadable RobotTaken "

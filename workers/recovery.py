@@ -9,10 +9,10 @@ from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.motions import Motion, MotionKind, Senses
 from keyexpr_schema.payloads.tasks import Order, ReportState
-from workers.context import SkillContext
 from workers.embodiment import Embodiment
 from workers.errors import RobotUnreachable, SkillFailed
 from workers.orders.fencing import Ledger, Phase
+from workers.skill_context import SkillContext
 
 SAFE_S = 60.0
 """Wall seconds that bringing the body to rest may take before the worker goes on without."""

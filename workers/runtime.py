@@ -12,7 +12,6 @@ from keyexpr_schema.keyspace import ORDER, ROBOT_ALIVE
 from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotSpec
 from keyexpr_schema.payloads.tasks import Order, OrderAddress, Report, ReportState
 from keyexpr_schema.transport.session import Session, Watch
-from workers.context import SkillContext
 from workers.embodiment import Embodiment
 from workers.errors import BadArguments, UnknownSkill
 from workers.orders.fencing import Phase
@@ -29,6 +28,7 @@ from workers.recovery import (
 )
 from workers.retry import run_attempt
 from workers.single_instance import ensure_single_worker
+from workers.skill_context import SkillContext
 from workers.skill_registry import SkillRegistry
 from workers.state_publisher import StatePublisher
 from workers.world_cache import WORLD_KEYS, WorldCache

@@ -12,8 +12,8 @@ from typing import Any
 from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.ids import check_id
 from keyexpr_schema.plug_ins import load_plug_ins
-from workers.context import SkillContext
 from workers.errors import BadArguments, BadSkill, UnknownSkill
+from workers.skill_context import SkillContext
 from workers.world_cache import WorldCache
 
 SKILLS = "robotfleet.skills"

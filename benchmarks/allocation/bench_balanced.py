@@ -26,7 +26,7 @@ from rich.table import Table
 
 from fleet.allocators.load_balancing import BalancedAssignment, LoadBalancingProblem, balance
 from fleet.allocators.load_balancing.robot_sets import bits, mask_of
-from fleet.allocators.min_max_load_program import MinMaxLoadProgram, Status, solve
+from fleet.allocators.min_max_load_milp import MinMaxLoadProgram, Status, solve
 
 SIZES = ((100, 20), (1_000, 100), (10_000, 1_000))
 KINDS = ("alike", "types", "different", "random", "sparse", "skewed", "weighted", "apart")

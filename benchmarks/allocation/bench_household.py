@@ -33,9 +33,9 @@ from fleet.allocators.llm import LlmAllocator
 from fleet.allocators.makespan import DEADLINE_S, MakespanAllocator
 from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.allocators.round_robin import RoundRobinAllocator
-from fleet.core.checker.checked_plan import CheckedPlan, check_plan
-from fleet.core.schedule.idle_time import predicted_unit, union_s
+from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.llm import LanguageModel, load_llm_config
+from fleet.scheduling.idle_time import predicted_unit, union_s
 
 PAPER = {"3 robots, 5 goals": 0.350, "5 robots, 10 goals": 0.429}
 """Least idle time that the paper reports for any planner and allocator (reference's definition)."""

@@ -18,11 +18,11 @@ from random import Random
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.allocation.alternatives import big_m, in_turn, makespan_s, nearest, papers_milp
+from benchmarks.allocation.baselines import big_m, in_turn, makespan_s, nearest, papers_milp
 from benchmarks.allocation.shop_files import NAMES, load
 from benchmarks.allocation.shops import random_shop, with_under_way, without_machines
-from fleet.jobshop.instance import Instance
 from fleet.jobshop.portfolio import solve
+from fleet.jobshop.preprocessing import Instance
 from fleet.jobshop.problem import Machine, Shop
 from fleet.jobshop.rescheduling import reschedule
 from fleet.jobshop.search.list_scheduling import list_schedule

@@ -26,7 +26,7 @@ from benchmarks.allocation.bench_balanced import KINDS, problem_builder, program
 from fleet.allocators.load_balancing import BalancedAssignment, balance
 from fleet.allocators.load_balancing.robot_sets import bits
 from fleet.allocators.min_max_load import TRAVEL_GAP
-from fleet.allocators.min_max_load_program import Status, max_load, solve
+from fleet.allocators.min_max_load_milp import Status, max_load, solve
 
 SOLVERS = ("scipy", "CBC", "HiGHS")
 STEPS = ("max load", "travel")

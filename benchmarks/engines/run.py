@@ -26,7 +26,7 @@ from rich.table import Table
 from benchmarks.bench_planner import goals_of, household
 from benchmarks.engines import pddl
 from fleet.allocators.base import Allocated, AllocationProblem, Allocator, Assignment
-from fleet.core.checker.checked_plan import CheckedPlan, InvalidPlan, check_plan
+from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem

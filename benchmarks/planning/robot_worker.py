@@ -10,12 +10,12 @@ from msgspec.structs import replace
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState
 from keyexpr_schema.payloads.world import Fact
-from workers.context import SkillContext
 from workers.embodiment import Embodiment
 from workers.errors import BadArguments, UnknownSkill
 from workers.orders.reports import make_report
 from workers.recovery import make_safe, observe_robot
 from workers.retry import run_attempt
+from workers.skill_context import SkillContext
 from workers.skill_registry import SkillRegistry
 from workers.world_cache import WorldCache
 

@@ -46,7 +46,7 @@ async def demo(
     from cli.errors import check_known
     from cli.views.live import ChangePrinter
     from sim.files.mission_file import load_mission
-    from sim.reach import out_of_reach
+    from sim.reachability import out_of_reach
 
     check_known("backend", backend, BACKENDS)
     parse_speed(speed)

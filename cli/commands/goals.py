@@ -47,7 +47,7 @@ async def add(
 ) -> None:
     """Want something. The planner says what it understood, or that it did not (exit code 1)."""
     from cli.client.fleet_view import fleet_view
-    from cli.client.planner import ask_planner, request_name
+    from cli.client.planner_requests import ask_planner, request_name
     from cli.client.presence import planner_alive
     from cli.client.publish import put_goal
     from cli.errors import NotRunning, Refused

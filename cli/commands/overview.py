@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 async def status(call: Call) -> None:
     """The whole fleet on one page: router, planner, robots, goals, plans, unreadable values."""
     from cli.client.fleet_view import FLEET_KEYS, snapshot
-    from cli.client.planner import planner_status
+    from cli.client.planner_requests import planner_status
     from cli.client.presence import planner_alive, robots_alive
     from cli.client.undecodable import still_undecodable
     from cli.views.goals import goal_rows

@@ -59,7 +59,7 @@ async def check(
     """
     from cli.plans.files import read_plan
     from cli.plans.worlds import world_of_files, world_of_fleet
-    from fleet.core.checker.checked_plan import check_plan
+    from fleet.core.checker.plan_checker import check_plan
     from fleet.service.composition import load_all_skills
 
     _only_with_world(world, connected, robots, facts)
@@ -141,7 +141,7 @@ async def propose(
     from msgspec.structs import replace
 
     from cli.client.fleet_view import fleet_view
-    from cli.client.planner import check_planner
+    from cli.client.planner_requests import check_planner
     from cli.errors import BadArgument, Refused
     from cli.plans.files import read_plan
     from cli.views.text import outcome

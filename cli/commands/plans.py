@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.command import Call, command, group, single
+from cli.command_line import FactWords
 from cli.commands.plan_files import check, diff, propose
-from cli.parsing import FactWords
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -59,7 +59,7 @@ async def create(
     """Have goals turned into a plan and, unless told otherwise, carried out."""
     from cli.client.fleet_view import FleetView, snapshot
     from cli.client.known import check_goals
-    from cli.client.planner import ask_planner, planner_status, request_name
+    from cli.client.planner_requests import ask_planner, planner_status, request_name
     from cli.errors import BadArgument, check_known
     from cli.plans.files import check_suffix, write_plan
     from keyexpr_schema.ids import check_id
@@ -240,7 +240,7 @@ async def replan(
 ) -> None:
     """Plan again from what is known now; what is done or running is kept."""
     from cli.client.known import check_goals, check_plan
-    from cli.client.planner import ask_planner, request_name
+    from cli.client.planner_requests import ask_planner, request_name
     from keyexpr_schema.payloads.requests import ReplanRequest
 
     async with call.session() as session:
@@ -261,7 +261,7 @@ def _state(status: PlanStatus | None) -> str:
 
 async def _control(call: Call, control: str, plan: str) -> None:
     from cli.client.known import check_plan
-    from cli.client.planner import ask_planner, request_name
+    from cli.client.planner_requests import ask_planner, request_name
     from keyexpr_schema.keyspace import PLAN_PROPOSAL
     from keyexpr_schema.payloads.plans import PlanAddress
     from keyexpr_schema.payloads.requests import Control, ControlRequest

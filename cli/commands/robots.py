@@ -17,7 +17,7 @@ async def register(
     ],
 ) -> None:
     """Declare robots from YAML files; declaring one again replaces what was said of it."""
-    from cli.client.planner import check_skills
+    from cli.client.planner_requests import check_skills
     from keyexpr_schema.keyspace import ROBOT_SPEC
     from keyexpr_schema.payloads.robots import RobotAddress
     from sim.files.mission_file import load_robot

@@ -91,7 +91,7 @@ async def add(
 ) -> None:
     """Add a task to a plan; the planner checks it like any other."""
     from cli.client.known import check_plan, check_robot
-    from cli.client.planner import ask_planner, planner_status, request_name
+    from cli.client.planner_requests import ask_planner, planner_status, request_name
     from cli.errors import check_known
     from keyexpr_schema.keyspace import PLAN_SPEC
     from keyexpr_schema.payloads.plans import PlanAddress

@@ -76,7 +76,7 @@ async def add(
     "The first cup is in the kitchen."   --fact at cup_1 kitchen
     --object cup_3 --kind cup --home kitchen   --place pantry --distance kitchen=2.5
     """
-    from cli.client.planner import statement_status
+    from cli.client.planner_requests import statement_status
     from cli.client.publish import put_fact, put_statement
     from cli.client.world import put_object, put_place
     from cli.errors import BadArgument

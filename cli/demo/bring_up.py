@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cli.client.fleet_view import FleetView
-from cli.client.planner import check_skills
+from cli.client.planner_requests import check_skills
 from cli.client.world import put_world
 from cli.demo.child_processes import ChildProcesses
 from cli.errors import TooLate

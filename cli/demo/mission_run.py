@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from cli.client.fleet_view import FLEET_KEYS, SIMULATION_KEYS, FleetView, fleet_view
-from cli.client.planner import ask_planner, request_name
+from cli.client.planner_requests import ask_planner, request_name
 from cli.client.publish import put_goal, put_statement
 from cli.demo.bring_up import RECORDING, DemoOptions, bring_up, declare_processes, router_up
 from cli.demo.child_processes import ChildProcesses, free_endpoint

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import msgspec
 
 from cli.demo.verdict import GoalVerdict
-from fleet.core.schedule.idle_time import measured_idle
+from fleet.scheduling.idle_time import measured_idle
 from keyexpr_schema.payloads.simulation import ContactCount
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from fleet.core.schedule.idle_time import (
+from fleet.scheduling.idle_time import (
     IdleTime,
     capable,
     measured_idle,

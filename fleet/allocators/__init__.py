@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from fleet.allocators.min_max_load import MinMaxLoadAllocator as MinMaxLoadAllocator
     from fleet.allocators.min_max_load import TieBreak as TieBreak
     from fleet.allocators.round_robin import RoundRobinAllocator as RoundRobinAllocator
-    from fleet.scheduling.plan_shop import AllocationContext as AllocationContext
+    from fleet.scheduling.allocation_context import AllocationContext as AllocationContext
 else:
     __all__, __getattr__ = lazy_names(
         __name__,
@@ -30,6 +30,6 @@ else:
             "makespan": "MakespanAllocator",
             "min_max_load": "MinMaxLoadAllocator TieBreak",
             "round_robin": "RoundRobinAllocator",
-            ".scheduling.plan_shop": "AllocationContext",
+            ".scheduling.allocation_context": "AllocationContext",
         },
     )

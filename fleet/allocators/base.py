@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from fleet.core.checker.checked_plan import CheckedPlan, check_plan
+from fleet.core.actors.actor_constraints import actors_apart, task_counts
+from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.core.model.world import WorldModel
-from fleet.core.schedule.actor_constraints import actors_apart, task_counts
+from fleet.scheduling.allocation_context import AllocationContext
 from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
-from fleet.scheduling.plan_shop import AllocationContext
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 

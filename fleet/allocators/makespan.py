@@ -16,7 +16,8 @@ from fleet.jobshop.portfolio import solve
 from fleet.jobshop.problem import Schedule
 from fleet.jobshop.rescheduling import reschedule
 from fleet.jobshop.time_budget import Clock, TimeBudget
-from fleet.scheduling.plan_shop import AllocationContext, PlanShop, plan_shop
+from fleet.scheduling.allocation_context import AllocationContext
+from fleet.scheduling.plan_shop import PlanShop, plan_shop
 
 DEADLINE_S = 1.0
 """Time that the search may take, s."""

@@ -12,7 +12,7 @@ from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotA
 from fleet.allocators.infeasibility import explanation
 from fleet.allocators.load_balancing.balance import balance
 from fleet.allocators.load_balancing.problem import BalancedAssignment, NoAssignment
-from fleet.allocators.min_max_load_program import MinMaxLoadProgram, Status, max_load, solve
+from fleet.allocators.min_max_load_milp import MinMaxLoadProgram, Status, max_load, solve
 from fleet.allocators.round_robin import assign_in_turn
 from keyexpr_schema.payloads.plans import Violation
 

@@ -18,7 +18,7 @@ from fleet.core.events import Event
 from fleet.core.handlers import (
     goals,
     plan_results,
-    planner,
+    planner_lifecycle,
     reports,
     requests,
     robots,
@@ -30,9 +30,9 @@ from fleet.core.state import State
 
 _Handler = Callable[[State, Any, Skills], State]
 _HANDLERS: dict[type[Event], _Handler] = {
-    events.PlannerStarted: planner.planner_started,
-    events.PriorStateLoaded: planner.prior_state_loaded,
-    events.TimerFired: planner.timer_fired,
+    events.PlannerStarted: planner_lifecycle.planner_started,
+    events.PriorStateLoaded: planner_lifecycle.prior_state_loaded,
+    events.TimerFired: planner_lifecycle.timer_fired,
     events.GoalPut: goals.goal_put,
     events.GoalDeleted: goals.goal_deleted,
     events.GoalInterpreted: goals.goal_interpreted,

@@ -8,62 +8,38 @@
 It knows of operations, blocks and machines, and nothing of robots.
 """
 
-from __future__ import annotations
+from typing import TYPE_CHECKING
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from keyexpr_schema.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from fleet.jobshop.bounds import lower_bound
-    from fleet.jobshop.forward_pass import schedule_of
-    from fleet.jobshop.instance import Instance
-    from fleet.jobshop.portfolio import solve
-    from fleet.jobshop.problem import (
-        BadShop,
-        Block,
-        Machine,
-        Operation,
-        Position,
-        Schedule,
-        Shop,
+    from fleet.jobshop.bounds import lower_bound as lower_bound
+    from fleet.jobshop.forward_pass import schedule_of as schedule_of
+    from fleet.jobshop.portfolio import solve as solve
+    from fleet.jobshop.preprocessing import Instance as Instance
+    from fleet.jobshop.problem import BadShop as BadShop
+    from fleet.jobshop.problem import Block as Block
+    from fleet.jobshop.problem import Machine as Machine
+    from fleet.jobshop.problem import Operation as Operation
+    from fleet.jobshop.problem import Position as Position
+    from fleet.jobshop.problem import Schedule as Schedule
+    from fleet.jobshop.problem import Shop as Shop
+    from fleet.jobshop.rescheduling import Rescheduled as Rescheduled
+    from fleet.jobshop.rescheduling import reschedule as reschedule
+    from fleet.jobshop.sequencing import sequences as sequences
+    from fleet.jobshop.time_budget import StepClock as StepClock
+    from fleet.jobshop.time_budget import TimeBudget as TimeBudget
+else:
+    __all__, __getattr__ = lazy_names(
+        __name__,
+        {
+            "bounds": "lower_bound",
+            "forward_pass": "schedule_of",
+            "portfolio": "solve",
+            "preprocessing": "Instance",
+            "problem": "BadShop Block Machine Operation Position Schedule Shop",
+            "rescheduling": "Rescheduled reschedule",
+            "sequencing": "sequences",
+            "time_budget": "StepClock TimeBudget",
+        },
     )
-    from fleet.jobshop.rescheduling import Rescheduled, reschedule
-    from fleet.jobshop.sequencing import sequences
-    from fleet.jobshop.time_budget import StepClock, TimeBudget
-
-__all__ = [
-    "BadShop",
-    "Block",
-    "TimeBudget",
-    "Instance",
-    "Machine",
-    "Operation",
-    "Position",
-    "Rescheduled",
-    "Schedule",
-    "Shop",
-    "StepClock",
-    "lower_bound",
-    "reschedule",
-    "schedule_of",
-    "sequences",
-    "solve",
-]
-
-_MODULES = {
-    "TimeBudget": "time_budget",
-    "Instance": "instance",
-    "Rescheduled": "rescheduling",
-    "StepClock": "time_budget",
-    "lower_bound": "bounds",
-    "reschedule": "rescheduling",
-    "schedule_of": "forward_pass",
-    "sequences": "sequencing",
-    "solve": "portfolio",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_MODULES.get(name, 'problem')}"), name)

@@ -19,7 +19,7 @@ from collections.abc import Iterable, Sequence
 from math import inf
 from typing import NamedTuple
 
-from fleet.jobshop.instance import Instance
+from fleet.jobshop.preprocessing import Instance
 from fleet.jobshop.problem import Position
 
 STEPS = 300

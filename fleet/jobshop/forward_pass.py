@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from math import inf
 from typing import NamedTuple, Self
 
-from fleet.jobshop.instance import Instance, MergedOperation
+from fleet.jobshop.preprocessing import Instance, MergedOperation
 from fleet.jobshop.problem import BadShop, Position, Schedule, Shop, topological
 
 ENDS_WEIGHT = 1e-3

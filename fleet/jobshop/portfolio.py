@@ -8,7 +8,7 @@ from math import ceil
 
 from fleet.jobshop.bounds import bound_with_travel, lower_bound
 from fleet.jobshop.forward_pass import Solution, schedule_of
-from fleet.jobshop.instance import Instance
+from fleet.jobshop.preprocessing import Instance
 from fleet.jobshop.problem import Schedule, Shop
 from fleet.jobshop.search.annealing import anneal
 from fleet.jobshop.search.branch_and_bound import branch_and_bound

@@ -15,8 +15,8 @@ from math import inf
 
 from fleet.jobshop.bounds import lower_bound
 from fleet.jobshop.forward_pass import Solution, evaluate
-from fleet.jobshop.instance import Instance
 from fleet.jobshop.portfolio import schedule_in_order
+from fleet.jobshop.preprocessing import Instance
 from fleet.jobshop.problem import Position, Schedule, Shop
 from fleet.jobshop.search.annealing import anneal
 from fleet.jobshop.search.list_scheduling import list_schedule

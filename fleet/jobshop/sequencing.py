@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from itertools import chain, islice, permutations
 
 from fleet.jobshop.forward_pass import Solution, evaluate
-from fleet.jobshop.instance import Instance
+from fleet.jobshop.preprocessing import Instance
 from fleet.jobshop.problem import Shop
 from fleet.jobshop.search.annealing import anneal
 from fleet.jobshop.search.branch_and_bound import branch_and_bound

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from keyexpr_schema.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from fleet.core.checker.checked_plan import CheckedPlan as CheckedPlan
+    from fleet.core.checker.plan_checker import CheckedPlan as CheckedPlan
     from fleet.planners.base import NoPlan as NoPlan
     from fleet.planners.base import Planner as Planner
     from fleet.planners.base import PlanningProblem as PlanningProblem
@@ -23,6 +23,6 @@ else:
             "llm.interpreter": "LlmInterpreter",
             "llm.planner": "LlmPlanner",
             "symbolic.planner": "SymbolicPlanner",
-            ".core.checker.checked_plan": "CheckedPlan",
+            ".core.checker.plan_checker": "CheckedPlan",
         },
     )

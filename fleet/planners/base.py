@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
-from fleet.core.checker.checked_plan import CheckedPlan, check_plan
+from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan, Violation

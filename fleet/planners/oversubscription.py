@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from fleet.core.checker.checked_plan import CheckedPlan
+from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from keyexpr_schema.payloads.plans import Plan
 

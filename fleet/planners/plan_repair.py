@@ -8,12 +8,16 @@ checker decides whether that is a plan.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable, Set
+from dataclasses import replace as changed
 
-from fleet.core.checker.checked_plan import CheckedPlan, check_plan
-from fleet.core.revision.repair import beside, broken_goals, for_goals, without_tasks_of
+from msgspec.structs import replace
+
+from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
+from keyexpr_schema.facts import SEARCHED
+from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan
 
 
@@ -30,11 +34,11 @@ def repair_plan(
     `problem` has all goals of the plan with what they still want; `reached` are those that want
     only to be kept. `feasibility` says which goals cannot be reached at all.
     """
-    whole = for_goals(residual, problem.goals)
+    whole = _for_goals(residual, problem.goals)
     checked = check_plan(whole, problem.world)
     if isinstance(checked, CheckedPlan):
         return PartialPlan(checked, changed=False)
-    broken = broken_goals(checked, problem.goals)
+    broken = _broken_goals(checked, problem.goals)
     rest = tuple(goal for goal in problem.goals if goal.goal not in broken)
     if not broken or all(goal.goal in reached for goal in rest):
         return None
@@ -42,14 +46,84 @@ def repair_plan(
     first = max([problem.first_task, *(number + 1 for number in numbers)])
     anew = tuple(goal for goal in problem.goals if goal.goal in broken)
     part = plan_reachable_goals(
-        planner, feasibility, replace(problem, goals=anew, first_task=first)
+        planner, feasibility, changed(problem, goals=anew, first_task=first)
     )
-    repaired = without_tasks_of(residual, broken)
+    repaired = _without_tasks_of(residual, broken)
     if isinstance(part, NoPlan):
         left_out = {goal.goal: part.reason for goal in anew}
     else:
         left_out = dict(part.left_out)
-        repaired = beside(repaired, part.plan)
-    repaired = for_goals(repaired, [g for g in problem.goals if g.goal not in left_out])
+        repaired = _beside(repaired, part.plan)
+    repaired = _for_goals(repaired, [g for g in problem.goals if g.goal not in left_out])
     rechecked = check_plan(repaired, problem.world)
     return PartialPlan(rechecked, left_out) if isinstance(rechecked, CheckedPlan) else None
+
+
+def _without_tasks_of(plan: Plan, goals: Set[str]) -> Plan:
+    """The plan without the tasks of these goals, and without what only those tasks need."""
+    tasks = tuple(task for task in plan.tasks if task.goal not in goals)
+    kept = {task.task for task in tasks}
+    actors = {task.actor for task in tasks}
+    return replace(
+        plan,
+        tasks=tuple(replace(t, after=tuple(b for b in t.after if b in kept)) for t in tasks),
+        pins={actor: robot for actor, robot in plan.pins.items() if actor in actors},
+    )
+
+
+def _beside(plan: Plan, other: Plan) -> Plan:
+    """Both plans as one, with no order between them; their tasks' and actors' names differ."""
+    return replace(
+        plan,
+        tasks=(*plan.tasks, *other.tasks),
+        pins={**plan.pins, **other.pins},
+        conditions=tuple(dict.fromkeys([*plan.conditions, *other.conditions])),
+        seeks=tuple(dict.fromkeys([*plan.seeks, *other.seeks])),
+    )
+
+
+def _for_goals(plan: Plan, goals: Iterable[Goal]) -> Plan:
+    """The plan, answering for these goals, and for the places that it searches."""
+    wanted = tuple(goals)
+    conditions = [
+        condition
+        for goal in wanted
+        for condition in goal.conditions
+        if not set(plan.seeks) & set(condition.subjects)
+    ]
+    conditions += [c for c in plan.conditions if plan.seeks and c.relation == SEARCHED]
+    return replace(
+        plan,
+        goals=tuple(goal.goal for goal in wanted),
+        conditions=tuple(dict.fromkeys(conditions)),
+    )
+
+
+def _broken_goals(invalid: InvalidPlan, goals: Iterable[Goal]) -> frozenset[str]:
+    """The goals that the checker's violations are about; none if one is about no goal."""
+    plan = invalid.plan
+    goal_of = {task.task: task.goal for task in plan.tasks}
+    wants: dict[Condition, list[str]] = {}
+    for goal in goals:
+        for condition in goal.conditions:
+            wants.setdefault(condition, []).append(goal.goal)
+    if invalid.graph is None:
+        return frozenset()
+    broken: set[str] = set()
+    for violation in invalid.violations:
+        if violation.task is not None:
+            served = goal_of[violation.task]
+            about = [served] if served is not None else []
+        elif violation.condition is not None:
+            about = wants.get(violation.condition, [])
+        elif violation.code == "no-robot":
+            continue
+        else:
+            about = []
+        if not about:
+            return frozenset()
+        broken.update(about)
+    for actor, robots in invalid.able.items():
+        if not robots:
+            broken.update(t.goal for t in plan.tasks if t.actor == actor and t.goal is not None)
+    return frozenset(broken)

@@ -6,11 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice, pairwise
 
-from fleet.core.checker.checked_plan import CheckedPlan, check_allocation
+from fleet.core.checker.plan_checker import CheckedPlan, check_allocation
 from fleet.jobshop.forward_pass import schedule_of
 from fleet.jobshop.sequencing import sequences
 from fleet.jobshop.time_budget import StepClock, TimeBudget
-from fleet.scheduling.plan_shop import AllocationContext, plan_shop
+from fleet.scheduling.allocation_context import AllocationContext
+from fleet.scheduling.plan_shop import plan_shop
 from keyexpr_schema.payloads.plans import Violation
 
 MAX_SEQUENCES_CHECKED = 24

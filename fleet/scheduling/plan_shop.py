@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import inf
 
-from fleet.core.checker.checked_plan import CheckedPlan
+from fleet.core.actors.actor_order import carried_at_end, first_actors
+from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
-from fleet.core.schedule.actor_order import carried_at_end, first_actors
 from fleet.jobshop.problem import Block, Machine, Operation, Position, Shop
+from fleet.scheduling.allocation_context import AllocationContext
 from keyexpr_schema.facts import AT, FactKey, Value
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.plans import Plan
@@ -21,25 +22,6 @@ MOST_PRIORITY = 8
 ANYWHERE = 0
 """The site that stands for wherever a robot may be."""
 ANY = Position.ANYWHERE
-
-
-@dataclass(frozen=True)
-class AllocationContext:
-    """What counts in an allocation besides plan and world.
-
-    `ready_s` says from when on a robot is free [s from now]; `priority` of a goal decides between
-    equal makespans (each step up counts twice); `due_s` says when a goal should be done
-    [s from now]. `previous_allocation` has the robots of actors in the plan that this is the rest
-    of, and `actor_order` the order in which they were to begin: few actors should change hands.
-    Actors that are `under_way` go on at once.
-    """
-
-    ready_s: Mapping[str, float] = field(default_factory=dict)
-    priority: Mapping[str, int] = field(default_factory=dict)
-    due_s: Mapping[str, float] = field(default_factory=dict)
-    previous_allocation: Mapping[str, str] = field(default_factory=dict)
-    actor_order: tuple[str, ...] = ()
-    under_way: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from fleet.core.state import Policy
 from fleet.errors import FleetError
 from fleet.service.composition import Composition, compose
 from fleet.service.event_journal import EventJournal
-from fleet.service.planner import PlannerService
+from fleet.service.planner_service import PlannerService
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.transport.session import SessionConfig, open_session
 

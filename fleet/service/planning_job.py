@@ -10,17 +10,17 @@ from dataclasses import replace as changed
 from msgspec.structs import replace
 
 from fleet.allocators.base import Allocated, Allocator, NotAllocated
-from fleet.core.checker.checked_plan import CheckedPlan, InvalidPlan, check_plan
+from fleet.core.actors.actor_constraints import tasks_nobody_can_do
+from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.events import At, PlanningFailed, PlanningSucceeded
 from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import PlanningJob
-from fleet.core.schedule.actor_constraints import tasks_nobody_can_do
 from fleet.core.state import State
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
 from fleet.planners.plan_repair import repair_plan
-from fleet.service.allocation_context import context_of, robots_under_way
 from fleet.service.composition import Composition
+from fleet.service.job_context import context_of, robots_under_way
 from keyexpr_schema.facts import SEARCHED
 from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan

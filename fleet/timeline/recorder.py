@@ -15,8 +15,8 @@ import rerun as rr
 from fleet.timeline.clock import Clock, wall_of
 from fleet.timeline.drawing import event_log
 from fleet.timeline.drawing.blueprint import DEFAULT_SPAN_S, blueprint
+from fleet.timeline.drawing.gantt import Lanes, call_text
 from fleet.timeline.drawing.graph import Graphs
-from fleet.timeline.drawing.lanes import Lanes, call_text
 from fleet.timeline.drawing.palette import Palette
 from fleet.timeline.drawing.sink import Sink, entity
 from fleet.timeline.drawing.text import drawable

@@ -12,10 +12,10 @@ from keyexpr_schema.ids import check_id
 from keyexpr_schema.key import A, Delivery, Key, P, Payload
 from keyexpr_schema.transport.connecting import open_link
 from keyexpr_schema.transport.link import Link
+from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
 from keyexpr_schema.transport.queries import QueryServer, send_query
 from keyexpr_schema.transport.samples import Sample, decode_value, encoding_of
 from keyexpr_schema.transport.store_client import StoreClient
-from keyexpr_schema.transport.tokens import TokenChange, TokenWatch
 from keyexpr_schema.transport.trace import Trace
 from keyexpr_schema.transport.undecodable import UndecodableReports
 from keyexpr_schema.transport.watch import Change, Watch

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from sim.mujoco_world.base_controllers import PERIOD_S
 from sim.mujoco_world.description import ArmEntry, GripperEntry
-from sim.mujoco_world.drives import PERIOD_S
 
 ITERATIONS = 60
 DAMPING = 1e-3

@@ -18,12 +18,12 @@ from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from sim.backend import Backend
 from sim.files.world_schema import WorldFile
 from sim.mujoco_world.assemble import STEP_S, compile_world
+from sim.mujoco_world.base_controllers import PERIOD_S
+from sim.mujoco_world.base_motions import approach, fold, go_to, look
 from sim.mujoco_world.collisions import Collisions
 from sim.mujoco_world.description import load_description
 from sim.mujoco_world.drawing import draw_frame, draw_scene
-from sim.mujoco_world.drives import PERIOD_S
-from sim.mujoco_world.driving import approach, fold, go_to, look
-from sim.mujoco_world.handling import grasp, release
+from sim.mujoco_world.grasping import grasp, release
 from sim.mujoco_world.handover import release_in_basket
 from sim.mujoco_world.motion import MotionContext, MotionFailed, MotionRun, Steps
 from sim.mujoco_world.observer import Observer

@@ -8,9 +8,9 @@ from collections.abc import Generator
 from keyexpr_schema.payloads.motions import PointM
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.files.solids import solids
-from sim.mujoco_world.drives import wrap
-from sim.mujoco_world.driving import distance_m
-from sim.mujoco_world.handling import (
+from sim.mujoco_world.base_controllers import wrap
+from sim.mujoco_world.base_motions import distance_m
+from sim.mujoco_world.grasping import (
     RELEASE_LIFT_M,
     Reach,
     hand_of,

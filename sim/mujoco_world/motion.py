@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from keyexpr_schema.payloads.motions import Detection, Motion, MotionOutcome
 from sim.files.world_schema import WorldFile
-from sim.mujoco_world.drives import PERIOD_S, wrap
+from sim.mujoco_world.base_controllers import PERIOD_S, wrap
 from sim.mujoco_world.observer import Observer
 from sim.mujoco_world.robot_body import RobotBody
 from sim.navigation import Leg, Navigator

@@ -7,8 +7,8 @@ from typing import Any
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from sim.errors import BadFile
 from sim.mujoco_world.arm import Arm, Gripper
+from sim.mujoco_world.base_controllers import PERIOD_S, make_drive
 from sim.mujoco_world.description import RobotModel
-from sim.mujoco_world.drives import PERIOD_S, make_drive
 
 LOST_AFTER_S = 0.3
 """A hand that feels nothing for this long is empty: a pad can lose touch for a moment on a jolt."""

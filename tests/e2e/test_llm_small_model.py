@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from fleet.core.checker.checked_plan import CheckedPlan
+from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.llm.configuration import LlmConfig
 from fleet.llm.conversation import LanguageModel
 from fleet.planners.base import PlanningProblem

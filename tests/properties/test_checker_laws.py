@@ -6,7 +6,7 @@ from itertools import combinations
 
 from hypothesis import given, settings
 
-from fleet.core.checker.checked_plan import check_allocation, check_plan
+from fleet.core.checker.plan_checker import check_allocation, check_plan
 from fleet.core.model.preconditions import first_unmet
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel, condition_holds, room_left

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from benchmarks.allocation.shops import without_machines
 from fleet.jobshop.bounds import bound_with_travel, lower_bound
 from fleet.jobshop.forward_pass import schedule_of
-from fleet.jobshop.instance import Instance
 from fleet.jobshop.portfolio import schedule_in_order, solve
+from fleet.jobshop.preprocessing import Instance
 from fleet.jobshop.problem import BadShop, Block, Machine, Operation, Position, Schedule, Shop
 from fleet.jobshop.rescheduling import WITHIN, reschedule
 from fleet.jobshop.search.branch_and_bound import branch_and_bound

@@ -9,7 +9,7 @@ import msgspec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fleet.core.checker.checked_plan import CheckedPlan, check_plan
+from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.llm.quoting import fenced
 from fleet.llm.structured_output import read_answer
 from fleet.planners.base import PlanningProblem

@@ -16,7 +16,7 @@ from fleet.allocators.load_balancing import (
 )
 from fleet.allocators.load_balancing.robot_sets import bits, classes_of, mask_of, projection
 from fleet.allocators.load_balancing.semi_matching import loads_of, semi_matching
-from fleet.allocators.min_max_load_program import MinMaxLoadProgram, Status, solve
+from fleet.allocators.min_max_load_milp import MinMaxLoadProgram, Status, solve
 from tests.support.reached import Reached, reaches
 
 LIMIT_S = 600.0

@@ -6,7 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from fleet.allocators.base import Allocated
-from fleet.core.checker.checked_plan import CheckedPlan, check_allocation, check_plan
+from fleet.core.checker.plan_checker import CheckedPlan, check_allocation, check_plan
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import PlanningProblem
 from fleet.service.composition import compose

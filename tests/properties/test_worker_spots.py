@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from keyexpr_schema.payloads.world import Place, Surface
 from tests.support.reached import Reached, reaches
-from workers.skills.spots import (
+from workers.skills.put_down_spots import (
     APART_M,
     FURNITURE_M,
     REACH_IN_M,
@@ -20,7 +20,7 @@ from workers.skills.spots import (
     floor_spots,
     surface_spots,
 )
-from workers.skills.viewing import BORDER_M, MOST_CELLS, RANGE_MARGIN, Viewing, cells
+from workers.skills.viewpoints import BORDER_M, MOST_CELLS, RANGE_MARGIN, Viewing, cells
 
 metres = st.floats(0.0, 10.0)
 points = st.tuples(metres, metres)

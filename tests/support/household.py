@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fleet.core.checker.checked_plan import CheckedPlan, check_plan
+from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.service.composition import load_skills

@@ -6,7 +6,7 @@ from typing import Any
 
 from fleet.allocators.base import Allocated
 from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
-from fleet.core.checker.checked_plan import CheckedPlan
+from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.core.model.world import WorldModel
 from fleet.llm.client import ModelClient
 from fleet.llm.configuration import LlmConfig

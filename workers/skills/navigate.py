@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.motions import MotionKind
-from workers.context import SkillContext
 from workers.errors import SkillFailed
+from workers.skill_context import SkillContext
 from workers.skill_registry import ParameterKind, skill
 
 DOORWAY_M = 0.6

@@ -6,11 +6,11 @@ from contextlib import aclosing
 
 from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.payloads.motions import Detection, MotionKind
-from workers.context import SkillContext
 from workers.errors import SkillFailed
+from workers.skill_context import SkillContext
 from workers.skill_registry import ParameterKind, skill
-from workers.skills.finding import looks
-from workers.skills.viewing import Viewing
+from workers.skills.looking_around import looks
+from workers.skills.viewpoints import Viewing
 
 LEAST_LOOKS = 2
 """A thing is not to be seen only after looks from two spots: furniture hides things."""

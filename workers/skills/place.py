@@ -6,10 +6,10 @@ from math import dist
 
 from keyexpr_schema.facts import AT, NOTHING
 from keyexpr_schema.payloads.motions import Detection, MotionKind, PointM
-from workers.context import SkillContext
 from workers.errors import SkillFailed
+from workers.skill_context import SkillContext
 from workers.skill_registry import ParameterKind, skill
-from workers.skills.spots import away_from, candidates
+from workers.skills.put_down_spots import away_from, candidates
 
 MOST_SPOTS = 4
 OTHER_SPOT_M = 0.3

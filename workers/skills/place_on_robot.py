@@ -6,8 +6,8 @@ from math import dist
 
 from keyexpr_schema.facts import AT, NOTHING
 from keyexpr_schema.payloads.motions import MotionKind, PointM
-from workers.context import SkillContext
 from workers.errors import SkillFailed
+from workers.skill_context import SkillContext
 from workers.skill_registry import ParameterKind, skill
 
 STATE_S = 10.0

@@ -5,10 +5,10 @@ from __future__ import annotations
 from contextlib import aclosing
 
 from keyexpr_schema.facts import AT, SEARCHED
-from workers.context import SkillContext
+from workers.skill_context import SkillContext
 from workers.skill_registry import ParameterKind, skill
-from workers.skills.finding import looks
-from workers.skills.viewing import Viewing
+from workers.skills.looking_around import looks
+from workers.skills.viewpoints import Viewing
 
 
 @skill("search", parameters={"place": ParameterKind.PLACE})

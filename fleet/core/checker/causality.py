@@ -1,6 +1,6 @@
 """Causality: whether conditions hold before tasks and at the end, in every order of the graph.
 
-The criterion is that of `fleet.core.checker.checked_plan`.
+The criterion is that of `fleet.core.checker.plan_checker`.
 """
 
 from __future__ import annotations

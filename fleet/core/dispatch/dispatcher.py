@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from fleet.core.dispatch.deadlock import break_deadlock
 from fleet.core.dispatch.delays import late_task, next_lateness
 from fleet.core.dispatch.lost_robots import fail_tasks_of_lost_robots, next_loss
-from fleet.core.dispatch.ready_tasks import order_if_ready
+from fleet.core.dispatch.ready_tasks import by_priority, order_if_ready
 from fleet.core.dispatch.replan_triggers import new_robots, why_replan
 from fleet.core.handlers.goals import next_stage
 from fleet.core.handlers.requests import plan_waiting_goals
@@ -15,7 +15,7 @@ from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import PlanEntry, ReplanScope
 from fleet.core.revision.replanning import start_replanning
 from fleet.core.state import State
-from fleet.core.updates import give_up, mark_goals, set_entry
+from fleet.core.state_updates import give_up, mark_goals, set_entry
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
@@ -26,7 +26,7 @@ def advance(state: State, skills: Skills) -> State:
     state = fail_tasks_of_lost_robots(state)
     if state.policy.auto_plan:
         state = plan_waiting_goals(state)
-    plans = sorted(state.plans, key=lambda name: _priority(state, name))
+    plans = by_priority(state)
     for plan in plans:
         entry = state.plans[plan]
         if entry.cancelling and not entry.ended:
@@ -43,11 +43,6 @@ def next_timer(state: State) -> float | None:
     """The Unix time [s] at which time alone changes something: a robot is lost, or a task late."""
     times = [at_s for at_s in (next_loss(state), next_lateness(state)) if at_s is not None]
     return min(times, default=None)
-
-
-def _priority(state: State, plan: str) -> tuple[int, str]:
-    goals = [state.goals[g] for g in state.plans[plan].plan.goals if g in state.goals]
-    return -max((goal.priority for goal in goals), default=0), plan
 
 
 def _cancel(state: State, entry: PlanEntry) -> State:

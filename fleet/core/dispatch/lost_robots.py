@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
 from fleet.core.state import State
-from fleet.core.updates import set_entry
+from fleet.core.state_updates import set_entry
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
 
 

@@ -8,10 +8,20 @@ from fleet.core.model.preconditions import action_of, unmet_before
 from fleet.core.model.skills import Action, Skills
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
 from fleet.core.state import State
-from fleet.core.updates import give_up, set_entry, set_record
+from fleet.core.state_updates import give_up, set_entry, set_record
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import ENDED_GOALS
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+
+
+def by_priority(state: State) -> list[str]:
+    """The plans in the order in which their ready tasks are given robots."""
+
+    def rank(plan: str) -> tuple[int, str]:
+        goals = [state.goals[g] for g in state.plans[plan].plan.goals if g in state.goals]
+        return -max((goal.priority for goal in goals), default=0), plan
+
+    return sorted(state.plans, key=rank)
 
 
 def order_if_ready(

@@ -1,4 +1,11 @@
-"""What comes up that a plan does not provide for: facts against it, finds, new robots."""
+"""Replan triggers: what comes up that a plan does not provide for.
+
+Here are facts against it, finds, conditions that do not hold at its end, and robots that came. A
+task that failed is one in `handlers.reports`, a robot lost or late in `lost_robots` and `delays`, a
+goal that changed in `handlers.goals`, a person's word in `handlers.requests`. Each sets
+`PlanEntry.replan`; `revision.replanning` makes a planning job of it, which `planners.plan_repair`
+answers.
+"""
 
 from __future__ import annotations
 

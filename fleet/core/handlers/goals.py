@@ -9,7 +9,7 @@ from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import ReplanScope
 from fleet.core.state import State, put, without
-from fleet.core.updates import believe, cancel, set_entry, set_goal, without_goal
+from fleet.core.state_updates import believe, cancel, set_entry, set_goal, without_goal
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, read_goal
 from keyexpr_schema.facts import AT, NOTHING, SEARCHED, Value

@@ -12,7 +12,7 @@ from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanReason
 from fleet.core.revision.reconcile import reconcile
 from fleet.core.state import State, put, without
-from fleet.core.updates import answer, give_up, mark_goals, set_entry, without_goal
+from fleet.core.state_updates import answer, give_up, mark_goals, set_entry, without_goal
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Answer

@@ -11,7 +11,7 @@ from fleet.core.model.preconditions import action_of, unmet_before
 from fleet.core.model.skills import Action, Skills
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
 from fleet.core.state import State, put
-from fleet.core.updates import (
+from fleet.core.state_updates import (
     believe,
     believe_if_newer,
     give_up,

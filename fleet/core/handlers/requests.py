@@ -10,7 +10,7 @@ from fleet.core import events
 from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanScope
 from fleet.core.state import State, put, without
-from fleet.core.updates import active_plan_of, answer, cancel, mark_goals, set_entry
+from fleet.core.state_updates import active_plan_of, answer, cancel, mark_goals, set_entry
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState, Task

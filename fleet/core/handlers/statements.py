@@ -8,7 +8,7 @@ from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.model.skills import Skills
 from fleet.core.state import State, put, without
-from fleet.core.updates import believe
+from fleet.core.state_updates import believe
 from fleet.errors import NotUnderstood
 from fleet.language import statement_facts
 from keyexpr_schema.payloads.world import Fact, StatementStatus

@@ -10,7 +10,7 @@ from fleet.core.handlers import goals, statements
 from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import ReplanScope
 from fleet.core.state import State, put, without
-from fleet.core.updates import believe, set_entry
+from fleet.core.state_updates import believe, set_entry
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.payloads.plans import PlanState
 

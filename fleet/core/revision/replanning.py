@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanReason, ReplanScope
 from fleet.core.revision.residual_plan import actors_in_order, begun_actors, residual_plan
 from fleet.core.state import State
-from fleet.core.updates import give_up, open_goals, set_entry
+from fleet.core.state_updates import give_up, open_goals, set_entry
 
 MAX_REPLANS = 12
 """After this many new revisions for each of its open goals, without one reached, a plan is given

@@ -12,7 +12,7 @@ from math import log
 from random import Random
 
 from fleet.jobshop.forward_pass import Solution, evaluate
-from fleet.jobshop.instance import Instance
+from fleet.jobshop.preprocessing import Instance
 from fleet.jobshop.time_budget import TimeBudget
 
 HOT, COLD = 0.02, 0.0002

@@ -11,7 +11,7 @@ from itertools import product
 from typing import NamedTuple
 
 from fleet.jobshop.forward_pass import LATE_WEIGHT, PartialSchedule, Solution
-from fleet.jobshop.instance import Instance
+from fleet.jobshop.preprocessing import Instance
 
 MOST_COMPONENTS = 7
 MOST_NODES = 6000

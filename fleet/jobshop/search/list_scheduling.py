@@ -15,7 +15,7 @@ from random import Random
 from typing import NamedTuple
 
 from fleet.jobshop.forward_pass import LAST, PartialSchedule, Solution
-from fleet.jobshop.instance import Instance
+from fleet.jobshop.preprocessing import Instance
 from fleet.jobshop.time_budget import TimeBudget
 
 ALPHAS = (0.1, 0.5, 1.0, 2.0, 0.2, 0.0, 0.3, 0.03, 0.7, 0.05, 0.4, 5.0)

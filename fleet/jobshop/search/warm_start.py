@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fleet.jobshop.forward_pass import Solution
-from fleet.jobshop.instance import Instance
+from fleet.jobshop.preprocessing import Instance
 from fleet.jobshop.search.list_scheduling import GreedySchedule, Placement
 
 NEAR = 1e-9

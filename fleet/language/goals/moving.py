@@ -16,7 +16,7 @@ from fleet.language.refusals import listed, one_of
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.lexicon import EntityType, Lexicon
 from fleet.language.words.morphology import gerund
-from fleet.language.words.verbs import PARTICLES
+from fleet.language.words.verb_senses import PARTICLES
 from fleet.language.words.wordlists import HOME, RELATIVE
 from keyexpr_schema.facts import AT, HELD
 

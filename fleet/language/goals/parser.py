@@ -11,7 +11,7 @@ from fleet.language.phrases.mentions import Mention
 from fleet.language.phrases.subjects import THINGS, Subject
 from fleet.language.vocabulary import SkillPhrase, Vocabulary
 from fleet.language.words.tokens import SENTENCE_ENDS, words_of
-from fleet.language.words.verbs import EXAMPLE, IMPERATIVES
+from fleet.language.words.verb_senses import EXAMPLE, IMPERATIVES
 from fleet.language.words.wordlists import (
     ASKING_WHERE,
     CAUSATIVES,

@@ -12,7 +12,7 @@ from fleet.language.phrases.subjects import THINGS, Subject
 from fleet.language.refusals import suggestion
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.tokens import words_in
-from fleet.language.words.verbs import (
+from fleet.language.words.verb_senses import (
     BASE_VERBS,
     EXAMPLE,
     FINITE,

@@ -10,7 +10,7 @@ from fleet.language.goals.moving import HOME_HINT, Moving
 from fleet.language.phrases.locations import PLACES
 from fleet.language.phrases.mentions import Mention
 from fleet.language.refusals import one_of
-from fleet.language.words.verbs import EXAMPLE
+from fleet.language.words.verb_senses import EXAMPLE
 from fleet.language.words.wordlists import WHOLE_HOUSE
 from keyexpr_schema.facts import AT
 

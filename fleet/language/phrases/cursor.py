@@ -8,7 +8,7 @@ from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, reason_for, suggestion
 from fleet.language.words.lexicon import ENTITY_TYPES, EntityType, Lexicon
 from fleet.language.words.tokens import ORDINALS, SENTENCE_ENDS, Phrase, Token, tokens_of, words_of
-from fleet.language.words.verbs import FINITE, IMPERATIVES
+from fleet.language.words.verb_senses import FINITE, IMPERATIVES
 from fleet.language.words.wordlists import COPULAR_VERBS, FROM, IN, MODALS, TO
 
 _PUNCTUATION = SENTENCE_ENDS | {","}

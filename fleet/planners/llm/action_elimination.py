@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from msgspec.structs import replace
 
-from fleet.core.checker.checked_plan import check_plan
+from fleet.core.checker.plan_checker import check_plan
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import AT, FactKey

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fleet.core.checker.checked_plan import CheckedPlan, InvalidPlan
+from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan
 from fleet.core.model.world import WorldModel
 from fleet.llm.budget import Budget
 from fleet.llm.conversation import GivenUp, LanguageModel, Rejected

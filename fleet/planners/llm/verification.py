@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from fleet.core.checker.checked_plan import (
+from fleet.core.actors.actor_constraints import least_loaded
+from fleet.core.checker.plan_checker import (
     CheckedPlan,
     InvalidPlan,
     check_plan,
 )
 from fleet.core.model.world import WorldModel
-from fleet.core.schedule.actor_constraints import least_loaded
 from fleet.scheduling.plan_schedule import AllocatedPlan
 from keyexpr_schema.payloads.plans import Plan, Violation
 

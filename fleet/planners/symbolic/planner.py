@@ -18,10 +18,10 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from math import inf, prod
 
-from fleet.core.checker.checked_plan import CheckedPlan, InvalidPlan, check_plan
+from fleet.core.actors.actor_constraints import least_loaded
+from fleet.core.actors.actor_order import carried_at_end
+from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.model.world import WorldModel
-from fleet.core.schedule.actor_constraints import least_loaded
-from fleet.core.schedule.actor_order import carried_at_end
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.deordering import ActionSequence, deordered
 from fleet.planners.symbolic.action_sequences import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fleet.timeline.drawing.lanes import call_text
+from fleet.timeline.drawing.gantt import call_text
 from keyexpr_schema.facts import render_value
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import networkx
 import rerun as rr
 
-from fleet.timeline.drawing.lanes import call_text
+from fleet.timeline.drawing.gantt import call_text
 from fleet.timeline.drawing.palette import TASK_STATES
 from fleet.timeline.drawing.sink import Sink, entity
 from fleet.timeline.drawing.text import drawable

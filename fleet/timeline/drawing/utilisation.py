@@ -6,7 +6,7 @@ import math
 
 import rerun as rr
 
-from fleet.timeline.drawing.lanes import Lanes
+from fleet.timeline.drawing.gantt import Lanes
 from fleet.timeline.drawing.palette import FLEET, Palette
 from fleet.timeline.drawing.sink import Sink, entity
 

@@ -8,7 +8,7 @@ from fleet.allocators.base import Allocated, Allocator, NotAllocated
 from fleet.allocators.cost_based import CostBasedAllocator
 from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.allocators.round_robin import RoundRobinAllocator
-from fleet.core.checker.checked_plan import CheckedPlan, check_allocation
+from fleet.core.checker.plan_checker import CheckedPlan, check_allocation
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner

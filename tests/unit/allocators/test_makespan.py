@@ -12,7 +12,7 @@ from fleet.core.model.world import WorldModel
 from fleet.jobshop.time_budget import StepClock
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
-from fleet.scheduling.plan_shop import AllocationContext
+from fleet.scheduling.allocation_context import AllocationContext
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.plans import Plan, Task
 from tests.support.household import bring, carrier, checked, home, manipulator

@@ -17,7 +17,7 @@ from fleet.allocators.min_max_load import (
     assign_with_least_travel,
     in_turn_instead,
 )
-from fleet.allocators.min_max_load_program import MinMaxLoadProgram, Status, max_load, solve
+from fleet.allocators.min_max_load_milp import MinMaxLoadProgram, Status, max_load, solve
 from fleet.core.model.world import WorldModel
 from fleet.service.composition import compose
 from keyexpr_schema.payloads.plans import Violation

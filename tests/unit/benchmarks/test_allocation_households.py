@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.allocation.alternatives import big_m, in_turn, makespan_s, nearest, papers_milp
+from benchmarks.allocation.baselines import big_m, in_turn, makespan_s, nearest, papers_milp
 from benchmarks.allocation.bench_household import compare
 from benchmarks.allocation.household import (
     CLOCKS,
@@ -20,9 +20,9 @@ from benchmarks.allocation.shops import random_shop
 from fleet.allocators.base import Allocated
 from fleet.allocators.makespan import MakespanAllocator
 from fleet.allocators.round_robin import RoundRobinAllocator
-from fleet.core.checker.checked_plan import check_plan
-from fleet.jobshop.instance import Instance
+from fleet.core.checker.plan_checker import check_plan
 from fleet.jobshop.portfolio import solve
+from fleet.jobshop.preprocessing import Instance
 from fleet.jobshop.time_budget import StepClock, TimeBudget
 from tests.support.household import checked
 

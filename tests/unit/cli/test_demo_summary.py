@@ -12,7 +12,7 @@ from rich.console import Console
 from cli.demo.summary import Summary, task_lines, times
 from cli.demo.verdict import GoalVerdict, Verdict
 from cli.views.demo_summary import summary_page
-from fleet.core.schedule.idle_time import union_s
+from fleet.scheduling.idle_time import union_s
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState, Try
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from benchmarks.allocation.shops import random_shop, with_under_way, without_machines
-from fleet.jobshop.instance import Instance
 from fleet.jobshop.portfolio import solve
+from fleet.jobshop.preprocessing import Instance
 from fleet.jobshop.rescheduling import WITHIN, reschedule
 from fleet.jobshop.search.list_scheduling import list_schedule
 from tests.support.searches import steps

@@ -7,8 +7,8 @@ import time
 import pytest
 
 from benchmarks.allocation.shops import random_shop, without_machines
-from fleet.jobshop.instance import Instance
 from fleet.jobshop.portfolio import solve
+from fleet.jobshop.preprocessing import Instance
 from fleet.jobshop.problem import BadShop, Block, Machine, Operation, Shop
 from fleet.jobshop.search.cpsat import CpSat, installed
 from fleet.jobshop.search.list_scheduling import list_schedule

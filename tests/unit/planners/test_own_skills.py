@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from fleet.core.checker.checked_plan import CheckedPlan
+from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.core.model.skill_file import skills_from_data
 from fleet.core.model.skill_phrases import phrases_of
 from fleet.core.model.world import WorldModel

@@ -9,7 +9,7 @@ import pytest
 
 from fleet.allocators.base import Allocated
 from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
-from fleet.core.checker.checked_plan import (
+from fleet.core.checker.plan_checker import (
     CheckedPlan,
     check_allocation,
 )

@@ -10,8 +10,8 @@ from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
+from fleet.scheduling.allocation_context import AllocationContext
 from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
-from fleet.scheduling.plan_shop import AllocationContext
 from keyexpr_schema.ids import actor_arg, bound
 from keyexpr_schema.payloads.plans import Plan, Task
 from tests.support.household import bring, carrier, checked, fact, home, manipulator

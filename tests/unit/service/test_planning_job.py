@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from fleet.core.checker.form import PlanForm
+from fleet.core.checker.well_formedness import PlanForm
 from fleet.core.model.world import WorldModel
 from fleet.planners.symbolic.action_sequences import ALTERNATIVES
 from keyexpr_schema.payloads.plans import Plan

@@ -16,7 +16,7 @@ from sim.files.mission_file import load_mission, load_robot
 from sim.files.solids import solids
 from sim.files.world_file import load_world
 from sim.files.world_payloads import object_payloads, place_payloads
-from sim.reach import out_of_reach
+from sim.reachability import out_of_reach
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 HOME = CONFIGS / "worlds" / "home.yaml"

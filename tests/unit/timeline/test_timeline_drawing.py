@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fleet.timeline.clock import Clock, wall_of
+from fleet.timeline.drawing.gantt import Bar, Lane, Lanes, call_text
 from fleet.timeline.drawing.graph import Node, layout
-from fleet.timeline.drawing.lanes import Bar, Lane, Lanes, call_text
 from fleet.timeline.drawing.palette import Palette
 from fleet.timeline.drawing.sink import Sink, open_stream
 from fleet.timeline.drawing.text import DRAWN, drawable

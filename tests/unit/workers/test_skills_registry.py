@@ -8,8 +8,8 @@ from keyexpr_schema.keyspace import OBJECT, PLACE, ROBOT_SPEC
 from keyexpr_schema.payloads.robots import RobotAddress, RobotSpec
 from keyexpr_schema.payloads.world import Object, ObjectAddress, Place, PlaceAddress
 from keyexpr_schema.transport.session import Change
-from workers.context import SkillContext
 from workers.errors import BadArguments, BadSkill, UnknownSkill
+from workers.skill_context import SkillContext
 from workers.skill_registry import ParameterKind, Skill, SkillRegistry, skill
 from workers.skills.household import HOUSEHOLD
 from workers.world_cache import WorldCache

@@ -23,7 +23,7 @@ from sim.files.mission_file import Mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
 from tests.support.router_process import RouterProcess
 from tests.support.worker_world import DEADLINE_S, Fleet, running_fleet
-from workers.context import SkillContext
+from workers.skill_context import SkillContext
 from workers.skill_registry import skill
 
 MakeFleet = Callable[..., AbstractAsyncContextManager[Fleet]]

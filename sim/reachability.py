@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from sim.files.mission_file import Mission
+from sim.mujoco_world.base_motions import REACH_MARGIN_M
 from sim.mujoco_world.description import load_description
-from sim.mujoco_world.driving import REACH_MARGIN_M
 from sim.navigation.spots import Spots
 
 

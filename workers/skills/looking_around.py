@@ -6,9 +6,9 @@ from collections.abc import AsyncGenerator
 
 from keyexpr_schema.payloads.motions import Detection, MotionKind
 from keyexpr_schema.payloads.robots import PoseMRad
-from workers.context import SkillContext
 from workers.errors import SkillFailed
-from workers.skills.viewing import Viewing
+from workers.skill_context import SkillContext
+from workers.skills.viewpoints import Viewing
 
 MOST_LOOKS = 4
 NO_WAY_MOST = 3

@@ -7,7 +7,7 @@ from dataclasses import replace as model_replace
 import pytest
 from msgspec.structs import replace
 
-from fleet.core.checker.checked_plan import CheckedPlan, check_allocation, check_plan
+from fleet.core.checker.plan_checker import CheckedPlan, check_allocation, check_plan
 from fleet.core.model.skill_file import skills_from_data
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import Condition

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fleet.allocators.min_max_load_program import MinMaxLoadProgram, solve
-from fleet.jobshop.instance import Instance
+from fleet.allocators.min_max_load_milp import MinMaxLoadProgram, solve
+from fleet.jobshop.preprocessing import Instance
 from fleet.jobshop.problem import Shop
 from fleet.jobshop.search.list_scheduling import list_schedule
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fleet.core.checker.checked_plan import CheckedPlan, InvalidPlan, check_plan
-from fleet.core.schedule.actor_constraints import tasks_nobody_can_do
+from fleet.core.actors.actor_constraints import tasks_nobody_can_do
+from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.planners.base import PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from tests.support.household import bring, carrier, home, manipulator

@@ -1,4 +1,4 @@
-"""The allocation context: who is busy, what matters, who did what until now."""
+"""Where a planning job is allocated: its allocation context, and robots whose work goes on."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Set
 from fleet.core.dispatch.delays import behind_s
 from fleet.core.plan_entry import PlanningJob
 from fleet.core.state import State
-from fleet.scheduling.plan_shop import AllocationContext
+from fleet.scheduling.allocation_context import AllocationContext
 from keyexpr_schema.ids import actor_in
 from keyexpr_schema.payloads.plans import Plan
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from keyexpr_schema.payloads.motions import PointM
 from sim.mujoco_world.arm import Arm, Gripper
-from sim.mujoco_world.drives import PERIOD_S
-from sim.mujoco_world.driving import distance_m
+from sim.mujoco_world.base_controllers import PERIOD_S
+from sim.mujoco_world.base_motions import distance_m
 from sim.mujoco_world.motion import (
     MotionContext,
     MotionFailed,

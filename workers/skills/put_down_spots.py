@@ -7,7 +7,7 @@ from math import cos, dist, sin
 
 from keyexpr_schema.payloads.motions import PointM
 from keyexpr_schema.payloads.world import Place, Surface
-from workers.skills.viewing import cells
+from workers.skills.viewpoints import cells
 
 PointM2 = tuple[float, float]
 

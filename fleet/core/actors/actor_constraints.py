@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fleet.core.checker.checked_plan import CheckedPlan, InvalidPlan
-from fleet.core.schedule.actor_order import carried_at_end
+from fleet.core.actors.actor_order import carried_at_end
+from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan
 from keyexpr_schema.ids import bare_name
 from keyexpr_schema.payloads.plans import Plan, Violation
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 
-from fleet.core.checker.checked_plan import CheckedPlan
+from fleet.core.checker.plan_checker import CheckedPlan
 from keyexpr_schema.facts import AT, Value
 from keyexpr_schema.ids import actor_arg, actor_in
 

@@ -24,7 +24,7 @@ import msgspec
 
 from fleet.core.checker.actor_requirements import Candidates, Left, Requirement
 from fleet.core.checker.causality import Causality
-from fleet.core.checker.form import PlanForm
+from fleet.core.checker.well_formedness import PlanForm
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import Cycle, TaskGraph
 from fleet.core.model.world import WorldModel

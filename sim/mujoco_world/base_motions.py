@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from keyexpr_schema.payloads.motions import Detection, PointM
 from sim.errors import NoPath, NoStance
-from sim.mujoco_world.drives import wrap
+from sim.mujoco_world.base_controllers import wrap
 from sim.mujoco_world.motion import MotionContext, MotionFailed, MotionRun, Step, Steps, stow
 
 LOOK_RATE_RAD_S = 1.0

@@ -12,7 +12,7 @@ from cli.plans.idle import idle_report
 from cli.views.console import console
 from cli.views.idle_time import idle_page
 from fleet.core.model.task_graph import Cycle
-from fleet.core.schedule.idle_time import (
+from fleet.scheduling.idle_time import (
     IdleTime,
     capable,
     measured_idle,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from fleet.core.actors.actor_constraints import actors_apart, task_counts
+from fleet.core.actors import actors_apart, task_counts
 from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.core.model.world import WorldModel
 from fleet.scheduling.allocation_context import AllocationContext

@@ -119,10 +119,7 @@ def fact(now: Fact, before: Fact | None) -> Iterator[Line]:
     if before is not None and before.value == now.value:
         return
     was = f" (was {render_value(before.value)})" if before is not None else ""
-    yield (
-        INFO,
-        f"{now.source} says {now.literal}{was}",
-    )
+    yield INFO, f"{now.source} says {now.literal}{was}"
 
 
 def robot_spec(now: RobotSpec, before: RobotSpec | None) -> Iterator[Line]:
@@ -160,7 +157,7 @@ def truth(now: Truth, before: Truth | None) -> Iterator[Line]:
     )
 
 
-def reject(now: UndecodableValue, before: UndecodableValue | None) -> Iterator[Line]:
+def undecodable(now: UndecodableValue, before: UndecodableValue | None) -> Iterator[Line]:
     """A value could not be read."""
     if before is None or before.reason != now.reason:
         yield ERROR, f"{now.component} could not read {now.keyexpr}: {now.reason}"

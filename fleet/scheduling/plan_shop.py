@@ -34,18 +34,18 @@ class PlanShop:
     robots: tuple[str, ...]
     tasks: tuple[str, ...]
 
-    def actors_only(self) -> PlanShop:
+    def actors_only(self) -> Shop:
         """The same, but robots that the plan names take part in any number of tasks at once, and
         any actor may come first or last."""
         count, shop = len(self.actors), self.shop
         if len(shop.blocks) == count and all(b.position == ANY for b in shop.blocks):
-            return self
+            return shop
         blocks = tuple(replace(block, position=ANY) for block in shop.blocks[:count])
         operations = tuple(
             replace(operation, blocks=tuple(b for b in operation.blocks if b < count))
             for operation in shop.operations
         )
-        return replace(self, shop=replace(shop, blocks=blocks, operations=operations))
+        return replace(shop, blocks=blocks, operations=operations)
 
 
 def plan_shop(

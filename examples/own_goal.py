@@ -1,6 +1,6 @@
 """Give the fleet a goal from a program of your own, and follow what becomes of it.
 
-    python examples/own_goal.py "Bring the first cup to the hallway." [tcp/127.0.0.1:7447]
+    python examples/own_goal.py "Bring the first cup to the hallway." [tcp/127.0.0.1:7447 [plan]]
 
 A goal is one key that you put, its status one key that the planner puts: nothing else is needed to
 talk to the fleet. With `plan` as third word the planner is also asked for a plan, which it then

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from keyexpr_schema.transport.router import *  # noqa: F403
     from keyexpr_schema.transport.session import *  # noqa: F403
 else:
-    __all__, __getattr__ = lazy_names(
+    __all__, __getattr__, __dir__ = lazy_names(
         __name__,
         {
             "errors": (

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
 
-def lazy_names(package: str, names: Mapping[str, str]) -> tuple[list[str], Callable[[str], Any]]:
-    """`__all__` and `__getattr__` of a package: `names` has, by module in it, its public names.
+def lazy_names(
+    package: str, names: Mapping[str, str]
+) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
+    """`__all__`, `__getattr__`, `__dir__` of a package: `names` has its public names by module.
 
     A module is named as after the first dot of a relative import.
 
@@ -21,4 +24,7 @@ def lazy_names(package: str, names: Mapping[str, str]) -> tuple[list[str], Calla
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         return getattr(import_module(f".{modules[name]}", package), name)
 
-    return sorted(modules), get
+    def names_there() -> list[str]:
+        return sorted({*vars(sys.modules[package]), *modules})
+
+    return sorted(modules), get, names_there

@@ -49,7 +49,7 @@ def load_plug_ins(group: str, accept: Callable[[Any], T]) -> list[T]:
 def _load(entry: EntryPoint, accept: Callable[[Any], T]) -> T:
     try:
         return accept(entry.load())
-    except Exception as error:  # whatever a stranger's import, constructor or type may raise
+    except (Exception, SystemExit) as error:  # whatever a stranger's import or constructor raises
         package = "a package" if entry.dist is None else f"package {entry.dist.name}"
         raise BrokenPlugIn(
             f"{package} offers {entry.value} as {entry.name!r} in {entry.group}, which cannot be "

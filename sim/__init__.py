@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from sim.server.process import *  # noqa: F403
     from sim.server.sim_server import *  # noqa: F403
 else:
-    __all__, __getattr__ = lazy_names(
+    __all__, __getattr__, __dir__ = lazy_names(
         __name__,
         {
             "backend": "Backend",

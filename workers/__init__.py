@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from workers.skills.household import *  # noqa: F403
     from workers.world_cache import *  # noqa: F403
 else:
-    __all__, __getattr__ = lazy_names(
+    __all__, __getattr__, __dir__ = lazy_names(
         __name__,
         {
             "skill_context": "SkillContext",

@@ -17,9 +17,9 @@ from workers.errors import BadArguments, UnknownSkill
 from workers.orders.fencing import Phase
 from workers.orders.journal import Journal
 from workers.orders.order_queue import OrderQueue
-from workers.orders.outbox import Outbox
-from workers.orders.reports import make_report
+from workers.orders.outbox import Outbox, make_report
 from workers.recovery import (
+    ensure_single_worker,
     first_senses,
     make_safe,
     observe_after_crash,
@@ -27,7 +27,6 @@ from workers.recovery import (
     was_interrupted,
 )
 from workers.retry import run_attempt
-from workers.single_instance import ensure_single_worker
 from workers.skill_context import SkillContext
 from workers.skill_registry import SkillRegistry
 from workers.state_publisher import StatePublisher

@@ -24,9 +24,10 @@ from collections.abc import Callable
 from rich.console import Console
 from rich.table import Table
 
-from fleet.allocators.load_balancing import BalancedAssignment, LoadBalancingProblem, balance
+from fleet.allocators.load_balancing.balance import balance
+from fleet.allocators.load_balancing.problem import BalancedAssignment, LoadBalancingProblem
 from fleet.allocators.load_balancing.robot_sets import bits, mask_of
-from fleet.allocators.min_max_load_milp import MinMaxLoadProgram, Status, solve
+from fleet.allocators.min_max_load_milp import MinMaxLoadProgram, solve
 
 SIZES = ((100, 20), (1_000, 100), (10_000, 1_000))
 KINDS = ("alike", "types", "different", "random", "sparse", "skewed", "weighted", "apart")
@@ -169,7 +170,7 @@ def _milp(problem: LoadBalancingProblem) -> str:
     program.minimise_max_load()
     found = solve(program.model, MILP_LIMIT_S)
     most = f"{found.values['max_load']:.0f}" if found.values else "nothing"
-    proven = "" if found.status is Status.OPTIMAL else " (not proven)"
+    proven = "" if found.proven else " (not proven)"
     return f"{time.perf_counter() - start:.2f} s: {most}{proven}"
 
 

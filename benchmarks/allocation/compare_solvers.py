@@ -23,10 +23,11 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.allocation.bench_balanced import KINDS, problem_builder, program_of
-from fleet.allocators.load_balancing import BalancedAssignment, balance
+from fleet.allocators.load_balancing.balance import balance
+from fleet.allocators.load_balancing.problem import BalancedAssignment
 from fleet.allocators.load_balancing.robot_sets import bits
 from fleet.allocators.min_max_load import TRAVEL_GAP
-from fleet.allocators.min_max_load_milp import Status, max_load, solve
+from fleet.allocators.min_max_load_milp import max_load, solve
 
 SOLVERS = ("scipy", "CBC", "HiGHS")
 STEPS = ("max load", "travel")
@@ -105,7 +106,7 @@ def measured(
     began_s = time.perf_counter()
     if solver == "scipy":
         found = solve(program.model, limit_s, gap)
-        values, proven = found.values, found.status is Status.OPTIMAL
+        values, proven = found.values, found.proven
     else:
         values, proven = _by_pulp(program.model, solver, limit_s, gap, begin)
     took_s = time.perf_counter() - began_s

@@ -12,7 +12,7 @@ from keyexpr_schema.payloads.tasks import Order, Report, ReportState
 from keyexpr_schema.payloads.world import Fact
 from workers.embodiment import Embodiment
 from workers.errors import BadArguments, UnknownSkill
-from workers.orders.reports import make_report
+from workers.orders.outbox import make_report
 from workers.recovery import make_safe, observe_robot
 from workers.retry import run_attempt
 from workers.skill_context import SkillContext

@@ -1,4 +1,4 @@
-"""What robotctl asks of the planner, and what the planner says that it can do."""
+"""What robotctl asks of the planner, what must be there first, and what the planner can do."""
 
 from __future__ import annotations
 
@@ -9,14 +9,18 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from cli.client.presence import planner_alive
-from cli.errors import NotRunning, Refused, TooLate, Unknown, near_miss
+from cli.errors import NotRunning, Refused, TooLate, Unknown, check_known, near_miss
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import (
     ANSWER,
     CONTROL_REQUEST,
+    GOAL_SPEC,
     PLAN_REQUEST,
+    PLAN_SPEC,
+    PLAN_STATUS,
     PLANNER_STATUS,
     REPLAN_REQUEST,
+    ROBOT_SPEC,
     STATEMENT_STATUS,
 )
 from keyexpr_schema.payloads.requests import (
@@ -51,6 +55,25 @@ REQUEST_KEYS: dict[type[Request], Key[RequestAddress, Any]] = {
 def request_name() -> str:
     """A name for one request, never used before."""
     return f"req-{uuid.uuid4().hex[:12]}"
+
+
+async def check_goals(session: Session, goals: Iterable[str]) -> None:
+    """Raise `Unknown` unless there is each of these goals."""
+    known = [address.goal for address in await session.list(GOAL_SPEC)]
+    for goal in goals:
+        check_known("goal", goal, known)
+
+
+async def check_plan(session: Session, plan: str) -> None:
+    """Raise `Unknown` unless there is a plan of that name, be it without tasks."""
+    known = {address.plan for address in await session.list(PLAN_SPEC)}
+    known |= {address.plan for address in await session.list(PLAN_STATUS)}
+    check_known("plan", plan, known)
+
+
+async def check_robot(session: Session, robot: str) -> None:
+    """Raise `Unknown` unless a robot of that name is registered."""
+    check_known("robot", robot, (address.robot for address in await session.list(ROBOT_SPEC)))
 
 
 async def check_planner(session: Session) -> None:
@@ -105,7 +128,7 @@ async def statement_status(session: Session, statement: str) -> StatementStatus 
 async def planner_status(session: Session) -> PlannerStatus | None:
     """What the latest planner says that it can do; `None` where none ever ran, or nobody can tell.
 
-    A value that is no status is reported on its reject key, and is no reason to refuse a command.
+    One that does not decode is reported like any other, and is no reason to refuse a command.
     """
     return (await session.list(PLANNER_STATUS)).get(PlannerAddress())
 

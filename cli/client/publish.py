@@ -68,11 +68,11 @@ async def put_statement(session: Session, text: str, name: str | None = None) ->
         raise BadArgument("say something, such as “The first cup is in the kitchen.”")
     if name is None:
         stored = await session.list(STATEMENT)
-        same = [a.statement for a, said in stored.items() if said.text == text]
+        same = [a.statement for a, known in stored.items() if known.text == text]
         name = same[0] if same else free_name(text, (a.statement for a in stored), "statement")
-    said = Statement(statement=name, text=text)
-    await session.confirm(STATEMENT, StatementAddress(name), said)
-    return said
+    statement = Statement(statement=name, text=text)
+    await session.confirm(STATEMENT, StatementAddress(name), statement)
+    return statement
 
 
 async def put_fact(session: Session, relation: str, subject: str, written: str) -> Fact:

@@ -76,7 +76,7 @@ async def put_place(
 ) -> Place:
     """Store a place, confirmed; of one that is known, what is not said now stays as it was.
 
-    A distance counts both ways, so the other place is told of it, too.
+    A distance counts both ways, so the other place is put with it, too.
 
     Raises:
         BadArgument: the name stands for an object or a robot, or a region or distance is none.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.command import Call, single
-from cli.commands.processes import BACKENDS, BackendOption, MissionArgument, parse_speed
+from cli.commands.processes import BackendOption, MissionArgument, parse_speed
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -47,6 +47,7 @@ async def demo(
     from cli.views.live import ChangePrinter
     from sim.files.mission_file import load_mission
     from sim.reachability import out_of_reach
+    from sim.server.process import BACKENDS
 
     check_known("backend", backend, BACKENDS)
     parse_speed(speed)

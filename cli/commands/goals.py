@@ -145,7 +145,7 @@ async def show(call: Call, goal: GoalArgument) -> None:
 @command(app, "delete")
 async def delete(call: Call, goal: GoalArgument) -> None:
     """Take a goal back; its plan goes on without it, and ends if it had no other goal."""
-    from cli.client.known import check_goals
+    from cli.client.planner_requests import check_goals
     from keyexpr_schema.keyspace import GOAL_SPEC
     from keyexpr_schema.payloads.goals import GoalAddress
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -11,7 +12,10 @@ from cli.command import Call, single
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from keyexpr_schema.transport.session import Change
+    from keyexpr_schema.payloads.system import UndecodableValue
+    from keyexpr_schema.transport.session import Change, Session
+
+ASK_S = 3.0
 
 
 @single
@@ -20,7 +24,6 @@ async def status(call: Call) -> None:
     from cli.client.fleet_view import FLEET_KEYS, snapshot
     from cli.client.planner_requests import planner_status
     from cli.client.presence import planner_alive, robots_alive
-    from cli.client.undecodable import still_undecodable
     from cli.views.goals import goal_rows
     from cli.views.robots import robot_rows
     from cli.views.status import status_page
@@ -31,7 +34,7 @@ async def status(call: Call) -> None:
         planner = await planner_status(session)
         planning = await planner_alive(session)
         connected = await robots_alive(session)
-        undecodable = await still_undecodable(session, view.undecodable.values())
+        undecodable = await _still_undecodable(session, view.undecodable.values())
     robots = robot_rows(view.robot_specs, view.robot_states, connected)
     goals = goal_rows(view.goals, view.goal_status)
     settings = call.settings
@@ -49,6 +52,30 @@ async def status(call: Call) -> None:
             settings.routers, settings.realm, planner, planning, robots, goals, view, undecodable
         ),
     )
+
+
+async def _still_undecodable(
+    session: Session, values: Iterable[UndecodableValue]
+) -> list[UndecodableValue]:
+    """Those whose key still has a value that does not decode.
+
+    The report stays on its key when the bad value is replaced or deleted. What is not stored, and
+    what was put on a key that nobody can have, cannot be looked at again and stays listed.
+    """
+    from keyexpr_schema.errors import ForeignKey, UndecodablePayload
+    from keyexpr_schema.keyspace import key_of
+
+    left = []
+    for value in values:
+        try:
+            key = key_of(value.keyexpr)
+            if key.stored:
+                await session.get(key, key.parse(value.keyexpr), ASK_S)
+                continue
+        except (ForeignKey, UndecodablePayload):
+            pass
+        left.append(value)
+    return left
 
 
 @single

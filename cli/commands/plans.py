@@ -14,8 +14,6 @@ from cli.commands.plan_files import check, diff, propose
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from keyexpr_schema.payloads.plans import PlanStatus
-
 app = group("Make, look at, check, compare, start and cancel plans.")
 PlanArgument = Annotated[str, typer.Argument(metavar="PLAN", help="Its name.")]
 
@@ -58,8 +56,7 @@ async def create(
 ) -> None:
     """Have goals turned into a plan and, unless told otherwise, carried out."""
     from cli.client.fleet_view import FleetView, snapshot
-    from cli.client.known import check_goals
-    from cli.client.planner_requests import ask_planner, planner_status, request_name
+    from cli.client.planner_requests import ask_planner, check_goals, planner_status, request_name
     from cli.errors import BadArgument, check_known
     from cli.plans.files import check_suffix, write_plan
     from keyexpr_schema.ids import check_id
@@ -182,7 +179,8 @@ async def show(
         from cli.views.plans import plan_page, plans_table, violations_table
 
         if spec is None and dot:
-            raise Unknown(f"plan {name} has no tasks to draw: it is {_state(status)}")
+            state = status.state.value if status else "not there"
+            raise Unknown(f"plan {name} has no tasks to draw: it is {state}")
         if spec is None:
             table = plans_table({}, {name: status} if status else {})
             if status is None or not status.violations:
@@ -239,8 +237,7 @@ async def replan(
     ] = None,
 ) -> None:
     """Plan again from what is known now; what is done or running is kept."""
-    from cli.client.known import check_goals, check_plan
-    from cli.client.planner_requests import ask_planner, request_name
+    from cli.client.planner_requests import ask_planner, check_goals, check_plan, request_name
     from keyexpr_schema.payloads.requests import ReplanRequest
 
     async with call.session() as session:
@@ -255,13 +252,8 @@ async def replan(
     call.show(answer, lambda: answer.sentence)
 
 
-def _state(status: PlanStatus | None) -> str:
-    return status.state.value if status else "not there"
-
-
 async def _control(call: Call, control: str, plan: str) -> None:
-    from cli.client.known import check_plan
-    from cli.client.planner_requests import ask_planner, request_name
+    from cli.client.planner_requests import ask_planner, check_plan, request_name
     from keyexpr_schema.keyspace import PLAN_PROPOSAL
     from keyexpr_schema.payloads.plans import PlanAddress
     from keyexpr_schema.payloads.requests import Control, ControlRequest

@@ -16,7 +16,6 @@ from cli.command import Call, single
 T = TypeVar("T")
 SIM = "sim"
 """The embodiment that is not a plug-in."""
-BACKENDS = ("mujoco", "kinematic")
 
 MissionArgument = Annotated[
     str, typer.Argument(metavar="MISSION", help="A mission's file, or name as two-cups.")
@@ -170,15 +169,15 @@ def sim(
     seed: Annotated[int, typer.Option("--seed", help="Of everything that is drawn.")] = 0,
 ) -> None:
     """Run a simulated world with a mission's robots in it."""
+    from cli.demo.child_processes import end_with_parent
     from cli.errors import BadArgument, check_known
+    from sim.kinematic.backend import MotionModel
+    from sim.server.process import BACKENDS, run_simulation
 
     check_known("backend", backend, BACKENDS)
     pace = parse_speed(speed)
     if backend != "kinematic" and (spread or failing):
         raise BadArgument("--spread and --failing are for --backend kinematic; physics needs none")
-    from cli.demo.child_processes import end_with_parent
-    from sim.kinematic.backend import MotionModel
-    from sim.server.process import run_simulation
 
     end_with_parent()
     run_simulation(

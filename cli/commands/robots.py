@@ -40,7 +40,7 @@ async def unregister(
     call: Call, robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Its name.")]
 ) -> None:
     """Forget a robot: it gets no further tasks."""
-    from cli.client.known import check_robot
+    from cli.client.planner_requests import check_robot
     from keyexpr_schema.keyspace import ROBOT_SPEC
     from keyexpr_schema.payloads.robots import RobotAddress
 

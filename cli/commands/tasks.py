@@ -46,7 +46,7 @@ async def show(
     task: Annotated[str, typer.Argument(metavar="TASK", help="Name of the task.")],
 ) -> None:
     """One task: its orders, every try of every attempt, and what was learned on the way."""
-    from cli.client.known import check_plan
+    from cli.client.planner_requests import check_plan
     from cli.errors import check_known
     from keyexpr_schema.keyspace import ORDER, REPORT, TASK_RECORD
 
@@ -90,8 +90,13 @@ async def add(
     ] = None,
 ) -> None:
     """Add a task to a plan; the planner checks it like any other."""
-    from cli.client.known import check_plan, check_robot
-    from cli.client.planner_requests import ask_planner, planner_status, request_name
+    from cli.client.planner_requests import (
+        ask_planner,
+        check_plan,
+        check_robot,
+        planner_status,
+        request_name,
+    )
     from cli.errors import check_known
     from keyexpr_schema.keyspace import PLAN_SPEC
     from keyexpr_schema.payloads.plans import PlanAddress

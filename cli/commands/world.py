@@ -77,7 +77,7 @@ async def list_(call: Call) -> None:
             "objects": objects,
             "facts": facts,
             "statements": statements,
-            "read": [read[said.statement] for said in statements if said.statement in read],
+            "read": [read[s.statement] for s in statements if s.statement in read],
         },
         draw,
     )

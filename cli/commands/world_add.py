@@ -115,8 +115,8 @@ async def add(
             )
             call.show(room, lambda: f"stored place {room.place}: “{room.label}”")
         elif fact:
-            said = await put_fact(session, *words)
-            call.show(said, lambda: f"stored {said.literal}")
+            stated = await put_fact(session, *words)
+            call.show(stated, lambda: f"stored {stated.literal}")
         else:
             statement = await put_statement(session, " ".join(words), name)
             status = await statement_status(session, statement.statement)
@@ -132,7 +132,7 @@ async def add(
 def _check_options(
     *, sentence: bool, fact: bool, object: bool, place: bool, given: Mapping[str, object]
 ) -> None:
-    """Do nothing if the options tell of one thing.
+    """Do nothing if the options belong to one form.
 
     Raises:
         BadArgument: of none, of two at once, or an option goes with another form.

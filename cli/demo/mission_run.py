@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from cli.client.fleet_view import FLEET_KEYS, SIMULATION_KEYS, FleetView, fleet_view
@@ -44,8 +44,8 @@ class Demo:
     started_at_s: float
     """Seconds of `time.monotonic` when the first process was started."""
     goals: tuple[str, ...] = ()
-    _clock_from: tuple[float, float] | None = field(default=None)
-    _clock_to: tuple[float, float] | None = field(default=None)
+    _clock_from: tuple[float, float] | None = None
+    _clock_to: tuple[float, float] | None = None
 
     async def submit(self) -> None:
         """Publish the mission's statements and goals, and ask for one plan for all of them.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from cli.plans.idle import Idle, IdleReport
+from cli.plans.idle import IdleReport
 from cli.views.console import table
 from cli.views.text import seconds
 
@@ -13,25 +13,23 @@ from cli.views.text import seconds
 def idle_page(report: IdleReport) -> RenderableType:
     """One line a robot, one for all, and the makespan beside its lower bound."""
     heading = Text("Idle time", "bold")
-    columns = {
-        "of real durations, predicted": report.predicted,
-        "measured": report.measured,
-        "of unit tasks, predicted": report.unit_predicted,
-        "measured ": report.unit_measured,
-    }
-    there = {name: found for name, found in columns.items() if found is not None}
+    columns = (
+        ("of real durations, predicted", report.predicted, seconds),
+        ("measured", report.measured, seconds),
+        ("of unit tasks, predicted", report.unit_predicted, _steps),
+        ("measured", report.unit_measured, _steps),
+    )
+    there = [(name, found, length) for name, found, length in columns if found is not None]
     if not there:
         return Group(heading, "no robots are allocated yet")
-    robots = dict.fromkeys([*report.fleet, *(r for found in there.values() for r in found.idle)])
+    robots = dict.fromkeys([*report.fleet, *(r for _, found, _ in there for r in found.idle)])
     rows = [
-        *(
-            (robot, *(_share(found.idle.get(robot)) for found in there.values()))
-            for robot in robots
-        ),
-        ("mean", *(_share(found.mean) for found in there.values())),
-        ("makespan", *(_length(name, found) for name, found in there.items())),
+        *((robot, *(_share(found.idle.get(robot)) for _, found, _ in there)) for robot in robots),
+        ("mean", *(_share(found.mean) for _, found, _ in there)),
+        ("makespan", *(length(found.makespan) for _, found, length in there)),
     ]
-    return Group(heading, table(["robot", *there], rows), *map(Text, _lines(report)))
+    names = [name for name, _, _ in there]
+    return Group(heading, table(["robot", *names], rows), *map(Text, _lines(report)))
 
 
 def _lines(report: IdleReport) -> list[str]:
@@ -56,6 +54,5 @@ def _share(share: float | None) -> str:
     return "-" if share is None else f"{100 * share:.1f} %"
 
 
-def _length(name: str, found: Idle) -> str:
-    unit = "unit" in name or name.endswith(" ")
-    return f"{found.makespan:.0f} steps" if unit else seconds(found.makespan)
+def _steps(makespan: float) -> str:
+    return f"{makespan:.0f} steps"

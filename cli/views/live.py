@@ -35,7 +35,7 @@ class ChangePrinter:
     """
 
     def __init__(self, to_stderr: bool, only: str | None = None) -> None:
-        self._to_stderr = to_stderr
+        self.to_stderr = to_stderr
         self._only = only
         self._printed: dict[str, str] = {}
         self.silent = False
@@ -43,12 +43,7 @@ class ChangePrinter:
     @property
     def draws(self) -> bool:
         """Whether there is a terminal to draw on."""
-        return (sys.stderr if self._to_stderr else sys.stdout).isatty()
-
-    @property
-    def to_stderr(self) -> bool:
-        """Whether stdout is kept for data."""
-        return self._to_stderr
+        return (sys.stderr if self.to_stderr else sys.stdout).isatty()
 
     def on_change(self, change: Change[Any, Any]) -> None:
         """Print the change if it is worth a line that was not printed."""
@@ -62,7 +57,7 @@ class ChangePrinter:
         if self._printed.get(where) != sentence:
             self._printed[where] = sentence
             time = " " * 10 if time_s is None else f"{time_s:8.1f} s"
-            typer.echo(f"{time}  {sentence}", err=self._to_stderr)
+            typer.echo(f"{time}  {sentence}", err=self.to_stderr)
 
 
 def change_line(what: object) -> tuple[float | None, str] | None:

@@ -66,8 +66,8 @@ def _planner(planner: PlannerStatus | None, planning: bool) -> str:
 def undecodable_table(undecodable: Sequence[UndecodableValue]) -> Table:
     """One line a value that somebody could not read."""
     return table(
-        ["key", "told by", "times", "reason"],
-        ((r.keyexpr, r.component, r.count, r.reason) for r in undecodable),
+        ["key", "reported by", "times", "reason"],
+        ((v.keyexpr, v.component, v.count, v.reason) for v in undecodable),
         title="Unreadable values",
     )
 

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from cli.views.console import table
 from cli.views.text import seconds, skill_call, spent_s
-from keyexpr_schema.payloads.tasks import Report, TaskRecord
+from keyexpr_schema.payloads.tasks import Report, TaskRecord, Try
 
 
 def tasks_table(records: Iterable[TaskRecord], now_s: float | None = None) -> Table:
@@ -38,25 +38,12 @@ def reports_table(reports: Iterable[Report]) -> Table:
     rows: list[Sequence[object]] = []
     for report in reports:
         learned = ", ".join(str(fact.literal) for fact in report.facts)
-        if not report.tries:
-            spent = _between(report.started_s, report.ended_s)
-            rows.append(
-                (
-                    report.attempt,
-                    report.robot,
-                    report.state.value,
-                    "",
-                    spent,
-                    report.reason,
-                    learned,
-                )
-            )
-        for each in report.tries:
+        state = report.state.value
+        for each in report.tries or (report,):
+            number = each.number if isinstance(each, Try) else ""
+            shown = state if each in (report, report.tries[-1]) else "failed"
             spent = _between(each.started_s, each.ended_s)
-            state = report.state.value if each is report.tries[-1] else "failed"
-            rows.append(
-                (report.attempt, report.robot, state, each.number, spent, each.reason, learned)
-            )
+            rows.append((report.attempt, report.robot, shown, number, spent, each.reason, learned))
     return table(["attempt", "robot", "state", "try", "spent", "reason", "learned"], rows)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from rich.table import Table
 
 from cli.views.console import table
-from cli.views.text import statement_means
+from cli.views.text import seconds, statement_means
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
 
@@ -45,14 +45,7 @@ def facts_table(facts: Sequence[Fact]) -> Table:
     """One line a fact."""
     return table(
         ["fact", "source", "time"],
-        (
-            (
-                str(fact.literal),
-                fact.source,
-                f"{fact.time_s:.1f} s",
-            )
-            for fact in facts
-        ),
+        ((str(fact.literal), fact.source, seconds(fact.time_s)) for fact in facts),
         title="Facts",
     )
 
@@ -63,12 +56,12 @@ def statements_table(statements: Sequence[Statement], read: Mapping[str, Stateme
         ["statement", "text", "source", "read as"],
         (
             (
-                said.statement,
-                said.text,
-                said.source,
-                statement_means(read.get(said.statement)).removeprefix(", "),
+                each.statement,
+                each.text,
+                each.source,
+                statement_means(read.get(each.statement)).removeprefix(", "),
             )
-            for said in statements
+            for each in statements
         ),
         title="Statements",
     )

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from fleet.allocators.round_robin import RoundRobinAllocator as RoundRobinAllocator
     from fleet.scheduling.allocation_context import AllocationContext as AllocationContext
 else:
-    __all__, __getattr__ = lazy_names(
+    __all__, __getattr__, __dir__ = lazy_names(
         __name__,
         {
             "base": "Allocated AllocationProblem Allocator Assignment NotAllocated",

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from fleet.core.actors.actor_constraints import actors_apart, task_counts
+from fleet.core.actors import actors_apart, task_counts
 from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.core.model.world import WorldModel
 from fleet.scheduling.allocation_context import AllocationContext
 from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
+from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 
@@ -74,6 +75,26 @@ class AllocationProblem:
     def world(self) -> WorldModel:
         """The world that the plan is valid in."""
         return self.checked.world
+
+    def first_destinations(self) -> dict[str, str]:
+        """By actor, where its first way leads; an actor that drives nowhere has none."""
+        destinations: dict[str, str] = {}
+        actor_of = {task.task: task.actor for task in self.plan.tasks}
+        for task in self.checked.graph.order:
+            action = self.checked.actions[task]
+            if action.skill.travel_to is not None:
+                destinations.setdefault(actor_of[task], action.args[action.skill.travel_to])
+        return destinations
+
+    def approach_s(self) -> dict[tuple[str, str], float]:
+        """By actor and able robot: its way from where it is to where the actor begins, s."""
+        world, to = self.world, self.first_destinations()
+        where = {robot: world.value(AT, robot) for robot in world.team}
+        return {
+            (actor, robot): world.travel_s(robot, where[robot], to[actor]) if actor in to else 0.0
+            for actor, robots in self.able.items()
+            for robot in robots
+        }
 
 
 class Allocator(ABC):

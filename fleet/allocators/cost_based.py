@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fleet.allocators.approach import first_destinations
 from fleet.allocators.balancing_problem import balancing_problem, named
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
 from fleet.allocators.load_balancing.local_search import PartialAssignment
@@ -37,15 +36,15 @@ def assign_in_rounds(problem: AllocationProblem) -> Assignment | NotAllocated:
     from scipy.optimize import linear_sum_assignment
 
     world, names = problem.world, tuple(problem.able)
-    made = PartialAssignment(balancing_problem(problem))
-    destination, last_place = first_destinations(problem), _last_places(problem)
+    partial = PartialAssignment(balancing_problem(problem))
+    destination, last_place = problem.first_destinations(), _last_places(problem)
     predecessors = _predecessors(problem)
     bound: set[str] = set()
     where = [world.value(AT, robot) for robot in world.team]
 
     def costs(actor: int) -> list[float]:
         """For every robot of the team: its way to where the actor starts, s."""
-        free, to = made.free(actor), destination.get(names[actor])
+        free, to = partial.free(actor), destination.get(names[actor])
         return [
             UNABLE_S
             if not free >> r & 1
@@ -55,7 +54,7 @@ def assign_in_rounds(problem: AllocationProblem) -> Assignment | NotAllocated:
             for r, robot in enumerate(world.team)
         ]
 
-    while left := [actor for actor, robot in enumerate(made.robot) if robot < 0]:
+    while left := [actor for actor, robot in enumerate(partial.robot) if robot < 0]:
         ready = [actor for actor in left if predecessors[names[actor]] <= bound] or left
         way_s = [costs(actor) for actor in ready]
         rows, columns = linear_sum_assignment(way_s)
@@ -65,20 +64,18 @@ def assign_in_rounds(problem: AllocationProblem) -> Assignment | NotAllocated:
         for i, robot in pairs:
             if way_s[i][robot] < UNABLE_S:
                 actor = names[ready[i]]
-                made.assign(ready[i], robot)
+                partial.assign(ready[i], robot)
                 bound.add(actor)
                 last = last_place.get(actor)
                 where[robot] = where[robot] if last is None else last
-    return Assignment(named(problem, made.robot))
+    return Assignment(named(problem, partial.robot))
 
 
 def _last_places(problem: AllocationProblem) -> dict[str, Value]:
     """By actor, where its robot is in the end, if the plan says it."""
-    graph = problem.checked.graph
-    assert graph is not None  # the plan is valid
     places: dict[str, Value] = {}
     actor_of = {task.task: task.actor for task in problem.plan.tasks}
-    for task in graph.order:
+    for task in problem.checked.graph.order:
         for literal in problem.checked.actions[task].after:
             if literal.variable == (AT, actor_arg(actor_of[task])):
                 places[actor_of[task]] = literal.value
@@ -87,15 +84,12 @@ def _last_places(problem: AllocationProblem) -> dict[str, Value]:
 
 def _predecessors(problem: AllocationProblem) -> dict[str, set[str]]:
     """For every actor the others whose tasks its first one follows."""
-    graph = problem.checked.graph
-    assert graph is not None  # the plan is valid
     tasks = {task.task: task for task in problem.plan.tasks}
-    found: dict[str, set[str]] = {}
-    for name in graph.order:
-        task = tasks[name]
-        if task.actor not in found:
-            found[task.actor] = {tasks[before].actor for before in task.after} - {task.actor}
-    return found
+    predecessors: dict[str, set[str]] = {}
+    for name in problem.checked.graph.order:
+        actor, after = tasks[name].actor, tasks[name].after
+        predecessors.setdefault(actor, {tasks[before].actor for before in after} - {actor})
+    return predecessors
 
 
 def _balanced_instead(problem: AllocationProblem, actor: str) -> Assignment | NotAllocated:

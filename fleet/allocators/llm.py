@@ -49,21 +49,17 @@ class LlmAllocator(Allocator):
     def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
         if not problem.able:
             return Assignment({})
-
-        def read(text: str) -> dict[str, str] | Rejected:
-            return read_allocation(text, problem)
-
-        made = self._model.ask(
+        allocation: dict[str, str] | GivenUp = self._model.ask(
             system="allocate-system",
             question="allocate",
             correction="allocate-repair",
             values={"problem": problem_text(problem)},
             schema=allocation_schema(problem),
-            read=read,
+            read=lambda text: read_allocation(text, problem),
         )
-        if not isinstance(made, GivenUp):
-            return Assignment(made)
-        note = f"allocated by {self._fallback.name} and not by language model: {made.reason}"
+        if not isinstance(allocation, GivenUp):
+            return Assignment(allocation)
+        note = f"allocated by {self._fallback.name} and not by language model: {allocation.reason}"
         log.warning(note)
         instead = self._fallback._assign(problem)
         if isinstance(instead, NotAllocated):
@@ -132,22 +128,22 @@ def read_allocation(text: str, problem: AllocationProblem) -> dict[str, str] | R
 def _wrong(
     answer: AllocationAnswer, allocation: Mapping[str, str], problem: AllocationProblem
 ) -> list[str]:
-    found = []
+    sentences = []
     for actor, times in Counter(row.actor for row in answer.robots).items():
         if actor not in problem.able:
-            found.append(f"there is no actor {actor}; there are {', '.join(problem.able)}")
+            sentences.append(f"there is no actor {actor}; there are {', '.join(problem.able)}")
         elif times > 1:
-            found.append(f"actor {actor} is given {times} robots; it must be one")
+            sentences.append(f"actor {actor} is given {times} robots; it must be one")
     for actor, robots in problem.able.items():
         if actor not in allocation:
-            found.append(f"actor {actor} is given no robot")
+            sentences.append(f"actor {actor} is given no robot")
         elif allocation[actor] not in robots:
-            found.append(
+            sentences.append(
                 f"{allocation[actor]} cannot be actor {actor}; it can be {', '.join(robots)}"
             )
-    found += [
+    sentences += [
         f"actors {one} and {other} must be different robots, and both are {allocation[one]}"
         for one, other in sorted(problem.apart)
         if one in allocation and allocation[one] == allocation.get(other)
     ]
-    return found
+    return sentences

@@ -5,12 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-from fleet.allocators.base import (
-    AllocationProblem,
-    Allocator,
-    Assignment,
-    NotAllocated,
-)
+from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
 from fleet.allocators.min_max_load import assign_with_least_travel
 from fleet.jobshop.portfolio import solve
 from fleet.jobshop.problem import Schedule
@@ -55,51 +50,54 @@ class MakespanAllocator(Allocator):
         self._clock = clock
 
     def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
-        made = plan_shop(problem.checked, problem.able, problem.apart, problem.context)
+        plan = plan_shop(problem.checked, problem.able, problem.apart, problem.context)
         if problem.context.previous_allocation:
             budget = TimeBudget(RESCHEDULE_SHARE * self._deadline_s, self._clock)
-            rescheduled = _rescheduled(made, problem.context, budget, self._seed)
+            rescheduled = _rescheduled(plan, problem.context, budget, self._seed)
             if rescheduled is not None:
                 return rescheduled
-        found = solve(made.shop, TimeBudget(self._deadline_s, self._clock), self._exact, self._seed)
-        if found is None:
+        schedule = solve(
+            plan.shop, TimeBudget(self._deadline_s, self._clock), self._exact, self._seed
+        )
+        if schedule is None:
             # Robots are so few that rules run into a dead end: what is left is a matching problem.
             chosen = assign_with_least_travel(problem)
             if isinstance(chosen, NotAllocated):
                 return chosen
             return Assignment(chosen.allocation, notes=("load balanced: no rule found an order",))
-        return _assignment(made, found)
+        return _assignment(plan, schedule)
 
 
-def _assignment(made: PlanShop, found: Schedule) -> Assignment:
+def _assignment(plan: PlanShop, schedule: Schedule) -> Assignment:
     """A schedule of the shop in terms of actors and robots."""
     return Assignment(
         allocation={
-            actor: made.robots[found.machine_of[block]] for block, actor in enumerate(made.actors)
+            actor: plan.robots[schedule.machine_of[block]]
+            for block, actor in enumerate(plan.actors)
         },
-        actor_order=tuple(made.actors[b] for b in found.order if b < len(made.actors)),
-        lower_bound_s=found.lower_bound_s,
-        notes=found.notes,
+        actor_order=tuple(plan.actors[b] for b in schedule.order if b < len(plan.actors)),
+        lower_bound_s=schedule.lower_bound_s,
+        notes=schedule.notes,
     )
 
 
 def _rescheduled(
-    made: PlanShop, context: AllocationContext, budget: TimeBudget, seed: int
+    plan: PlanShop, context: AllocationContext, budget: TimeBudget, seed: int
 ) -> Assignment | None:
     """The allocation there was, with few actors in other hands."""
-    machine = {robot: i for i, robot in enumerate(made.robots)}
-    named = made.shop.blocks[len(made.actors) :]
+    machine = {robot: i for i, robot in enumerate(plan.robots)}
+    named = plan.shop.blocks[len(plan.actors) :]
     previous = context.previous_allocation
-    home = [machine.get(previous.get(actor, ""), NOBODY) for actor in made.actors]
+    home = [machine.get(previous.get(actor, ""), NOBODY) for actor in plan.actors]
     home += [block.machines[0] for block in named]
-    block_of = {actor: block for block, actor in enumerate(made.actors)}
+    block_of = {actor: block for block, actor in enumerate(plan.actors)}
     order = [block_of[actor] for actor in context.actor_order if actor in block_of]
-    found = reschedule(made.shop, home, order, budget, seed=seed)
-    if found is None:
+    repaired = reschedule(plan.shop, home, order, budget, seed=seed)
+    if repaired is None:
         return None
-    moved = sum(block < len(made.actors) for block in found.moved)
+    moved = sum(block < len(plan.actors) for block in repaired.moved)
     note = (
-        f"rescheduled: {moved} of {len(made.actors)} actors changed hands; "
-        f"with any number of changes the least found is {found.best_makespan_s:.1f} s"
+        f"rescheduled: {moved} of {len(plan.actors)} actors changed hands; "
+        f"with any number of changes the least found is {repaired.best_makespan_s:.1f} s"
     )
-    return _assignment(made, replace(found.schedule, notes=(note,)))
+    return _assignment(plan, replace(repaired.schedule, notes=(note,)))

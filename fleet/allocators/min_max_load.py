@@ -6,13 +6,11 @@ import logging
 import time
 from enum import Enum
 
-from fleet.allocators.approach import approach_s
-from fleet.allocators.balancing_problem import balancing_problem, named
+from fleet.allocators.balancing_problem import balancing_problem, explanation, named
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
-from fleet.allocators.infeasibility import explanation
 from fleet.allocators.load_balancing.balance import balance
 from fleet.allocators.load_balancing.problem import BalancedAssignment, NoAssignment
-from fleet.allocators.min_max_load_milp import MinMaxLoadProgram, Status, max_load, solve
+from fleet.allocators.min_max_load_milp import MinMaxLoadProgram, max_load, solve
 from fleet.allocators.round_robin import assign_in_turn
 from keyexpr_schema.payloads.plans import Violation
 
@@ -146,11 +144,10 @@ def _least_max_load(
     program = MinMaxLoadProgram(problem.able, problem.load, problem.apart)
     program.minimise_max_load(lower, upper)
     found = solve(program.model, limit_s)
-    proven = found.status in (Status.OPTIMAL, Status.INFEASIBLE)
     if not found.values:
-        return best, proven
+        return best, found.proven
     robots = program.robots(found.values)
-    return robots, proven or max_load(robots, problem.load) == lower
+    return robots, found.proven or max_load(robots, problem.load) == lower
 
 
 def _least_travel(
@@ -158,7 +155,7 @@ def _least_travel(
 ) -> dict[str, str]:
     """Of the robots of which none has more tasks than in `known`, those with the least travel, if
     the solver finds them in time; else the known ones."""
-    travel_s = approach_s(problem)
+    travel_s = problem.approach_s()
     free = any(len({travel_s[a, r] for r in robots}) > 1 for a, robots in problem.able.items())
     if not free or limit_s <= 0:
         return known

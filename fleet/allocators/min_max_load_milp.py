@@ -14,33 +14,23 @@ from __future__ import annotations
 import time
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from enum import Enum
+from dataclasses import dataclass
 from math import inf
 from typing import Any
 
 Pair = tuple[str, str]
 
 
-class Status(Enum):
-    """What a run of the solver came to."""
-
-    OPTIMAL = "optimal"
-    """Proven, to the gap that was allowed."""
-    FEASIBLE = "feasible"
-    """Time ran out with a solution."""
-    INFEASIBLE = "infeasible"
-    """Proven."""
-    UNKNOWN = "unknown"
-    """Time ran out before there was any solution."""
-
-
 @dataclass(frozen=True)
 class Solution:
-    """How a run ended, and the variables' values by name if there is a solution."""
+    """The variables' values by name; none if no solution was found.
 
-    status: Status
-    values: Mapping[str, float] = field(default_factory=dict)
+    `proven`: no solution is better than this one, to the gap allowed, or there is none at all;
+    else time ran out.
+    """
+
+    values: Mapping[str, float]
+    proven: bool
 
 
 class MinMaxLoadProgram:
@@ -153,8 +143,4 @@ def solve(model: Any, limit_s: float, gap: float = 0.0) -> Solution:
     values = (
         {} if found.x is None else dict(zip(map(str, variables), found.x.tolist(), strict=True))
     )
-    if found.status == 0:
-        return Solution(Status.OPTIMAL, values)
-    if found.status == 2:
-        return Solution(Status.INFEASIBLE)
-    return Solution(Status.FEASIBLE if values else Status.UNKNOWN, values)
+    return Solution(values, proven=found.status in (0, 2))  # optimal, infeasible

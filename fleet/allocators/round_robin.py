@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from bisect import bisect_left
 
-from fleet.allocators.balancing_problem import balancing_problem, named
+from fleet.allocators.balancing_problem import balancing_problem, explanation, named
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
-from fleet.allocators.infeasibility import explanation
 from fleet.allocators.load_balancing.local_search import PartialAssignment
 from fleet.allocators.load_balancing.problem import NoAssignment, overfull_clique
 from fleet.allocators.load_balancing.robot_sets import bits
@@ -33,7 +32,7 @@ def assign_in_turn(problem: AllocationProblem) -> Assignment | NotAllocated:
     Where actors that must be apart leave none, the choice before is taken back, and so on.
     """
     numbers = balancing_problem(problem)
-    made = PartialAssignment(numbers)
+    partial = PartialAssignment(numbers)
     untried: list[list[int]] = []
     actor = first = steps = 0
     while actor < len(numbers.able):
@@ -42,11 +41,11 @@ def assign_in_turn(problem: AllocationProblem) -> Assignment | NotAllocated:
             turn = bisect_left(able, first)
             untried.append([*able[turn:], *able[:turn]])
         robots = untried[-1]
-        while robots and not made.fits(actor, robots[0]):
+        while robots and not partial.fits(actor, robots[0]):
             robots.pop(0)
         steps += 1
         if robots:
-            made.assign(actor, robots[0])
+            partial.assign(actor, robots[0])
             first = robots.pop(0) + 1
             actor += 1
             continue
@@ -54,5 +53,5 @@ def assign_in_turn(problem: AllocationProblem) -> Assignment | NotAllocated:
         if not actor or steps > MAX_STEPS:
             return explanation(problem, NoAssignment(not actor, overfull_clique(numbers)))
         actor -= 1
-        made.assign(actor, -1)
-    return Assignment(named(problem, made.robot))
+        partial.assign(actor, -1)
+    return Assignment(named(problem, partial.robot))

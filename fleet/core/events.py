@@ -112,14 +112,14 @@ class RobotUnregistered(Event, frozen=True, kw_only=True):
 
 
 class WorkerConnected(Event, frozen=True, kw_only=True):
-    """A run of a robot's worker is connected."""
+    """A run of a robot's worker is there; `incarnation` names the run."""
 
     robot: str
     incarnation: str
 
 
 class WorkerDisconnected(Event, frozen=True, kw_only=True):
-    """A run of a robot's worker is no longer connected."""
+    """That run of the robot's worker is no longer there."""
 
     robot: str
     incarnation: str
@@ -144,7 +144,7 @@ class ReplanRequested(Event, frozen=True, kw_only=True):
 
 
 class ControlRequested(Event, frozen=True, kw_only=True):
-    """Someone wants a plan started, cancelled, deleted or extended."""
+    """Someone wants a plan started, approved, cancelled, deleted or extended."""
 
     request: ControlRequest
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from msgspec.structs import replace
 
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.state import State, put
-from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState, GoalStatus
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, Violation
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -56,7 +58,7 @@ def mark_goals(
 def active_plan_of(state: State, goal: str) -> str | None:
     """The plan that works on a goal and has not ended."""
     for plan, entry in state.plans.items():
-        if goal in entry.plan.goals and not entry.ended and entry.state is not PlanState.REJECTED:
+        if goal in entry.plan.goals and not entry.ended:
             return plan
     return None
 
@@ -70,16 +72,20 @@ def open_goals(state: State, entry: PlanEntry) -> list[str]:
     ]
 
 
+def conditions_of(state: State, goals: Iterable[str]) -> tuple[Condition, ...]:
+    """What these goals want to hold, as far as they are understood."""
+    return tuple(
+        condition
+        for goal in goals
+        if goal in state.goal_states
+        for condition in state.goal_states[goal].conditions
+    )
+
+
 def without_goal(state: State, plan: Plan, goal: str) -> Plan:
     """The plan, answering for its other goals only; its tasks stay."""
     rest = tuple(other for other in plan.goals if other != goal)
-    conditions = tuple(
-        condition
-        for other in rest
-        if other in state.goal_states
-        for condition in state.goal_states[other].conditions
-    )
-    return replace(plan, goals=rest, conditions=conditions)
+    return replace(plan, goals=rest, conditions=conditions_of(state, rest))
 
 
 def set_entry(state: State, entry: PlanEntry) -> State:

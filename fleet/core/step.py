@@ -15,24 +15,34 @@ from fleet.core import events
 from fleet.core.dispatch import dispatcher
 from fleet.core.effects import Effect, effects_between
 from fleet.core.events import Event
-from fleet.core.handlers import (
-    goals,
-    plan_results,
-    planner_lifecycle,
-    reports,
-    requests,
-    robots,
-    statements,
-    world,
-)
+from fleet.core.handlers import goals, plan_results, reports, requests, robots, statements, world
 from fleet.core.model.skills import Skills
 from fleet.core.state import State
+from keyexpr_schema.payloads.goals import ENDED_GOALS
+
+
+def _planner_started(state: State, event: events.PlannerStarted, skills: Skills) -> State:
+    return replace(state, epoch=event.epoch, incarnation=event.incarnation, policy=event.policy)
+
+
+def _prior_state_loaded(state: State, event: events.PriorStateLoaded, skills: Skills) -> State:
+    """Take over what an earlier planner left, so that nothing is done a second time."""
+    answers = {answer.request: answer for answer in event.answers}
+    goals = {status.goal: status for status in event.goals if status.state in ENDED_GOALS}
+    return replace(
+        state,
+        answers={**answers, **state.answers},
+        durations={**{known.model: known for known in event.durations}, **state.durations},
+        goal_states={**goals, **state.goal_states},
+        past_plans=(*state.past_plans, *(p for p in event.plans if p not in state.plans)),
+    )
+
 
 _Handler = Callable[[State, Any, Skills], State]
 _HANDLERS: dict[type[Event], _Handler] = {
-    events.PlannerStarted: planner_lifecycle.planner_started,
-    events.PriorStateLoaded: planner_lifecycle.prior_state_loaded,
-    events.TimerFired: planner_lifecycle.timer_fired,
+    events.PlannerStarted: _planner_started,
+    events.PriorStateLoaded: _prior_state_loaded,
+    events.TimerFired: lambda state, event, skills: state,
     events.GoalPut: goals.goal_put,
     events.GoalDeleted: goals.goal_deleted,
     events.GoalInterpreted: goals.goal_interpreted,

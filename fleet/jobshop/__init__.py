@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from fleet.jobshop.time_budget import StepClock as StepClock
     from fleet.jobshop.time_budget import TimeBudget as TimeBudget
 else:
-    __all__, __getattr__ = lazy_names(
+    __all__, __getattr__, __dir__ = lazy_names(
         __name__,
         {
             "bounds": "lower_bound",

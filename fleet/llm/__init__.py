@@ -8,7 +8,6 @@ from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
 from fleet.llm.structured_output import StructuredAnswer, read_answer, schema_of
 
 __all__ = [
-    "StructuredAnswer",
     "BadLlmConfig",
     "Budget",
     "GivenUp",
@@ -16,6 +15,7 @@ __all__ = [
     "LlmConfig",
     "ModelClient",
     "Rejected",
+    "StructuredAnswer",
     "load_llm_config",
     "read_answer",
     "schema_of",

@@ -41,6 +41,10 @@ class ModelAnswer(msgspec.Struct, frozen=True, kw_only=True):
     retry_after_s: float | None = None
 
 
+_CLOSED = ModelAnswer(kind="closed", error="the planner is being closed")
+_ENDED = ModelAnswer(kind="failed", error="the process that asks the model has ended")
+
+
 class ModelClient:
     """Carries out calls, from any thread. Processes are kept for later calls until `close`."""
 
@@ -56,7 +60,7 @@ class ModelClient:
         """The answer to one request: LiteLLM's `completion` arguments and `api_key_env`."""
         process = self._take()
         if process is None:
-            return ModelAnswer(kind="closed", error="the planner is being closed")
+            return _CLOSED
         failed = process.start()
         row = {**request, "timeout": timeout_s, "max_chars": MAX_ANSWER_CHARS}
         answer = failed or process.ask(row, timeout_s + GRACE_S)
@@ -65,11 +69,9 @@ class ModelClient:
 
     def warm(self) -> None:
         """Start a process now, so that the first call need not wait for it. Blocks until then."""
-        process = self._take()
-        if process is None:
-            return
-        process.start()
-        self._give_back(process)
+        if (process := self._take()) is not None:
+            process.start()
+            self._give_back(process)
 
     def close(self) -> None:
         """End all processes; a call that is under way fails at once, and so does any later one."""
@@ -124,7 +126,7 @@ class _LiteLlmProcess:
         """Start the process if it does not run; why it does not start, or `None`."""
         with self._lock:
             if self._ended:
-                return ModelAnswer(kind="closed", error="the planner is being closed")
+                return _CLOSED
             if self.running:
                 return None
             self.release()
@@ -149,12 +151,11 @@ class _LiteLlmProcess:
             process.stdin.flush()
         except (OSError, ValueError):
             self._stop()
-            return ModelAnswer(kind="failed", error="the process that asks the model has ended")
+            return _ENDED
         answer = self._line(timeout_s)
         if answer.kind == "timeout" and not answer.error:
-            answer = ModelAnswer(
-                kind="timeout", error=f"no whole answer within {timeout_s - GRACE_S:g} s"
-            )
+            error = f"no whole answer within {timeout_s - GRACE_S:g} s"
+            return ModelAnswer(kind="timeout", error=error)
         return answer
 
     def _line(self, timeout_s: float) -> ModelAnswer:
@@ -172,9 +173,7 @@ class _LiteLlmProcess:
                 some = os.read(process.stdout.fileno(), 1 << 16)
                 if not some or len(self._read) > MAX_LINE_BYTES:
                     self._stop()
-                    return ModelAnswer(
-                        kind="failed", error="the process that asks the model has ended"
-                    )
+                    return _ENDED
                 self._read += some
         line, _, self._read = self._read.partition(b"\n")
         try:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from fleet.planners.llm.planner import LlmPlanner as LlmPlanner
     from fleet.planners.symbolic.planner import SymbolicPlanner as SymbolicPlanner
 else:
-    __all__, __getattr__ = lazy_names(
+    __all__, __getattr__, __dir__ = lazy_names(
         __name__,
         {
             "base": "NoPlan Planner PlanningProblem",

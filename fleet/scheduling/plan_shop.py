@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
-from fleet.core.actors.actor_order import carried_at_end, first_actors
+from fleet.core.actors import carried_at_end, first_actors
 from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from fleet.allocators.base import Allocator
 from fleet.allocators.cost_based import CostBasedAllocator
 from fleet.allocators.llm import LlmAllocator
@@ -26,6 +28,7 @@ from fleet.planners.llm.interpreter import LlmInterpreter
 from fleet.planners.llm.planner import LlmPlanner
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from keyexpr_schema.config_files import config_file, read_yaml
+from keyexpr_schema.ids import Id
 from keyexpr_schema.plug_ins import load_plug_ins
 
 SKILL_MODELS = "robotfleet.skill_models"
@@ -75,10 +78,8 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
         LlmAllocator(model, MakespanAllocator()),
     )
     allocators = {allocator.name: allocator for allocator in own}
-    for planner in load_plug_ins(PLANNERS, _planner):
-        planners[planner.name] = planner
-    for allocator in load_plug_ins(ALLOCATORS, _allocator):
-        allocators[allocator.name] = allocator
+    load_plug_ins(PLANNERS, lambda offered: _add(offered, Planner, planners))
+    load_plug_ins(ALLOCATORS, lambda offered: _add(offered, Allocator, allocators))
     skills = load_all_skills(skill_files)
     interpreter = LlmInterpreter(model, skills)
     return Composition(skills, planners, allocators, model, interpreter, symbolic)
@@ -121,13 +122,13 @@ def load_skills(path: Path) -> dict[str, SkillModel]:
     return skills_from_data(read_yaml(path, BadSkillFile), str(path))
 
 
-def _planner(offered: Any) -> Planner:
-    if not isinstance(made := offered(), Planner):
-        raise TypeError(f"it makes {made!r}, which is no Planner")
-    return made
-
-
-def _allocator(offered: Any) -> Allocator:
-    if not isinstance(made := offered(), Allocator):
-        raise TypeError(f"it makes {made!r}, which is no Allocator")
-    return made
+def _add(offered: Any, kind: type, known: dict[str, Any]) -> None:
+    """Make what a plug-in offers and add it to those `known`; what it raises is the warning."""
+    if not isinstance(made := offered(), kind):
+        raise TypeError(f"it makes {made!r}, which is no {kind.__name__}")
+    name = msgspec.convert(getattr(made, "name", None), Id)
+    if name in known:
+        raise ValueError(f"there is a {kind.__name__} called {name!r} already")
+    if isinstance(made, Planner):
+        msgspec.convert(made.strategies, tuple[Id, ...])
+    known[name] = made

@@ -17,7 +17,7 @@ from fleet.core.dispatch.delays import SAME_CLOCK_S
 from fleet.core.dispatch.dispatcher import next_timer
 from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import At, Event
-from fleet.core.model.skill_phrases import phrases_of
+from fleet.core.model.skills import phrases_of
 from fleet.core.plan_entry import PlanningJob
 from fleet.core.state import Policy, State
 from fleet.core.step import replay, step

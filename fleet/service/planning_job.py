@@ -10,12 +10,13 @@ from dataclasses import replace as changed
 from msgspec.structs import replace
 
 from fleet.allocators.base import Allocated, Allocator, NotAllocated
-from fleet.core.actors.actor_constraints import tasks_nobody_can_do
+from fleet.core.actors import tasks_nobody_can_do
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.events import At, PlanningFailed, PlanningSucceeded
 from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import PlanningJob
 from fleet.core.state import State
+from fleet.core.state_updates import conditions_of
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
 from fleet.planners.plan_repair import repair_plan
@@ -204,10 +205,5 @@ def _searched(job: PlanningJob, state: State, composition: Composition) -> froze
 
 def _with_goal_conditions(plan: Plan, state: State) -> Plan:
     """A proposed plan answers for its goals: their conditions must hold at its end, too."""
-    wanted = [
-        condition
-        for goal in plan.goals
-        if goal in state.goal_states
-        for condition in state.goal_states[goal].conditions
-    ]
+    wanted = conditions_of(state, plan.goals)
     return replace(plan, conditions=tuple(dict.fromkeys([*plan.conditions, *wanted])))

@@ -219,7 +219,7 @@ def _take_lock(data_dir: Path) -> int:
         os.close(guard)
         raise StoreInUse(
             f"another router uses the store in {data_dir}: stop it, or give this one another "
-            "directory with --data-dir"
+            "directory with --data"
         ) from None
     return guard
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from fleet.timeline.recorder import *  # noqa: F403
     from fleet.timeline.screenshot import *  # noqa: F403
 else:
-    __all__, __getattr__ = lazy_names(
+    __all__, __getattr__, __dir__ = lazy_names(
         __name__,
         {
             "drawing.sink": "open_stream",

@@ -77,7 +77,7 @@ _SENTENCES: dict[str, tuple[str, Callable[[Any, Any], Iterator[event_log.Line]]]
     ROBOT_SPEC.name: ("robots", event_log.robot_spec),
     ROBOT_STATE.name: ("robots", event_log.robot_state),
     SIM_TRUTH.name: ("truth", event_log.truth),
-    UNDECODABLE.name: ("rejects", event_log.reject),
+    UNDECODABLE.name: ("rejects", event_log.undecodable),
 }
 
 _COLOURS = {
@@ -259,8 +259,7 @@ class Recorder:
 
     def _call(self, report: Report) -> str:
         """What a report is about, in the words of its order if that is known."""
-        address = OrderAddress(robot=report.robot, plan=report.plan, task=report.task)
-        order = self._known.get((ORDER.name, address))
+        order = self._known.get((ORDER.name, OrderAddress.of(report)))
         if order is None:
             return report.task
         return f"{call_text(order.skill, order.args, order.robot)} ({report.task})"

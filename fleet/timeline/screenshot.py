@@ -27,7 +27,7 @@ def save_screenshot(
 ) -> None:
     """Draw a recording as the viewer shows it, at fleet time `at_s` [s] (`None`: at its end).
 
-    `size` is width and height in pixels. Takes some ten seconds without a graphics card.
+    `size` is width and height in pixels. Takes some seconds without a graphics card.
 
     Raises:
         UnreadableRecording: there is no such recording.

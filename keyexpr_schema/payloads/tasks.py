@@ -23,6 +23,11 @@ class OrderAddress(Address, frozen=True):
     plan: str
     task: str
 
+    @classmethod
+    def of(cls, about: Order | Report) -> OrderAddress:
+        """Where an order goes, or the one that a report is about."""
+        return cls(about.robot, about.plan, about.task)
+
 
 class ReportAddress(Address, frozen=True):
     """What a robot says of one attempt at a task."""
@@ -31,6 +36,11 @@ class ReportAddress(Address, frozen=True):
     plan: str
     task: str
     attempt: int
+
+    @classmethod
+    def of(cls, report: Report) -> ReportAddress:
+        """Where a report goes."""
+        return cls(report.robot, report.plan, report.task, report.attempt)
 
 
 class TaskState(str, Enum):

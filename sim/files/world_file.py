@@ -12,10 +12,7 @@ from pathlib import Path
 from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.ids import check_id
 from sim.errors import BadFile
-from sim.files.world_schema import (
-    FLOOR,
-    WorldFile,
-)
+from sim.files.world_schema import FLOOR, WorldFile
 from sim.files.yaml_file import find_file, read_yaml
 
 

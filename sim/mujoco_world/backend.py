@@ -110,16 +110,6 @@ class MujocoBackend(Backend):
             robot_wall=self._collisions.robot_wall,
         )
 
-    @property
-    def collision_log(self) -> tuple[tuple[float, str, str], ...]:
-        """Every counted touch: (time in s, robot, what it touched)."""
-        return tuple(self._collisions.log)
-
-    def phase(self, robot: str) -> str | None:
-        """What the robot's running motion is at ("lowering the hand"), for people who watch."""
-        run = self._runs.get(robot)
-        return run.phase if run is not None and run.ended is None else None
-
     def scene(self) -> Scene:
         return self._scene
 

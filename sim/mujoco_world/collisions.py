@@ -29,8 +29,6 @@ class Collisions:
         self.robot_robot = 0
         self.robot_wall = 0
         self._seen_s: dict[tuple[str, str], float] = {}
-        self.log: list[tuple[float, str, str]] = []
-        """Every counted touch: (time in s, robot, robot or body), for people who look into one."""
         owner = np.full(model.ngeom, _OTHER)
         hand = np.zeros(model.ngeom, dtype=bool)
         self._body_names: list[str] = []
@@ -83,7 +81,6 @@ class Collisions:
         self._seen_s[pair] = time_s
         if last is not None and time_s - last <= ENDS_AFTER_S:
             return
-        self.log.append((time_s, *pair))
         if b == _FIXED:
             self.robot_wall += 1
         else:

@@ -25,7 +25,6 @@ Step = Generator[None, None, None]
 FACING_RAD = 0.006
 """5 mm off at an arm's length; the fingers open wider than that."""
 
-
 BLOCKED_S = 2.5
 """An arm that is not at its setpoints this long after is held up by something."""
 

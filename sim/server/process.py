@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from keyexpr_schema.keyspace import SIM_CLOCK, SIM_SCENE
 from keyexpr_schema.signals import run_until_signal
-from keyexpr_schema.transport.session import SessionConfig, open_session
+from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.backend import Backend
-from sim.errors import SimError
+from sim.errors import SimError, WorldRuns
 from sim.files.mission_file import Mission, load_mission
-from sim.server.sim_server import GRACE_S, WATCHDOG_S, SimServer
-from sim.server.single_instance import ensure_single_world
+from sim.server.sim_server import SimServer
 
 if TYPE_CHECKING:
     from sim.kinematic.backend import MotionModel
 
 BACKENDS = ("mujoco", "kinematic")
+CLOCK_S = 0.6
+"""How long to listen for another world's clock [s, wall]; it ticks twenty times a second."""
 
 
 def run_simulation(
@@ -28,9 +31,6 @@ def run_simulation(
     *,
     seed: int = 0,
     motion_model: MotionModel | None = None,
-    grace_s: float = GRACE_S,
-    watchdog_s: float = WATCHDOG_S,
-    idle_speed: float = 0.0,
 ) -> None:
     """Be the simulated world of `mission` until SIGTERM or SIGINT.
 
@@ -57,7 +57,7 @@ def run_simulation(
     async def serve() -> None:
         async with open_session(config) as session:
             await ensure_single_world(session)
-            server = SimServer(session, world, speed, grace_s, watchdog_s, idle_speed)
+            server = SimServer(session, world, speed)
             serving = asyncio.create_task(server.run())
             ready = asyncio.create_task(server.ready())
             await asyncio.wait({serving, ready}, return_when=asyncio.FIRST_COMPLETED)
@@ -71,6 +71,26 @@ def run_simulation(
             await serving
 
     run_until_signal(serve())
+
+
+async def ensure_single_world(session: Session) -> None:
+    """Return when no other simulation is heard; where none ever was, at once.
+
+    Two that start at the same moment in a new realm do not hear each other here.
+
+    Raises:
+        WorldRuns: one is. Both would move a robot of the same name for each call of its worker.
+    """
+    if not await session.list(SIM_SCENE):
+        return
+    async with session.watch(SIM_CLOCK) as watch:
+        with suppress(TimeoutError):
+            async with asyncio.timeout(CLOCK_S):
+                await anext(watch)
+                raise WorldRuns(
+                    f"a simulated world runs in realm {session.config.realm} already: end that "
+                    "one, or use another --realm"
+                )
 
 
 def make_backend(

@@ -34,10 +34,10 @@ class SimServer:
     `speed` is simulated seconds a second of wall time. `None` is as fast as it goes: then time
     advances only while some robot moves, and after a motion has ended it waits up to `grace_s` of
     wall time for that robot's next call, so that the thinking of workers and planners takes no
-    simulated time. `idle_speed` is how fast time runs while no robot moves, in that mode.
+    simulated time.
 
     A motion that nobody has asked about for `watchdog_s` (beyond the wait of the last call) is
-    stopped, as a calls would stop a robot whose worker is gone. While our own link to the router
+    stopped, as a driver would stop a robot whose worker is gone. While our own link to the router
     is down, that clock stands still: then it is not the worker who is away.
     """
 
@@ -48,11 +48,9 @@ class SimServer:
         speed: float | None = 1.0,
         grace_s: float = GRACE_S,
         watchdog_s: float = WATCHDOG_S,
-        idle_speed: float = 0.0,
     ) -> None:
         self._session, self._backend = session, backend
         self._speed, self._grace_s, self._watchdog_s = speed, grace_s, watchdog_s
-        self._idle_speed = idle_speed
         self._calls = {robot: MotionCalls(backend, robot) for robot in backend.robots}
         self._publisher = WorldPublisher(session, backend, speed)
         self._called = asyncio.Event()
@@ -111,11 +109,8 @@ class SimServer:
     def _speed_now(self, wall_s: float) -> float | None:
         if self._speed is not None:
             return self._speed
-        if self._held(wall_s):
-            return 0.0
-        if any(calls.active for calls in self._calls.values()):
-            return None
-        return self._idle_speed
+        moving = any(calls.active for calls in self._calls.values())
+        return None if moving and not self._held(wall_s) else 0.0
 
     def _held(self, wall_s: float) -> bool:
         """The world waits for the next call of a robot whose motion just ended."""

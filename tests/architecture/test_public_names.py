@@ -54,6 +54,15 @@ def test_a_public_name_is_there_and_documented(package: str, name: str) -> None:
     assert documentation(package, name, value), f"{package}.{name} says nothing of itself"
 
 
+@pytest.mark.parametrize("package", PACKAGES)
+def test_public_names_show_before_they_are_asked_for(package: str) -> None:
+    asked = f"import {package} as p; print(set(getattr(p, '__all__', ())) <= set(dir(p)))"
+    shown = subprocess.run(
+        [sys.executable, "-c", asked], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert shown.stdout == "True\n"
+
+
 def documentation(package: str, name: str, value: Any) -> str:
     """The docstring of a class or function; of a constant the text beneath it, or in the table."""
     if isinstance(value, Key):

@@ -1,7 +1,7 @@
 """Bytes of every payload as they were once written still decode, and nothing in them is lost.
 
-A new payload type, or a new field: run `python tests/contracts/test_golden_payloads.py` and commit
-what it adds under golden/. Bytes that are there are never rewritten.
+For a new payload type run `python -m tests.contracts.test_golden_payloads` and commit what it adds
+under golden/. Bytes that are there are never rewritten.
 """
 
 from __future__ import annotations
@@ -71,7 +71,9 @@ CASES = [(name, kind, v) for name, kind in top_level().items() for v in ("full",
 @pytest.mark.parametrize(("name", "kind", "variant"), CASES)
 def test_golden_bytes_decode_and_nothing_in_them_is_lost(name, kind, variant):
     path = GOLDEN / f"{name}.{variant}.json"
-    assert path.exists(), f"run python {__file__} and commit {path.name}"
+    assert path.exists(), (
+        f"run python -m tests.contracts.test_golden_payloads and commit {path.name}"
+    )
     data = path.read_bytes()
     decoded = decode_payload(kind, data, path.name)
     written = msgspec.json.decode(msgspec.json.encode(decoded))

@@ -47,6 +47,12 @@ def truth_of(backend: MujocoBackend, name: str) -> Truth:
     return next(truth for truth in backend.truths() if truth.object == name)
 
 
+def contacts(backend: MujocoBackend) -> tuple[int, int]:
+    """Of robots with each other, and with walls."""
+    counted = backend.contacts()
+    return counted.robot_robot, counted.robot_wall
+
+
 def fetch(backend: MujocoBackend, name: str) -> None:
     """The HSR looks for a cup from inside the kitchen and takes it."""
     do(backend, "hsr", Motion(kind=MotionKind.GO_TO, place="kitchen"))
@@ -83,7 +89,7 @@ def test_a_cup_is_carried_to_a_table_in_another_room() -> None:
     assert cup.settled
     assert backend.senses("hsr").holding is None
     assert truth_of(backend, "cup_2").support == "kitchen_table"
-    assert backend.collision_log == ()
+    assert contacts(backend) == (0, 0)
 
 
 @pytest.mark.slow
@@ -101,7 +107,7 @@ def test_two_cups_ride_through_two_doors_in_the_others_basket() -> None:
     for name in ("cup_1", "cup_2"):
         cup = truth_of(backend, name)
         assert (cup.place, cup.support, cup.held_by) == ("living_room", "locobot", None)
-    assert backend.collision_log == ()
+    assert contacts(backend) == (0, 0)
 
 
 @pytest.mark.slow
@@ -162,21 +168,20 @@ def test_a_stop_while_carrying_halts_and_keeps_the_cup() -> None:
     assert truth_of(backend, "cup_1").held_by == "hsr"
 
 
-@pytest.mark.parametrize("phase", ["lowering the hand", "closing the hand", "lifting cup_1"])
-def test_a_grasp_stopped_in_the_middle_can_be_taken_up_again(phase: str) -> None:
+@pytest.mark.parametrize(
+    ("periods", "phase"),
+    [(38, "lowering the hand"), (54, "closing the hand"), (69, "lifting cup_1")],
+)
+def test_a_grasp_stopped_in_the_middle_can_be_taken_up_again(periods: int, phase: str) -> None:
+    """After so many control periods the hand is in the middle of that, every time."""
     backend = start()
     do(backend, "hsr", Motion(kind=MotionKind.APPROACH, point_m=TABLE_M))
     backend.begin("hsr", Motion(kind=MotionKind.GRASP, object="cup_1", point_m=TABLE_M))
-    for _ in range(600):
-        backend.advance()
-        backend_phase = backend.phase("hsr")
-        if backend_phase is not None and backend_phase.startswith(phase):
-            break
-    else:
-        pytest.fail(f"it never was {phase}")
-    for _ in range(8):
+    for _ in range(periods):
         backend.advance()
     backend.stop("hsr")
+    stopped = backend.outcome("hsr")
+    assert stopped is not None and f"stopped while {phase}" in (stopped.reason or "")
     for _ in range(40):
         backend.advance()
     if backend.senses("hsr").holding is None:

@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fleet.allocators import min_max_load
-from fleet.allocators.approach import approach_s
 from fleet.allocators.base import AllocationProblem, Assignment, NotAllocated
 from fleet.allocators.cost_based import assign_in_rounds
 from fleet.allocators.min_max_load import assign_balanced, assign_with_least_travel
@@ -65,7 +64,7 @@ def objective(tie_break: str, problem: AllocationProblem, chosen: dict[str, str]
     loads = sorted_loads(problem, chosen)
     if tie_break == "next loads":
         return list(loads)
-    ways_s = approach_s(problem)
+    ways_s = problem.approach_s()
     return [loads[0], sum(ways_s[pair] for pair in chosen.items())]
 
 

@@ -28,7 +28,7 @@ from workers.orders.fencing import (
     superseded,
 )
 from workers.orders.journal import Journal
-from workers.orders.reports import make_report
+from workers.orders.outbox import make_report
 
 small = st.integers(1, 3)
 orders = st.builds(

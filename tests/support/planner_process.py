@@ -140,9 +140,7 @@ async def carry_out(session: Session, order: Order, took_s: float | None = None)
         state=ReportState.SUCCEEDED, facts=facts,
         started_s=None if took_s is None else 100.0, ended_s=100.0 + (took_s or 0.0),
     )  # fmt: skip
-    await session.confirm(
-        REPORT, ReportAddress(order.robot, order.plan, order.task, order.attempt), report
-    )
+    await session.confirm(REPORT, ReportAddress.of(report), report)
 
 
 async def finish(session: Session, done: set[str], took_s: float | None = None) -> None:

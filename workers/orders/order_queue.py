@@ -10,7 +10,13 @@ from msgspec.structs import replace
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.keyspace import ORDER, REPORT
-from keyexpr_schema.payloads.tasks import Order, OrderAddress, Report, ReportState
+from keyexpr_schema.payloads.tasks import (
+    Order,
+    OrderAddress,
+    Report,
+    ReportAddress,
+    ReportState,
+)
 from keyexpr_schema.transport.session import Session
 from workers.orders.fencing import (
     Accept,
@@ -25,8 +31,7 @@ from workers.orders.fencing import (
     superseded,
 )
 from workers.orders.journal import Journal
-from workers.orders.outbox import Outbox
-from workers.orders.reports import make_report, report_address
+from workers.orders.outbox import Outbox, make_report
 
 
 class OrderQueue:
@@ -64,7 +69,7 @@ class OrderQueue:
             self._withdraw(address)
         elif (wrong := malformed(order)) is not None:
             self._session.report_undecodable(ORDER.build(address), ORDER.encode(order), wrong)
-        elif OrderAddress(order.robot, order.plan, order.task) != address:
+        elif OrderAddress.of(order) != address:
             await self._refuse_misplaced(address, order)
         else:
             await self._take(order)
@@ -75,8 +80,7 @@ class OrderQueue:
             self._journal.dropped(name)
 
     async def _refuse_misplaced(self, address: OrderAddress, order: Order) -> None:
-        own = OrderAddress(order.robot, order.plan, order.task)
-        here, there = ORDER.build(address), ORDER.build(own)
+        here, there = ORDER.build(address), ORDER.build(OrderAddress.of(order))
         reason = f"the order at {here} says that it is the one at {there}"
         placed = replace(order, robot=address.robot, plan=address.plan, task=address.task)
         if attempt_name(placed) not in self._journal.ledger.attempts:
@@ -127,7 +131,7 @@ class OrderQueue:
 
     async def _report_unless_stored(self, report: Report) -> None:
         """Report what is no news to the journal, unless it stands there already."""
-        address = report_address(report)
+        address = ReportAddress.of(report)
         try:
             stored = await self._session.get(REPORT, address)
         except SchemaError as error:

@@ -1,4 +1,4 @@
-"""Sends what the journal has waiting, in order, until each is read back from the store."""
+"""Reports on their way: made of orders, sent in order until each is read back from the store."""
 
 from __future__ import annotations
 
@@ -8,14 +8,39 @@ from collections.abc import Callable
 
 from keyexpr_schema.errors import SchemaError, UndecodablePayload
 from keyexpr_schema.keyspace import FACT, REPORT
+from keyexpr_schema.payloads.tasks import Order, Report, ReportAddress, ReportState
 from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.session import Session
 from workers.orders.journal import Journal, Unsent
-from workers.orders.reports import report_address
 
 CONFIRM_S = 10.0
 PAUSE_S = 0.5
 """Wall seconds before the next go when a write was not confirmed though a router is there."""
+
+
+def make_report(
+    order: Order,
+    incarnation: str,
+    state: ReportState,
+    reason: str | None = None,
+    *,
+    retryable: bool = True,
+    started_s: float | None = None,
+) -> Report:
+    """What the run `incarnation` of a worker reports of the attempt that `order` asks for."""
+    return Report(
+        robot=order.robot,
+        plan=order.plan,
+        revision=order.revision,
+        task=order.task,
+        attempt=order.attempt,
+        epoch=order.epoch,
+        incarnation=incarnation,
+        state=state,
+        reason=reason,
+        retryable=retryable,
+        started_s=started_s,
+    )
 
 
 class Outbox:
@@ -66,7 +91,7 @@ class Outbox:
                 return
             await self._session.confirm(FACT, address, payload, timeout_s=CONFIRM_S)
         else:
-            reported = report_address(payload)
+            reported = ReportAddress.of(payload)
             await self._session.confirm(REPORT, reported, payload, timeout_s=CONFIRM_S)
 
     async def _outdated(self, address: FactAddress, fact: Fact) -> bool:

@@ -7,9 +7,7 @@ from math import cos, dist, sin
 
 from keyexpr_schema.payloads.motions import PointM
 from keyexpr_schema.payloads.world import Place, Surface
-from workers.skills.viewpoints import cells
-
-PointM2 = tuple[float, float]
+from workers.skills.viewpoints import PointM2, cells
 
 RIM_M = 0.08
 """Nothing is put closer to a surface's rim: half a hand's opening and some error."""

@@ -2,12 +2,3 @@
 
 Robots are numbers from 0; a set of robots is an `int` whose bit `r` stands for robot `r`.
 """
-
-from fleet.allocators.load_balancing.balance import balance
-from fleet.allocators.load_balancing.problem import (
-    BalancedAssignment,
-    LoadBalancingProblem,
-    NoAssignment,
-)
-
-__all__ = ["BalancedAssignment", "LoadBalancingProblem", "NoAssignment", "balance"]

@@ -20,7 +20,10 @@ from keyexpr_schema.payloads.plans import Plan, Violation
 
 
 class Causality:
-    """Preconditions, goals and room of one plan; `check` fills `violations` and `requirements`."""
+    """Checks preconditions, goals and room of one plan, on construction.
+
+    `violations` are what is wrong, `requirements` what actors (`?a1`) need of their robots.
+    """
 
     def __init__(
         self, plan: Plan, world: WorldModel, graph: TaskGraph, actions: Mapping[str, Action]
@@ -33,9 +36,9 @@ class Causality:
             for literal in actions[task].after:
                 self._writers[literal.variable].append((task, literal.value))
         self._baskets = BasketLoads(world, graph, self._writers)
+        self._check()
 
-    def check(self) -> None:
-        """Fill `violations` and `requirements`."""
+    def _check(self) -> None:
         self._one_task_at_a_time()
         for task in self._graph.order:
             action = self._actions[task]

@@ -83,7 +83,6 @@ def check_plan(plan: Plan, world: WorldModel) -> CheckedPlan | InvalidPlan:
         return read
     graph, actions = read
     causality = Causality(plan, world, graph, actions)
-    causality.check()
     for pinned, robot in plan.pins.items():
         causality.requirements[actor_arg(pinned)].pinned_to = robot
     requirements = {
@@ -114,7 +113,6 @@ def check_allocation(
         return read.violations
     graph, actions = read
     causality = Causality(plan, world, graph, actions)
-    causality.check()
     return (*causality.violations, *_unable_robots(plan, allocation, actions, world))
 
 

@@ -8,9 +8,8 @@ from fleet.core.model.preconditions import action_of, unmet_before
 from fleet.core.model.skills import Action, Skills
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import give_up, set_entry, set_record
+from fleet.core.state_updates import conditions_of, give_up, open_goals, set_entry, set_record
 from keyexpr_schema.facts import AT
-from keyexpr_schema.payloads.goals import ENDED_GOALS
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 
@@ -116,8 +115,6 @@ def _carries_for(state: State, robot: str, entry: PlanEntry) -> bool:
     """Whether a robot has something with it that an open goal of the plan is about."""
     return any(
         (fact := state.fact(AT, subject)) is not None and fact.value == robot
-        for goal in entry.plan.goals
-        if goal in state.goal_states and state.goal_states[goal].state not in ENDED_GOALS
-        for condition in state.goal_states[goal].conditions
+        for condition in conditions_of(state, open_goals(state, entry))
         for subject in condition.subjects
     )

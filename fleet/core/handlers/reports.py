@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.model.durations import learn
-from fleet.core.model.preconditions import action_of, unmet_before
+from fleet.core.model.preconditions import action_of, effects_hold, unmet_before
 from fleet.core.model.skills import Action, Skills
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
 from fleet.core.state import State, put
@@ -142,7 +142,7 @@ def _interrupted(
     if action is None:
         return _failed(state, entry, record, report)
     world = state.world(skills)
-    if all(world.value(*literal.variable) == literal.value for literal in action.after):
+    if effects_hold(action, world):
         record = _ended(record, report, TaskState.SUCCEEDED)
         return set_record(state, entry, replace(record, reason="found done after an interruption"))
     if unmet_before(action, world) is None and record.attempt < MAX_ATTEMPTS:

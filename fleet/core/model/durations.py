@@ -2,8 +2,8 @@
 
 Predicted is `work + pace * way`: the skill's duration, and the way at top speed times the pace of
 that type of robot. An attempt that took `r` times as long as predicted is an observation of `r *
-work` and of `r * pace`; both go into running means that forget (exponentially weighted, as soon as
-`FULL` observations have come in) and that begin with the skill model as one observation.
+work` and of `r * pace`; both go into running means that forget (exponentially weighted, once
+`FULL_ATTEMPTS` or `FULL_WAY_S` have come in) and that begin with the skill model as one attempt.
 """
 
 from __future__ import annotations

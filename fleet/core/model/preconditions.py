@@ -35,6 +35,11 @@ def applicable(action: Action, facts: Mapping[FactKey, Value], world: WorldModel
     )
 
 
+def effects_hold(action: Action, world: WorldModel) -> bool:
+    """Whether all that the action makes true is believed already."""
+    return all(world.value(*literal.variable) == literal.value for literal in action.after)
+
+
 def unmet_before(action: Action, world: WorldModel) -> str | None:
     """The first precondition that the facts do not grant, as a phrase, or `None`."""
     literal = first_unmet(action, world.facts, world)

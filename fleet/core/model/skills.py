@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
+from fleet.language.vocabulary import SkillPhrase
 from keyexpr_schema.facts import FactKey, Literal
 
 
@@ -109,3 +110,24 @@ class SkillModel:
 
 Skills = Mapping[str, SkillModel]
 """The skills that a planner knows, by name."""
+
+
+def phrases_of(skills: Skills) -> tuple[SkillPhrase, ...]:
+    """What people can ask for by a skill's name ("vacuum the hallway"): the skills that make
+    something true of one object or place, and of that alone.
+
+    What they do to robots aside; a skill whose effects name a second thing, as `place` names where
+    an object is put, needs a sentence of its own in the grammar.
+    """
+    phrases = []
+    for name in sorted(skills):
+        skill = skills[name]
+        rows = [row for row in skill.after if skill.parameters[row.variable.subject] != "robot"]
+        about = {row.variable.subject for row in rows}
+        plain = all(row.value not in skill.parameters for row in rows)
+        if len(about) == 1 and plain:
+            kind = skill.parameters[about.pop()]
+            wants = tuple((key.relation, value) for key, value in rows if value is not None)
+            if wants:
+                phrases.append(SkillPhrase(verb=name.replace("_", " "), type=kind, wants=wants))
+    return tuple(phrases)

@@ -72,10 +72,6 @@ class TaskGraph:
         """Whether `first` ends before `second` starts in every order the graph allows."""
         return bool(self._ancestors[self._index[second]] >> self._index[first] & 1)
 
-    def ordered(self, one: str, other: str) -> bool:
-        """Whether the graph fixes which of two tasks comes first."""
-        return self.precedes(one, other) or self.precedes(other, one)
-
     def reduced(self) -> dict[str, tuple[str, ...]]:
         """The fewest edges with the same meaning: task to the tasks it waits for directly."""
         result: dict[str, tuple[str, ...]] = {}

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.model.skills import SkillModel
+from fleet.core.model.preconditions import effects_hold
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry
@@ -116,11 +116,8 @@ def _going_on(
 
 
 def _holds_already(call: Call, world: WorldModel) -> bool:
-    skill: SkillModel | None = world.skills.get(call[0])
-    return skill is not None and all(
-        world.value(*literal.variable) == literal.value
-        for literal in skill.ground(dict(call[1])).after
-    )
+    skill = world.skills.get(call[0])
+    return skill is not None and effects_hold(skill.ground(dict(call[1])), world)
 
 
 def _same_waiting(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from fleet.core.model.skills import SkillModel
 from fleet.language import Vocabulary
@@ -21,6 +20,8 @@ DERIVED = {LOCATED: "it is known where the object is", HELD: "a hand holds the o
 """Relations that follow from others; `keyexpr_schema.payloads.goals.Condition` says how."""
 
 Stages = tuple[tuple[Condition, ...], ...]
+_Signature = set[tuple[str, str | bool]]
+"""What a relation takes: pairs of the subject's type, and the value's type or the value."""
 
 
 class ConditionAnswer(StructuredAnswer, frozen=True):
@@ -39,22 +40,6 @@ class GoalAnswer(StructuredAnswer, frozen=True):
     reason: str = ""
 
 
-@dataclass(frozen=True)
-class _Signature:
-    """What a relation takes: pairs of the subject's type, and the value's type or the value."""
-
-    types: frozenset[tuple[str, str | bool]]
-
-    def text(self, relation: str) -> str:
-        """The relation as a line of the prompt."""
-        forms = " or ".join(
-            f"{relation}({subject}) = {str(value).lower() if value is True else value}"
-            for subject, value in sorted(self.types, key=str)
-        )
-        about = DERIVED.get(relation)
-        return f"- {forms}" + (f": {about}" if about else "")
-
-
 class LlmInterpreter:
     """Turns a sentence into stages of conditions; asks within the budget of one plan."""
 
@@ -68,23 +53,19 @@ class LlmInterpreter:
 
         Every name in the result exists, and fits its relation. Blocks, and never raises.
         """
-
-        def read(text: str) -> Stages | str | Rejected:
-            return self._read(text, vocabulary)
-
-        made: Stages | str | GivenUp = self._model.ask(
+        stages: Stages | str | GivenUp = self._model.ask(
             system="interpret-system",
             question="interpret",
             correction="interpret-repair",
             values={
-                "relations": "\n".join(s.text(name) for name, s in self._signatures.items()),
+                "relations": "\n".join(f"- {_form(*each)}" for each in self._signatures.items()),
                 "problem": vocabulary_text(sentence, vocabulary),
                 "form": _FORM,
             },
             schema=schema_of(GoalAnswer),
-            read=read,
+            read=lambda text: self._read(text, vocabulary),
         )
-        return made.reason if isinstance(made, GivenUp) else made
+        return stages.reason if isinstance(stages, GivenUp) else stages
 
     def _read(self, text: str, vocabulary: Vocabulary) -> Stages | str | Rejected:
         answer = read_answer(text, GoalAnswer)
@@ -121,11 +102,11 @@ class LlmInterpreter:
                 found.append(Violation(code="unknown-name", sentence=sentence))
             elif not any(
                 kind == subject_type and _fits(row.value, value_type, vocabulary)
-                for subject_type, value_type in signature.types
+                for subject_type, value_type in signature
             ):
                 sentence = (
                     f"{row.relation}({subject}) = {row.value} does not fit: {subject} is a {kind}, "
-                    f"and the relation is {signature.text(row.relation).removeprefix('- ')}"
+                    f"and the relation is {_form(row.relation, signature)}"
                 )
                 found.append(Violation(code="wrong-type", sentence=sentence))
         return found
@@ -164,8 +145,18 @@ def _contradictions(number: int, stage: tuple[ConditionAnswer, ...]) -> list[Vio
     return found
 
 
+def _form(relation: str, signature: _Signature) -> str:
+    """What a condition on the relation looks like."""
+    forms = " or ".join(
+        f"{relation}({subject}) = {str(value).lower() if value is True else value}"
+        for subject, value in sorted(signature, key=str)
+    )
+    about = DERIVED.get(relation)
+    return forms + (f": {about}" if about else "")
+
+
 def _signatures(skills: Mapping[str, SkillModel]) -> dict[str, _Signature]:
-    types: dict[str, set[tuple[str, str | bool]]] = {}
+    types: dict[str, _Signature] = {}
     for skill in skills.values():
         for (relation, subject), value in skill.after:
             if isinstance(value, str):
@@ -178,7 +169,7 @@ def _signatures(skills: Mapping[str, SkillModel]) -> dict[str, _Signature]:
             types.setdefault(relation, set()).add((skill.parameters[subject], type_or_value))
     for relation in DERIVED:
         types[relation] = {("object", True)}
-    return {name: _Signature(frozenset(types[name])) for name in sorted(types)}
+    return dict(sorted(types.items()))
 
 
 _FORM = """{"stages": [[{"relation": "RELATION", "subject": "NAME", "value": "NAME", \

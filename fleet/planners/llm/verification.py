@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fleet.core.actors.actor_constraints import least_loaded
+from fleet.core.actors import least_loaded
 from fleet.core.checker.plan_checker import (
     CheckedPlan,
     InvalidPlan,

@@ -18,8 +18,7 @@ from dataclasses import dataclass, field, replace
 from itertools import cycle, product
 from math import inf, prod
 
-from fleet.core.actors.actor_constraints import least_loaded
-from fleet.core.actors.actor_order import carried_at_end
+from fleet.core.actors import carried_at_end, least_loaded
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import NoPlan, Planner, PlanningProblem

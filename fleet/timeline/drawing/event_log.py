@@ -160,7 +160,7 @@ def truth(now: Truth, before: Truth | None) -> Iterator[Line]:
     )
 
 
-def reject(now: UndecodableValue, before: UndecodableValue | None) -> Iterator[Line]:
+def undecodable(now: UndecodableValue, before: UndecodableValue | None) -> Iterator[Line]:
     """A value could not be read."""
     if before is None or before.reason != now.reason:
         yield ERROR, f"{now.component} could not read {now.keyexpr}: {now.reason}"

@@ -33,6 +33,8 @@ class Lane:
 
     path: str
     bars: dict[str, Bar] = field(default_factory=dict)
+    logged: dict[float, str] = field(default_factory=dict)
+    """What was logged as holding from a time on."""
     dirty: bool = False
 
     def at(self, time_s: float) -> Bar | None:
@@ -157,9 +159,14 @@ class Lanes:
 
     def _transition(self, lane: Lane, time_s: float) -> None:
         # Rows may come in any order: each says what holds from its time on, and of two at the
-        # same time the later row counts. So an end is never allowed to hide the next start.
-        bar = lane.at(time_s)
-        self._sink.log(lane.path, rr.StateChange(state=bar.key if bar else IDLE), time_s)
+        # same time the later row counts. So an end is never allowed to hide the next start, and
+        # a bar that is heard of late corrects what was logged for later times.
+        for at_s in sorted({time_s, *(later_s for later_s in lane.logged if later_s > time_s)}):
+            bar = lane.at(at_s)
+            state = bar.key if bar else IDLE
+            if lane.logged.get(at_s) != state:
+                lane.logged[at_s] = state
+                self._sink.log(lane.path, rr.StateChange(state=state), at_s)
 
     def _configure(self, lane: Lane) -> None:
         bars = list(lane.bars.values())

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.core.model.skill_file import skills_from_data
-from fleet.core.model.skill_phrases import phrases_of
+from fleet.core.model.skills import phrases_of
 from fleet.core.model.world import WorldModel
 from fleet.errors import NotUnderstood
 from fleet.language import Vocabulary, read_goal

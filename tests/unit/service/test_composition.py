@@ -25,6 +25,15 @@ class Needy(Lazy):
 class Turns(RoundRobinAllocator):
     name = "turns"
 
+class Nameless(RoundRobinAllocator):
+    name = None
+
+class Impostor(Lazy):
+    name = "symbolic"
+
+class OneWord(Lazy):
+    name, strategies = "one-word", "siesta"
+
 FILE = Path(__file__).with_name("wave.yaml")
 AGAIN = {"skills": {"wave": {"parameters": {"robot": "robot"}}}}
 """
@@ -33,9 +42,12 @@ ENTRIES = """
 lazy = theirs:Lazy
 needy = theirs:Needy
 turns = theirs:Turns
+impostor = theirs:Impostor
+one-word = theirs:OneWord
 [robotfleet.allocators]
 turns = theirs:Turns
 lazy = theirs:Lazy
+nameless = theirs:Nameless
 [robotfleet.skill_models]
 wave = theirs:FILE
 again = theirs:AGAIN
@@ -65,11 +77,14 @@ def test_sound_plug_ins_are_there_and_each_broken_one_is_named(
     assert {"makespan", "turns"} <= set(made.allocators) and "lazy" not in made.allocators
     assert {"navigate", "wave"} <= set(made.skills)
     warnings = [record.getMessage() for record in caplog.records]
-    assert len(warnings) == 4
+    assert len(warnings) == 7
     for entry, what in (
         ("theirs:Needy as 'needy'", "missing 1 required positional argument: 'wish'"),
         ("theirs:Turns as 'turns' in robotfleet.planners", "which is no Planner"),
         ("theirs:Lazy as 'lazy' in robotfleet.allocators", "which is no Allocator"),
+        ("theirs:Impostor as 'impostor'", "there is a Planner called 'symbolic' already"),
+        ("theirs:OneWord as 'one-word'", "Expected `array`, got `str`"),
+        ("theirs:Nameless as 'nameless'", "Expected `str`, got `null`"),
         ("theirs:AGAIN as 'again'", "skill wave is already modelled elsewhere"),
     ):
         (warning,) = [each for each in warnings if entry in each]

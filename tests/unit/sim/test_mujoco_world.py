@@ -8,8 +8,10 @@ import pytest
 
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionState
 from keyexpr_schema.payloads.simulation import ShapeKind
+from sim.backend import NEEDS
 from sim.files.mission_file import load_mission
 from sim.mujoco_world import MujocoBackend
+from sim.mujoco_world.backend import MOTIONS
 
 MISSION = load_mission("two-cups")
 
@@ -34,6 +36,10 @@ def test_idle_robots_and_objects_stay_where_they_were_put(resting: MujocoBackend
         start = MISSION.world.start_point_m(truth.object)
         assert math.dist(truth.point_m, start) < 0.002
     assert resting.contacts().robot_robot == resting.contacts().robot_wall == 0
+
+
+def test_every_kind_of_motion_has_its_rows() -> None:
+    assert set(NEEDS) == set(MOTIONS) == set(MotionKind)
 
 
 def test_truth_knows_where_everything_rests(resting: MujocoBackend) -> None:

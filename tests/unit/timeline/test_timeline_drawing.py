@@ -156,6 +156,18 @@ def test_a_task_that_starts_as_another_ends_is_not_hidden(tmp_path: Path) -> Non
     assert 0.0 not in busy
 
 
+def test_a_bar_is_not_hidden_by_what_was_shown_before_it_was_known(tmp_path: Path) -> None:
+    path = tmp_path / "lanes.rrd"
+    stream = open_stream(path, "test")
+    lanes = Lanes(Sink(stream, Clock()), Palette())
+    lanes.show_empty(lanes.robot("hsr"), 0.2)
+    lanes.record(record(STEPS[0], TaskState.RUNNING, started_s=0.0), 0.3)
+    lanes.record(record(STEPS[0], TaskState.SUCCEEDED, started_s=0.0, ended_s=15.0), 15.2)
+    stream.disconnect()
+    held = {row.sim_s: row.value[0] for row in rows(path, "/robots/hsr", "state")}
+    assert held == {0.0: "p1/t1#1", 0.2: "p1/t1#1", 15.0: ""}
+
+
 def test_a_trail_has_a_corner_where_the_way_turns_and_no_end_of_them(tmp_path: Path) -> None:
     path = tmp_path / "trail.rrd"
     stream = open_stream(path, "test")

@@ -15,7 +15,7 @@ from keyexpr_schema.payloads.world import Fact
 from workers.errors import JournalBusy, JournalUnreadable
 from workers.orders.fencing import Phase, attempt_name
 from workers.orders.journal import Journal
-from workers.orders.reports import make_report
+from workers.orders.outbox import make_report
 
 
 def order(task: str = "t1", attempt: int = 1) -> Order:
@@ -63,7 +63,7 @@ from msgspec.structs import replace
 from test_order_journal import fact, order
 from keyexpr_schema.payloads.tasks import ReportState
 from workers.orders.journal import Journal
-from workers.orders.reports import make_report
+from workers.orders.outbox import make_report
 journal = Journal(Path({str(path)!r})).__enter__()
 journal.queued(order("t1")); journal.queued(order("t2")); journal.queued(order("t3"))
 end = make_report(order("t1"), "r1", ReportState.SUCCEEDED)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fleet.core.actors.actor_constraints import tasks_nobody_can_do
+from fleet.core.actors import tasks_nobody_can_do
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.planners.base import PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner

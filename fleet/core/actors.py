@@ -1,15 +1,44 @@
-"""Which actors must be different robots, tasks that nobody can do, and a quick allocation."""
+"""Actor constraints and actor order: which actors must be different robots, which come first or
+last on theirs; tasks that nobody can do, and a quick allocation.
+"""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 
-from fleet.core.actors.actor_order import carried_at_end
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan
-from keyexpr_schema.ids import bare_name
+from keyexpr_schema.facts import AT, Value
+from keyexpr_schema.ids import actor_arg, actor_in, bare_name
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 Pair = tuple[str, str]
+
+
+def carried_at_end(checked: CheckedPlan) -> dict[str, str]:
+    """Objects that the plan leaves with an actor, in its basket or hand, and which actor.
+
+    Such actors come last: their robot would carry the object off.
+    """
+    return {
+        key.subject: actor
+        for key, value in checked.effects.items()
+        if key.relation == AT and (actor := actor_in(value)) is not None
+    }
+
+
+def first_actors(checked: CheckedPlan) -> frozenset[str]:
+    """Actors that need their robot as it is now, and as some other actor would not leave it."""
+    last = {actor_arg(actor) for actor in carried_at_end(checked).values()}
+    left: dict[str, set[Value]] = defaultdict(set)
+    for (relation, subject), value in checked.effects.items():
+        if subject not in last:
+            left[relation].add(value)
+    return frozenset(
+        actor
+        for actor, requirement in checked.requirements.items()
+        if any(left[relation] - {value} for relation, (value, _) in requirement.facts.items())
+    )
 
 
 def actors_apart(checked: CheckedPlan) -> frozenset[Pair]:

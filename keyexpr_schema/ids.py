@@ -61,6 +61,12 @@ def bound(arg: str, allocation: Mapping[str, str]) -> str:
     return allocation[arg[len(_ACTOR_MARK) :]] if arg.startswith(_ACTOR_MARK) else arg
 
 
+def natural_order(name: str) -> tuple[tuple[int, str], ...]:
+    """A sort key that puts `t2` before `t10`."""
+    parts = enumerate(re.split(r"([0-9]+)", name))  # every second one is a number
+    return tuple((int(part), "") if at % 2 else (0, part) for at, part in parts)
+
+
 def slug(text: str, limit: int = 40) -> str:
     """Turn free text into an id: `"Bring the cup!"` becomes `"bring-the-cup"`.
 

@@ -14,7 +14,7 @@ from keyexpr_schema.payloads.motions import (
     PointM,
     Senses,
 )
-from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec, RobotState
+from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.world import Fact
 from workers.embodiment import Embodiment
 from workers.errors import SkillFailed
@@ -60,13 +60,9 @@ class SkillContext:
         """Tell the person who watches this worker's output."""
         self._log.info("%s", sentence)
 
-    def robot_state(self, robot: str) -> RobotState | None:
-        """The state that another robot's worker published last; `None` if it never did."""
-        return self.world.robots.get(robot)
-
     def robot_pose(self, robot: str) -> PoseMRad | None:
         """Another robot's `(x [m], y [m], yaw [rad])`, world frame, as its worker published it."""
-        state = self.robot_state(robot)
+        state = self.world.robots.get(robot)
         return None if state is None else state.pose_m_rad
 
     async def do(

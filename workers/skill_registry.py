@@ -127,11 +127,6 @@ class SkillRegistry:
     def __iter__(self) -> Iterator[Skill]:
         return iter(self._skills.values())
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The names of all skills, sorted."""
-        return tuple(sorted(self._skills))
-
     def get(self, name: str, offered: Iterable[str]) -> Skill:
         """The skill `name` for a robot whose spec offers the skills `offered`.
 

@@ -26,7 +26,7 @@ async def list_(
     from cli.client.fleet_view import FLEET_KEYS, snapshot
     from cli.errors import check_known
     from cli.views.tasks import tasks_table
-    from cli.views.text import natural_order
+    from keyexpr_schema.ids import natural_order
 
     async with call.session() as session:
         view = await snapshot(session, *FLEET_KEYS)

@@ -10,13 +10,13 @@ from rich.tree import Tree
 
 from cli.views.text import (
     STATE_STYLE,
-    natural_order,
     outcome,
     performer,
     seconds,
     spent_s,
     task_call,
 )
+from keyexpr_schema.ids import natural_order
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanStatus, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState

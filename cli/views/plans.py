@@ -12,8 +12,8 @@ from cli.plans.comparison import PlanDiff, TaskChange
 from cli.views.console import table
 from cli.views.plan_graph import plan_graph
 from cli.views.plan_tree import plan_tree
-from cli.views.text import natural_order, outcome, seconds, skill_call
-from keyexpr_schema.ids import actor_arg
+from cli.views.text import outcome, seconds, skill_call
+from keyexpr_schema.ids import actor_arg, natural_order
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.plans import Making, Plan, PlanStatus, Task, Violation
 from keyexpr_schema.payloads.tasks import TaskRecord

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 
 from keyexpr_schema.ids import actor_arg, actor_in
@@ -119,10 +118,3 @@ def outcome(status: PlanStatus) -> str:
         if not any(each.sentence in part for part in parts):
             parts.append(each.sentence)
     return "; ".join(parts)
-
-
-def natural_order(name: str) -> tuple[tuple[int, str], ...]:
-    """A sort key that puts `t2` before `t10`."""
-    return tuple(
-        (int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", name)
-    )

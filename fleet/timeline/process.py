@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import signal
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -14,6 +13,7 @@ from fleet.timeline import viewer
 from fleet.timeline.drawing.sink import free_port, open_stream
 from fleet.timeline.errors import NoPicture
 from fleet.timeline.recorder import RECORDED, Recorder
+from keyexpr_schema.signals import run_until_signal
 from keyexpr_schema.transport.session import Change, SessionConfig, Watch, open_session
 
 FLUSH_S = 1.0
@@ -25,14 +25,13 @@ POSES_S = 5.0
 LIVE_FLUSH_S = 0.25
 """Both with a viewer looking on."""
 
-
 BACKLOG_S = 2.0
 """Values are put in the order of their timestamps for so long, if they do not cease before."""
 
 IDLE_S = 0.05
 
 
-def print_line(sentence: str) -> None:
+def _print_line(sentence: str) -> None:
     """Write a line to standard output, at once."""
     sys.stdout.write(f"{sentence}\n")
     sys.stdout.flush()
@@ -59,14 +58,10 @@ def run_recorder(
         component="recorder",
         connect_timeout_s=connect_timeout_s,
     )
-    asyncio.run(_record(config, out, view))
+    run_until_signal(_record(config, out, view))
 
 
 async def _record(config: SessionConfig, out: Path, view: bool) -> None:
-    stop = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, stop.set)
     shown: subprocess.Popen[bytes] | None = None
     try:
         async with open_session(config) as session:
@@ -77,33 +72,29 @@ async def _record(config: SessionConfig, out: Path, view: bool) -> None:
                 shown = _show(port)
             try:
                 async with session.watch(*RECORDED) as watch:
-                    print_line(f"recording to {out}")
-                    await _follow(watch, recorder, stop, view)
+                    _print_line(f"recording to {out}")
+                    await _follow(watch, recorder, view)
             finally:
                 recorder.close()
     finally:
         if shown is not None:
             viewer.end(shown)
-        for number in (signal.SIGTERM, signal.SIGINT):
-            loop.remove_signal_handler(number)
 
 
-async def _follow(watch: Watch, recorder: Recorder, stop: asyncio.Event, live: bool) -> None:
-    """Hand changes to the recorder until `stop`; what was stored first, in the order of writing."""
+async def _follow(watch: Watch, recorder: Recorder, live: bool) -> None:
+    """Hand changes to the recorder until cancelled; what was stored first, as it was written."""
     loop = asyncio.get_running_loop()
     backlog: list[Change[Any, Any]] | None = []
     give_up_at = loop.time() + BACKLOG_S
     synced = asyncio.ensure_future(watch.synced())
-    stopped = asyncio.ensure_future(stop.wait())
-    following = asyncio.ensure_future(_next(watch))
+    following = asyncio.ensure_future(anext(watch))
     flush_s, poses_s = (LIVE_FLUSH_S, LIVE_FLUSH_S) if live else (FLUSH_S, POSES_S)
     flush_at, poses_at = loop.time() + flush_s, loop.time() + poses_s
     try:
-        while not stopped.done():
+        while True:
             await asyncio.wait(
-                {stopped, following},
+                {following},
                 timeout=IDLE_S if backlog is not None else max(0.0, flush_at - loop.time()),
-                return_when=asyncio.FIRST_COMPLETED,
             )
             idle = not following.done()
             if not idle:
@@ -112,7 +103,7 @@ async def _follow(watch: Watch, recorder: Recorder, stop: asyncio.Event, live: b
                     recorder.record(change)
                 else:
                     backlog.append(change)
-                following = asyncio.ensure_future(_next(watch))
+                following = asyncio.ensure_future(anext(watch))
             now = loop.time()
             if backlog is not None and ((idle and synced.done()) or now >= give_up_at):
                 recorder.record_all(backlog)
@@ -125,23 +116,19 @@ async def _follow(watch: Watch, recorder: Recorder, stop: asyncio.Event, live: b
     finally:
         if backlog:
             recorder.record_all(backlog)
-        for task in (synced, stopped, following):
+        for task in (synced, following):
             task.cancel()
-        await asyncio.gather(synced, stopped, following, return_exceptions=True)
-
-
-async def _next(watch: Watch) -> Change[Any, Any]:
-    return await anext(watch)
+        await asyncio.gather(synced, following, return_exceptions=True)
 
 
 def _show(port: int) -> subprocess.Popen[bytes] | None:
     """Open the viewer on the live stream, or say in a sentence why not."""
     url = f"rerun+http://127.0.0.1:{port}/proxy"
     if not viewer.has_screen():
-        print_line(f"there is no screen here; look on with: rerun --connect {url}")
+        _print_line(f"there is no screen here; look on with: rerun --connect {url}")
         return None
     try:
         return viewer.start(["--port", "auto", "--connect", url])
     except NoPicture as error:
-        print_line(f"{error}; recording goes on")
+        _print_line(f"{error}; recording goes on")
         return None

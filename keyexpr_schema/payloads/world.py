@@ -5,6 +5,8 @@ Lengths are metres in the world frame (x east, y north, z up), angles radians.
 
 from __future__ import annotations
 
+from math import cos, hypot, sin
+
 from keyexpr_schema.facts import FactKey, Literal, Value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
@@ -102,6 +104,22 @@ class Surface(Payload, frozen=True, kw_only=True):
     yaw_rad: float
     length_m: float
     width_m: float
+
+    def point_m(self, along_m: float, across_m: float) -> tuple[float, float, float]:
+        """A point on it in the world frame, given from its middle along its own axes."""
+        c, s = cos(self.yaw_rad), sin(self.yaw_rad)
+        return (
+            self.x_m + c * along_m - s * across_m,
+            self.y_m + s * along_m + c * across_m,
+            self.z_m,
+        )
+
+    def distance_m(self, x_m: float, y_m: float) -> float:
+        """From a point to it on the floor plan; 0 on, over and under it."""
+        c, s = cos(self.yaw_rad), sin(self.yaw_rad)
+        dx, dy = x_m - self.x_m, y_m - self.y_m
+        along = max(0.0, abs(c * dx + s * dy) - self.length_m / 2)
+        return hypot(along, max(0.0, abs(c * dy - s * dx) - self.width_m / 2))
 
 
 class Place(Payload, frozen=True, kw_only=True):

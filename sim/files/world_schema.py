@@ -140,10 +140,7 @@ class WorldFile(FileEntry, frozen=True):
         entry = self.object_entries[object]
         if entry.on == FLOOR:
             return (entry.at_m[0], entry.at_m[1], 0.0)
-        top = self.surface(entry.on)
-        c, s = math.cos(top.yaw_rad), math.sin(top.yaw_rad)
-        x, y = entry.at_m
-        return (top.x_m + c * x - s * y, top.y_m + s * x + c * y, top.z_m)
+        return self.surface(entry.on).point_m(*entry.at_m)
 
     def surfaces(self, place: str | None = None) -> tuple[Surface, ...]:
         """The table tops (of one place), in the order of the file."""

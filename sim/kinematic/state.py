@@ -171,11 +171,7 @@ class KinematicState:
     def _support_at(self, point_m: PointM) -> str | None:
         x, y, z = point_m
         for top in self.world.surfaces():
-            c, s = math.cos(top.yaw_rad), math.sin(top.yaw_rad)
-            dx, dy = x - top.x_m, y - top.y_m
-            inside = abs(c * dx + s * dy) <= top.length_m / 2
-            inside &= abs(c * dy - s * dx) <= top.width_m / 2
-            if inside:
+            if top.distance_m(x, y) == 0.0:
                 return top.surface if abs(z - top.z_m) <= 0.1 else None
         return FLOOR if abs(z) <= 0.1 and self.world.place_at(x, y) is not None else None
 

@@ -103,10 +103,10 @@ def _take(run: MotionRun, path: Reach, name: str) -> Step:
     yield from _close(run, gripper, name)
     yield from move_arm(run, path.above, f"lifting {name}", slower=2.0)
     yield from wait(SETTLE_S)
-    if not (robot.holds(name) and gripper.feels()):
+    if not (robot.held == name and gripper.feels()):
         raise MotionFailed(f"{name} slipped out of the hand while it was lifted")
     yield from stow(run)
-    if not robot.holds(name):
+    if robot.held != name:
         raise MotionFailed(f"{name} slipped out of the hand while the arm was folded")
 
 

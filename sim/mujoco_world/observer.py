@@ -193,13 +193,7 @@ class Observer:
             if other.in_basket(self._data.xpos[self._objects[object]]) or other.held == object:
                 return other.name
         for surface in self._world.surfaces():
-            c, s = math.cos(surface.yaw_rad), math.sin(surface.yaw_rad)
-            dx, dy = x - surface.x_m, y - surface.y_m
-            inside = (
-                abs(c * dx + s * dy) <= surface.length_m / 2
-                and abs(c * dy - s * dx) <= surface.width_m / 2
-            )
-            if inside and abs(z - surface.z_m) < 0.06:
+            if surface.distance_m(x, y) == 0.0 and abs(z - surface.z_m) < 0.06:
                 return surface.surface
         return FLOOR
 

@@ -27,9 +27,10 @@ class RobotBody:
         self.name = spec.robot
         self.spec = spec
         self.description = found.description
-        self.prefix = f"{spec.robot}/"
+        prefix = f"{spec.robot}/"
         self._data = data
         self.held: str | None = None
+        """What is in the hand, as far as the robot knows."""
         self.reaching_for: str | None = None
         """What the hand was last commanded to grasp: a hand feels that it holds, not what."""
         self.grip_above_base_m = 0.0
@@ -37,31 +38,23 @@ class RobotBody:
         self._untouched_s = 0.0
         about = found.description
         try:
-            self.drive = make_drive(
-                model, data, self.prefix, about, spec.capabilities.get("drive", 0.3)
-            )
-            self.arm = Arm(model, data, self.prefix, about.arm) if about.arm else None
-            self.gripper = (
-                Gripper(model, data, self.prefix, about.gripper) if about.gripper else None
-            )
-            self.camera = (
-                int(model.site(self.prefix + about.camera.site).id) if about.camera else -1
-            )
-            self.basket = (
-                int(model.site(self.prefix + about.basket.site).id) if about.basket else -1
-            )
+            self.drive = make_drive(model, data, prefix, about, spec.capabilities.get("drive", 0.3))
+            self.arm = Arm(model, data, prefix, about.arm) if about.arm else None
+            self.gripper = Gripper(model, data, prefix, about.gripper) if about.gripper else None
+            self.camera = int(model.site(prefix + about.camera.site).id) if about.camera else -1
+            self.basket = int(model.site(prefix + about.basket.site).id) if about.basket else -1
             self.basket_body = (
-                int(model.body(self.prefix + about.basket.body).id) if about.basket else -1
+                int(model.body(prefix + about.basket.body).id) if about.basket else -1
             )
             self.pads = tuple(
-                int(model.geom(self.prefix + name).id)
+                int(model.geom(prefix + name).id)
                 for name in (about.gripper.pads if about.gripper else ())
             )
             self.hand_bodies = frozenset(
-                int(model.body(self.prefix + name).id) for name in about.hand_bodies
+                int(model.body(prefix + name).id) for name in about.hand_bodies
             )
         except KeyError as error:
-            part = str(error.args[0]).replace(self.prefix, "")
+            part = str(error.args[0]).replace(prefix, "")
             beside = found.mjcf.with_suffix(".model.yaml")
             raise BadFile(f"{beside} names what {found.mjcf.name} lacks: {part}") from None
         self.basket_half_m = tuple(
@@ -104,10 +97,6 @@ class RobotBody:
                 self.held = self.reaching_for
             elif self.held is not None and self._untouched_s > LOST_AFTER_S:
                 self.let_go()
-
-    def holds(self, name: str) -> bool:
-        """Whether an object is in the hand, as far as the robot knows."""
-        return self.held == name
 
     def let_go(self) -> None:
         """The hand is empty from now on."""

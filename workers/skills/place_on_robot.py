@@ -64,11 +64,11 @@ async def _stands_at(ctx: SkillContext, carrier: str, place: str) -> PointM:
     """Where the carrier stands, by the state that its worker publishes."""
 
     def there() -> bool:
-        state = ctx.robot_state(carrier)
+        state = ctx.world.robots.get(carrier)
         return state is not None and state.pose_m_rad is not None and state.place == place
 
     if not await ctx.world.until(there, STATE_S):
-        state = ctx.robot_state(carrier)
+        state = ctx.world.robots.get(carrier)
         if state is None or state.pose_m_rad is None:
             raise SkillFailed(f"{carrier} does not say where it is: is its worker running?")
         where = state.place
@@ -97,5 +97,5 @@ async def _arrived(ctx: SkillContext, object: str, carrier: str) -> bool:
 
 
 def _in_basket(ctx: SkillContext, object: str, carrier: str) -> bool:
-    state = ctx.robot_state(carrier)
+    state = ctx.world.robots.get(carrier)
     return state is not None and object in state.basket

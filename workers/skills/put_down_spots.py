@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import cos, dist, sin
+from math import dist
 
 from keyexpr_schema.payloads.motions import PointM
 from keyexpr_schema.payloads.world import Place, Surface
@@ -35,9 +35,9 @@ def surface_spots(
             inward = min(half_l - abs(along), half_w - abs(across))
             if inward > REACH_IN_M:
                 continue
-            spot = _to_world(surface, along, across)
-            if _free(spot, occupied, APART_M):
-                spots.append((*spot, surface.z_m))
+            spot = surface.point_m(along, across)
+            if _free(spot[:2], occupied, APART_M):
+                spots.append(spot)
     return tuple(sorted(spots, key=lambda s: dist(s[:2], robot)))
 
 
@@ -54,7 +54,7 @@ def floor_spots(
         for cell in cells(place, WALL_M)
         if _free(cell, occupied, APART_M)
         and _free(cell, (*robots, robot), ROBOT_M)
-        and all(_outside_m(surface, cell) >= FURNITURE_M for surface in place.surfaces)
+        and all(surface.distance_m(*cell) >= FURNITURE_M for surface in place.surfaces)
     ]
     return tuple(sorted(spots, key=lambda s: dist(s[:2], robot)))
 
@@ -63,7 +63,7 @@ def candidates(
     place: Place, occupied: Sequence[PointM2], robots: Sequence[PointM2], robot: PointM2
 ) -> tuple[PointM, ...]:
     """All spots, in the order in which to try them: the nearest surface's first, floor last."""
-    nearest = sorted(place.surfaces, key=lambda s: _outside_m(s, robot))
+    nearest = sorted(place.surfaces, key=lambda s: s.distance_m(*robot))
     found = [spot for surface in nearest for spot in surface_spots(surface, occupied, robot)]
     return (*found, *floor_spots(place, occupied, robots, robot))
 
@@ -73,20 +73,6 @@ def away_from(
 ) -> tuple[PointM, ...]:
     """The spots farther than `apart_m` from every tried one: where those failed, so would these."""
     return tuple(s for s in spots if all(dist(s, t) > apart_m for t in tried))
-
-
-def _to_world(surface: Surface, along: float, across: float) -> PointM2:
-    c, s = cos(surface.yaw_rad), sin(surface.yaw_rad)
-    return surface.x_m + c * along - s * across, surface.y_m + s * along + c * across
-
-
-def _outside_m(surface: Surface, point: PointM2) -> float:
-    """Distance from a point to a surface, on the floor plan; 0 under it."""
-    c, s = cos(surface.yaw_rad), sin(surface.yaw_rad)
-    dx, dy = point[0] - surface.x_m, point[1] - surface.y_m
-    along = max(0.0, abs(c * dx + s * dy) - surface.length_m / 2)
-    across = max(0.0, abs(-s * dx + c * dy) - surface.width_m / 2)
-    return dist((0.0, 0.0), (along, across))
 
 
 def _free(spot: PointM2, taken: Iterable[PointM2], apart_m: float) -> bool:

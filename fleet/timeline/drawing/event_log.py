@@ -119,10 +119,7 @@ def fact(now: Fact, before: Fact | None) -> Iterator[Line]:
     if before is not None and before.value == now.value:
         return
     was = f" (was {render_value(before.value)})" if before is not None else ""
-    yield (
-        INFO,
-        f"{now.source} says {now.literal}{was}",
-    )
+    yield INFO, f"{now.source} says {now.literal}{was}"
 
 
 def robot_spec(now: RobotSpec, before: RobotSpec | None) -> Iterator[Line]:

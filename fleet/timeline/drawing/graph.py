@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 
 import networkx
@@ -12,7 +11,7 @@ from fleet.timeline.drawing.gantt import call_text
 from fleet.timeline.drawing.palette import TASK_STATES
 from fleet.timeline.drawing.sink import Sink, entity
 from fleet.timeline.drawing.text import drawable
-from keyexpr_schema.ids import actor_in
+from keyexpr_schema.ids import actor_in, natural_order
 from keyexpr_schema.payloads.plans import Plan, PlanStatus, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
@@ -157,13 +156,13 @@ def layout(nodes: list[Node]) -> dict[str, tuple[float, float]]:
     rank = _ranks({node.task: node.after for node in nodes})
     row: dict[str, int] = {}
     free: dict[str, int] = {}
-    for node in sorted(nodes, key=lambda node: (rank[node.task], _natural(node.task))):
+    for node in sorted(nodes, key=lambda node: (rank[node.task], natural_order(node.task))):
         below = [row[first] + 1 for first in node.after if first in row]
         row[node.task] = max([free.get(node.lane, 0), *below])
         free[node.lane] = row[node.task] + 1
     positions: dict[str, tuple[float, float]] = {}
     left = 0.0
-    for lane in sorted(free, key=lambda lane: (actor_in(lane) is not None, _natural(lane))):
+    for lane in sorted(free, key=lambda lane: (actor_in(lane) is not None, natural_order(lane))):
         mine = [node for node in nodes if node.lane == lane]
         width = max(GLYPH_PX * len(line) for node in mine for line in node.label.split("\n"))
         width += GAP_PX
@@ -171,14 +170,6 @@ def layout(nodes: list[Node]) -> dict[str, tuple[float, float]]:
             positions[node.task] = (left + width / 2, row[node.task] * ROW_PX)
         left += width
     return positions
-
-
-def _natural(name: str) -> list[tuple[int, str]]:
-    """Sorts `t2` before `t10`."""
-    return [
-        (int(part), "") if part.isdigit() and part.isascii() else (0, part)
-        for part in re.split(r"([0-9]+)", name)
-    ]
 
 
 def _ranks(after: dict[str, tuple[str, ...]]) -> dict[str, int]:

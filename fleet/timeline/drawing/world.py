@@ -170,6 +170,7 @@ class World:
         self, robot: str, doing: str | None, sim_s: float, wall_s: float | None
     ) -> None:
         """Write over the robot what it is called, and what it does (`None`: nothing)."""
+        self._doing[robot] = doing
         root = self._roots.get(robot)
         if root is None and robot not in self._stand_ins:
             return  # its pose is not known

@@ -16,7 +16,8 @@ from cli.errors import BadArgument
 from cli.views.console import console, table
 from cli.views.live import change_line
 from cli.views.plan_tree import in_order, plan_tree
-from cli.views.text import natural_order, outcome
+from cli.views.text import outcome
+from keyexpr_schema.ids import natural_order
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, PlanStatus, Task, Violation
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState

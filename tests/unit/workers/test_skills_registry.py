@@ -129,7 +129,7 @@ def test_installed_skills_come_from_entry_points_and_broken_ones_are_left_out(
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: their-skills\nVersion: 1\n")
     (info / "entry_points.txt").write_text("[robotfleet.skills]\nwave = their_skills:wave\n")
     monkeypatch.syspath_prepend(site)
-    assert "wave" in SkillRegistry.installed(HOUSEHOLD).names
+    assert "wave" in [one.name for one in SkillRegistry.installed(HOUSEHOLD)]
     (info / "entry_points.txt").write_text(
         "[robotfleet.skills]\n"
         "nothere = their_skills:nothere\n"
@@ -137,8 +137,8 @@ def test_installed_skills_come_from_entry_points_and_broken_ones_are_left_out(
         "again = workers.skills.navigate:navigate\n"
         "wave = their_skills:wave\n"
     )
-    names = SkillRegistry.installed(HOUSEHOLD).names
-    assert set(names) == {"wave", *(one.name for one in HOUSEHOLD)}
+    names = {one.name for one in SkillRegistry.installed(HOUSEHOLD)}
+    assert names == {"wave", *(one.name for one in HOUSEHOLD)}
     assert [record.getMessage().partition("cannot be used: ")[2] for record in caplog.records] == [
         "AttributeError: module 'their_skills' has no attribute 'nothere'",
         "BadSkill: it offers 5, which is no @skill",

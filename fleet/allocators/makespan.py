@@ -56,9 +56,8 @@ class MakespanAllocator(Allocator):
             rescheduled = _rescheduled(plan, problem.context, budget, self._seed)
             if rescheduled is not None:
                 return rescheduled
-        schedule = solve(
-            plan.shop, TimeBudget(self._deadline_s, self._clock), self._exact, self._seed
-        )
+        budget = TimeBudget(self._deadline_s, self._clock)
+        schedule = solve(plan.shop, budget, self._exact, self._seed)
         if schedule is None:
             # Robots are so few that rules run into a dead end: what is left is a matching problem.
             chosen = assign_with_least_travel(problem)
@@ -71,10 +70,7 @@ class MakespanAllocator(Allocator):
 def _assignment(plan: PlanShop, schedule: Schedule) -> Assignment:
     """A schedule of the shop in terms of actors and robots."""
     return Assignment(
-        allocation={
-            actor: plan.robots[schedule.machine_of[block]]
-            for block, actor in enumerate(plan.actors)
-        },
+        allocation={a: plan.robots[schedule.machine_of[b]] for b, a in enumerate(plan.actors)},
         actor_order=tuple(plan.actors[b] for b in schedule.order if b < len(plan.actors)),
         lower_bound_s=schedule.lower_bound_s,
         notes=schedule.notes,

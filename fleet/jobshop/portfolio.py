@@ -86,7 +86,10 @@ def _search(
         run = CpSat(instance, best, bound_s, until_s, seed)
     how = "search"
     try:
-        found = anneal(instance, best, budget, bound_s, seed, stopped=lambda: _ended(run))
+        # CP-SAT that has ended has found the best there is, or gave up.
+        found = anneal(
+            instance, best, budget, bound_s, seed, stopped=lambda: run is not None and run.ended
+        )
         if found.cost < best.cost:
             schedule, how = schedule_in_order(instance, found), "annealing"
         if run is not None and not _met(found, bound_s):
@@ -102,11 +105,6 @@ def _search(
         if run is not None:
             run.close()
     return schedule, bound_s, how
-
-
-def _ended(run: CpSat | None) -> bool:
-    """Whether CP-SAT was asked and has ended: it has found the best there is, or gave up."""
-    return run is not None and run.ended
 
 
 def _met(solution: Solution, bound_s: float) -> bool:

@@ -53,12 +53,12 @@ class Planner(ABC):
             )
         if not problem.world.team:
             return NoPlan("no robot is connected")
-        made = self._solve(problem)
-        if isinstance(made, NoPlan):
-            return made
-        if isinstance(made, CheckedPlan) and made.world is problem.world:
-            return made
-        plan = made.plan if isinstance(made, CheckedPlan) else made
+        solved = self._solve(problem)
+        if isinstance(solved, NoPlan):
+            return solved
+        if isinstance(solved, CheckedPlan) and solved.world is problem.world:
+            return solved
+        plan = solved.plan if isinstance(solved, CheckedPlan) else solved
         checked = check_plan(plan, problem.world)
         if isinstance(checked, CheckedPlan):
             return checked

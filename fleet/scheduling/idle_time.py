@@ -27,11 +27,11 @@ Span = tuple[float, float]
 
 @dataclass(frozen=True)
 class IdleTime:
-    """How long the whole took, and how long each robot that counts was busy; both in `unit`."""
+    """How long the whole took, and how long each robot that counts was busy; both in s, or, by the
+    reference's definition, in steps."""
 
     makespan: float
     busy: Mapping[str, float]
-    unit: str = "s"
 
     @property
     def idle(self) -> dict[str, float]:
@@ -60,15 +60,15 @@ def unit_idle(robot_of: Mapping[str, str], after: Mapping[str, Iterable[str]]) -
         Cycle: tasks wait for each other.
     """
     TaskGraph({task: {b for b in after.get(task, ()) if b in robot_of} for task in robot_of})
-    mine: dict[str, list[str]] = defaultdict(list)
+    tasks_of: dict[str, list[str]] = defaultdict(list)
     for task, robot in robot_of.items():
-        mine[robot].append(task)
-    busy = {robot: float(len(tasks)) for robot, tasks in mine.items()}
+        tasks_of[robot].append(task)
+    busy = {robot: float(len(tasks)) for robot, tasks in tasks_of.items()}
     left = set(robot_of)
     steps = 0
     while left:
         begun = []
-        for tasks in mine.values():
+        for tasks in tasks_of.values():
             ready = (task for task in tasks if left.isdisjoint(after.get(task, ())))
             first = next(ready, None)
             if first is not None:
@@ -76,7 +76,7 @@ def unit_idle(robot_of: Mapping[str, str], after: Mapping[str, Iterable[str]]) -
                 begun.append(first)
         left.difference_update(begun)
         steps += 1
-    return IdleTime(float(steps), busy, "steps")
+    return IdleTime(float(steps), busy)
 
 
 def predicted_unit(plan: Plan, allocation: Mapping[str, str]) -> IdleTime:
@@ -117,12 +117,12 @@ def predicted_idle(
 ) -> IdleTime:
     """Our definition, of a plan and its allocation; `fleet` are the robots that could take part."""
     spans = predicted_spans(plan, allocation, sequence)
-    mine: dict[str, list[Span]] = {robot: [] for robot in fleet}
+    spans_of: dict[str, list[Span]] = {robot: [] for robot in fleet}
     for task in plan.tasks:
         for actor in _actors(task.actor, task.args.values()):
-            mine.setdefault(allocation[actor], []).append(spans[task.task])
+            spans_of.setdefault(allocation[actor], []).append(spans[task.task])
     makespan_s = max((end_s for _, end_s in spans.values()), default=0.0)
-    return IdleTime(makespan_s, {robot: union_s(rows) for robot, rows in mine.items()})
+    return IdleTime(makespan_s, {robot: union_s(rows) for robot, rows in spans_of.items()})
 
 
 def measured_unit(records: Iterable[TaskRecord]) -> IdleTime:
@@ -152,14 +152,14 @@ def measured_idle(records: Sequence[TaskRecord], fleet: Iterable[str]) -> IdleTi
     ]
     ends = [record.ended_s for record in records if record.ended_s is not None]
     makespan_s = max(0.0, max(ends) - min(begins)) if begins and ends else 0.0
-    mine: dict[str, list[Span]] = {robot: [] for robot in fleet}
+    spans_of: dict[str, list[Span]] = {robot: [] for robot in fleet}
     for record in records:
         if record.robot is not None:
-            mine.setdefault(record.robot, [])
+            spans_of.setdefault(record.robot, [])
     for record in records:
-        for robot in {record.robot, *record.args.values()} & mine.keys():
-            mine[str(robot)].extend(_spans(record))
-    return IdleTime(makespan_s, {robot: union_s(spans) for robot, spans in mine.items()})
+        for robot in {record.robot, *record.args.values()} & spans_of.keys():
+            spans_of[str(robot)].extend(_spans(record))
+    return IdleTime(makespan_s, {robot: union_s(spans) for robot, spans in spans_of.items()})
 
 
 def union_s(spans: Iterable[Span]) -> float:

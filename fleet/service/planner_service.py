@@ -54,7 +54,6 @@ class PlannerService:
         self._journal = journal
         self._composition = composition
         self._skills = composition.skills
-        self._interpreter = composition.interpreter
         self._policy = replace(
             policy or Policy(),
             interpreter=composition.language_model.configured,
@@ -249,8 +248,8 @@ class PlannerService:
         self._inbox.put_nowait(event)
 
     async def _interpret(self, effect: Interpret) -> None:
-        vocabulary = self._state.vocabulary()
-        read = await asyncio.to_thread(self._interpreter.interpret, effect.text, vocabulary)
+        interpret = self._composition.interpreter.interpret
+        read = await asyncio.to_thread(interpret, effect.text, self._state.vocabulary())
         meaning: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
         self._inbox.put_nowait(events.GoalInterpreted(goal=effect.goal, **meaning, **self._at()))
 

@@ -71,54 +71,55 @@ class _Run:
         planner = self.composition.planners.get(self.job.planner)
         if planner is None or self.job.residual is None:
             return None
-        made = repair_plan(
+        partial = repair_plan(
             self.job.residual,
             self._problem(),
             planner,
             self.composition.feasibility,
             self._reached(),
         )
-        if made is None:
+        if partial is None:
             return None
-        begun = {task.actor for task in made.plan.tasks} & set(self.job.begun_actors)
-        busy = robots_under_way(self.job, made.plan, self.state, begun)
-        found = self._allocate(made.checked, busy)
-        if isinstance(found, NotAllocated):
+        begun = {task.actor for task in partial.plan.tasks} & set(self.job.begun_actors)
+        busy = robots_under_way(self.job, partial.plan, self.state, begun)
+        allocated = self._allocate(partial.checked, busy)
+        if isinstance(allocated, NotAllocated):
             return None
-        if not self.job.reallocation and not made.left_out and not made.changed:
+        if not self.job.reallocation and not partial.left_out and not partial.changed:
             return None  # it is as it was, and there is a reason why that will not do
-        return self._succeeded(made, found, repaired=True)
+        return self._succeeded(partial, allocated, repaired=True)
 
     def planned(self) -> PlanningSucceeded | NoPlan:
         """A new plan; of goals that can be reached, where the job allows that."""
-        made = self._plan()
-        if isinstance(made, NoPlan):
-            return made
-        found = self._allocate(made.checked, robots_under_way(self.job, made.plan, self.state))
-        if isinstance(found, NotAllocated):
-            return NoPlan(found.violations[0].sentence, found.violations)
-        return self._succeeded(made, found)
+        partial = self._plan()
+        if isinstance(partial, NoPlan):
+            return partial
+        busy = robots_under_way(self.job, partial.plan, self.state)
+        allocated = self._allocate(partial.checked, busy)
+        if isinstance(allocated, NotAllocated):
+            return NoPlan(allocated.violations[0].sentence, allocated.violations)
+        return self._succeeded(partial, allocated)
 
     def _succeeded(
-        self, made: PartialPlan, found: Allocated, repaired: bool = False
+        self, partial: PartialPlan, allocated: Allocated, repaired: bool = False
     ) -> PlanningSucceeded:
-        schedule = found.schedule
+        schedule = allocated.schedule
         durations_s = schedule.durations_s
-        timed = (replace(task, duration_s=durations_s[task.task]) for task in made.plan.tasks)
-        notes = (f"goal {goal} is left out: {reason}" for goal, reason in made.left_out.items())
+        timed = (replace(task, duration_s=durations_s[task.task]) for task in partial.plan.tasks)
+        notes = (f"goal {goal} is left out: {reason}" for goal, reason in partial.left_out.items())
         return PlanningSucceeded(
             **self.at,
             job=self.job.job,
-            plan=replace(made.plan, tasks=tuple(timed)),
-            allocation=dict(found.allocation),
+            plan=replace(partial.plan, tasks=tuple(timed)),
+            allocation=dict(allocated.allocation),
             sequence=dict(schedule.sequence),
             extra_after=dict(schedule.extra_after),
             durations_s=durations_s,
             predicted_makespan_s=schedule.makespan_s,
-            lower_bound_s=found.lower_bound_s,
-            notes=(*found.notes, *notes),
+            lower_bound_s=allocated.lower_bound_s,
+            notes=(*allocated.notes, *notes),
             repaired=repaired,
-            left_out=dict(made.left_out),
+            left_out=dict(partial.left_out),
             planning_time_s=0.0,
         )
 
@@ -132,12 +133,12 @@ class _Run:
         kept = checked if pins == plan.pins else check_plan(replace(plan, pins=pins), self.world)
         if isinstance(kept, InvalidPlan):
             return self.allocator.allocate(checked, calm)
-        made = self.allocator.allocate(kept, context)
-        if isinstance(made, NotAllocated) and context.under_way:
-            made = self.allocator.allocate(kept, calm)
-        if isinstance(made, NotAllocated) and kept is not checked:
-            made = self.allocator.allocate(checked, calm)
-        return made
+        allocated = self.allocator.allocate(kept, context)
+        if isinstance(allocated, NotAllocated) and context.under_way:
+            allocated = self.allocator.allocate(kept, calm)
+        if isinstance(allocated, NotAllocated) and kept is not checked:
+            allocated = self.allocator.allocate(checked, calm)
+        return allocated
 
     def _plan(self) -> PartialPlan | NoPlan:
         job, planners = self.job, self.composition.planners
@@ -154,8 +155,8 @@ class _Run:
             )
         problem = self._problem()
         if not job.partial:
-            made = planner.plan(problem)
-            return made if isinstance(made, NoPlan) else PartialPlan(made)
+            plan = planner.plan(problem)
+            return plan if isinstance(plan, NoPlan) else PartialPlan(plan)
         return plan_reachable_goals(planner, self.composition.feasibility, problem, self._reached())
 
     def _problem(self) -> PlanningProblem:

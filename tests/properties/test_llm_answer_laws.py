@@ -15,8 +15,7 @@ from fleet.llm.structured_output import read_answer
 from fleet.planners.base import PlanningProblem
 from fleet.planners.llm.action_elimination import without_redundant_tasks
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema
-from fleet.planners.llm.candidate import candidate_of, merged
-from fleet.planners.llm.verification import verify
+from fleet.planners.llm.candidate import candidate_of, merged, verify
 from keyexpr_schema.payloads.plans import Plan
 from tests.support.household import bring, home, manipulator
 from tests.support.reached import Reached, reaches

@@ -190,19 +190,12 @@ def known_value(variable: FactKey, facts: Mapping[FactKey, Value], world: WorldM
 
 
 def room_left(robot: str, facts: Mapping[FactKey, Value], world: WorldModel) -> int:
-    """How many more objects go into a robot's basket."""
-    return capacity(robot, world) - len(in_basket(robot, facts, world))
+    """How many more objects go into a robot's basket, where all is that its hand does not hold."""
+    held = facts.get(FactKey(HOLDING, robot))
+    inside = (t for t in world.objects if facts.get(FactKey(AT, t)) == robot and held != t)
+    return capacity(robot, world) - sum(1 for _ in inside)
 
 
 def capacity(robot: str, world: WorldModel) -> int:
     """How many objects a robot's basket takes."""
     return int(world.capability(robot, "basket") or 0)
-
-
-def in_basket(robot: str, facts: Mapping[FactKey, Value], world: WorldModel) -> list[str]:
-    """The objects in a robot's basket: at the robot, and not in its hand."""
-    return [
-        thing
-        for thing in world.objects
-        if facts.get(FactKey(AT, thing)) == robot and facts.get(FactKey(HOLDING, robot)) != thing
-    ]

@@ -17,16 +17,15 @@ from fleet.jobshop.time_budget import TimeBudget
 
 HOT, COLD = 0.02, 0.0002
 """Temperatures at the beginning and the end, as shares of the makespan."""
-FIRST_COOLING, LATER_COOLING = 0.25, 0.25
-"""Shares of the time that is left for the first cooling, and for each one after it, which begins
-from the best so far."""
+COOLING = 0.25
+"""Share of the time that is left for each cooling; each begins from the best so far."""
 SHORTEST_S = 0.1
 """No cooling is shorter than this, s."""
 REASSIGN, SWAP = 0.45, 0.6
 """Of all moves so many (and then up to so many) give a block another machine (swap two machines);
 the rest change the order."""
 EXPLORE = 0.15
-"""Share of moves that start anyrank and not on the critical path."""
+"""Share of moves of a block anywhere, and not on the critical path."""
 NEAR = 1e-9
 
 
@@ -47,12 +46,10 @@ def anneal(
     """
     random = Random(seed)
     search = _Search(instance, begin, random, move_price_s, home)
-    share = FIRST_COOLING
     while not budget.over:
-        if search.run(budget.part(share, SHORTEST_S), bound_s, stopped):
+        if search.run(budget.part(COOLING, SHORTEST_S), bound_s, stopped):
             break
         search = _Search(instance, search.best, random, move_price_s, home)
-        share = LATER_COOLING
     return search.best
 
 

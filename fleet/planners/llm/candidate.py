@@ -1,4 +1,4 @@
-"""Candidate plans: from a model's answers to one deordered plan."""
+"""Candidate plans: from a model's answers to one deordered plan, and what that must pass."""
 
 from __future__ import annotations
 
@@ -6,16 +6,19 @@ from collections.abc import Mapping, Sequence
 
 from msgspec.structs import replace
 
+from fleet.core.actors import least_loaded
+from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import ActionSequence, deordered
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, StepAnswer, TaskAnswer
+from fleet.scheduling.plan_schedule import AllocatedPlan
 from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.ids import actor_arg, actor_in, bare_name
 from keyexpr_schema.payloads.goals import Condition, Goal
-from keyexpr_schema.payloads.plans import Plan, Task
+from keyexpr_schema.payloads.plans import Plan, Task, Violation
 
 
 def candidate_of(
@@ -95,9 +98,7 @@ def merged(candidates: Sequence[Plan], problem: PlanningProblem, keep_order: boo
     sequences: list[ActionSequence] = []
     rows: list[Task] = []
     for candidate in candidates:
-        graph = TaskGraph({task.task: task.after for task in candidate.tasks})
-        by_name = {task.task: task for task in candidate.tasks}
-        ordered = [by_name[name] for name in graph.order]
+        ordered = _in_order(candidate)
         rows.extend(ordered)
         robots = {actor_arg(actor): robot for actor, robot in candidate.pins.items()}
         actions = tuple(
@@ -132,15 +133,59 @@ def _with_model_order(
 
 def world_after(candidate: Plan, world: WorldModel) -> WorldModel:
     """The world after a checked candidate, as far as that is settled before robots are chosen."""
-    graph = TaskGraph({task.task: task.after for task in candidate.tasks})
-    by_name = {task.task: task for task in candidate.tasks}
     facts: dict[FactKey, Value] = {}
-    for name in graph.order:
-        task = by_name[name]
-        for literal in world.skills[task.skill].ground(task.args).after:
-            if actor_in(literal.variable.subject) is not None:
-                continue
-            value = literal.value
-            in_hand = actor_in(value) is not None
-            facts[literal.variable] = None if in_hand else value
+    for task in _in_order(candidate):
+        for variable, value in world.skills[task.skill].ground(task.args).after:
+            if actor_in(variable.subject) is None:
+                facts[variable] = value if actor_in(value) is None else None
     return world.with_facts(facts)
+
+
+def _in_order(plan: Plan) -> list[Task]:
+    by_name = {task.task: task for task in plan.tasks}
+    return [by_name[name] for name in TaskGraph({t.task: t.after for t in plan.tasks}).order]
+
+
+def verify(plan: Plan, world: WorldModel) -> CheckedPlan | InvalidPlan:
+    """The plan, if the checker passes it and some allocation of it can be scheduled."""
+    if foreign := _foreign_goals(plan):
+        return InvalidPlan(plan, world, foreign)
+    checked = check_plan(plan, world)
+    if isinstance(checked, InvalidPlan) or not plan.tasks:
+        return checked
+    allocation = least_loaded(checked)
+    if allocation is None:
+        return _invalid(
+            checked,
+            "too-few-robots",
+            "there are fewer able robots than the plan needs at the same time: "
+            "let the same actor do more of it",
+        )
+    allocated = AllocatedPlan(checked, allocation)
+    found = next(allocated.schedules(), None)
+    if found is None:
+        return _invalid(
+            checked,
+            "deadlock",
+            "with the robots there are, some would wait for each other for ever: "
+            "let actors that meet do less in between",
+        )
+    violations = allocated.violations(found)
+    return InvalidPlan(plan, world, violations) if violations else checked
+
+
+def _invalid(checked: CheckedPlan, code: str, sentence: str) -> InvalidPlan:
+    return InvalidPlan(checked.plan, checked.world, (Violation(code=code, sentence=sentence),))
+
+
+def _foreign_goals(plan: Plan) -> tuple[Violation, ...]:
+    return tuple(
+        Violation(
+            code="unknown-goal",
+            sentence=f"{task.task} is for goal {task.goal}; "
+            f"goals are {', '.join(plan.goals) or 'none'}",
+            task=task.task,
+        )
+        for task in plan.tasks
+        if task.goal not in plan.goals
+    )

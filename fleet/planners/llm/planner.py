@@ -14,9 +14,14 @@ from fleet.llm.structured_output import read_answer
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.llm.action_elimination import without_redundant_tasks
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema
-from fleet.planners.llm.candidate import candidate_of, conditions_of, merged, world_after
+from fleet.planners.llm.candidate import (
+    candidate_of,
+    conditions_of,
+    merged,
+    verify,
+    world_after,
+)
 from fleet.planners.llm.prompt_text import problem_text, skills_text, team_skills
-from fleet.planners.llm.verification import verify
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan

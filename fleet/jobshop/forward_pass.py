@@ -195,17 +195,14 @@ def schedule_of(shop: Shop, order: Sequence[int], machine_of: Sequence[int]) -> 
     operations, machines = shop.operations, shop.machines
     predecessors = [list(operation.after) for operation in operations]
     start_s = [0.0] * len(operations)
-    previous: dict[int, int] = {}
+    latest: dict[int, int] = {}
     for block in order:
         machine = machine_of[block]
-        before = previous.get(machine, -1)
         for op in shop.blocks[block].operations:
-            if before >= 0:
-                predecessors[op].append(before)
-            else:
-                start_s[op] = max(start_s[op], machines[machine].ready_s)
-            before = op
-        previous[machine] = before
+            start_s[op] = max(start_s[op], machines[machine].ready_s)
+            if machine in latest:
+                predecessors[op].append(latest[machine])
+            latest[machine] = op
     try:
         sequence = topological(predecessors)
     except BadShop:
@@ -216,9 +213,7 @@ def schedule_of(shop: Shop, order: Sequence[int], machine_of: Sequence[int]) -> 
         operation = operations[op]
         machine = machine_of[operation.blocks[0]]
         kind = machines[machine].kind
-        for before in predecessors[op]:
-            if end_s[before] > start_s[op]:
-                start_s[op] = end_s[before]
+        start_s[op] = max([start_s[op], *(end_s[before] for before in predecessors[op])])
         end_s[op] = start_s[op] + operation.duration_s[kind]
         if operation.target is not None:
             end_s[op] += shop.travel_s[kind][site[machine]][operation.target]

@@ -219,9 +219,8 @@ class Instance:
 
 def _strong_components(predecessors: Sequence[set[int]]) -> list[int]:
     """The strongly connected component of each node; without circles each is its own."""
-    reached = [1 << node for node in range(len(predecessors))]
-    """Bit sets: of two nodes they are the same if each is reached from the other."""
-    before: list[int] = []
+    # Bit sets: of two nodes they are the same if each is reached from the other.
+    reached, before = [1 << node for node in range(len(predecessors))], list[int]()
     while reached != before:
         before = list(reached)
         for node, others in enumerate(predecessors):

@@ -8,7 +8,6 @@ from itertools import islice, pairwise
 
 from fleet.core.checker.plan_checker import CheckedPlan, check_allocation
 from fleet.jobshop.forward_pass import schedule_of
-from fleet.jobshop.problem import Shop
 from fleet.jobshop.sequencing import sequences
 from fleet.jobshop.time_budget import StepClock, TimeBudget
 from fleet.scheduling.allocation_context import AllocationContext
@@ -84,18 +83,12 @@ class AllocatedPlan:
     def schedules(self, thorough: bool = False) -> Iterator[PlanSchedule]:
         """In various orders, the shortest first; none if all that were tried deadlock."""
         search_s = THOROUGH_S if thorough else QUICK_S
-        yield from self._in_orders(self._shop.shop, search_s)
-        # What must be first or last, or is named, may leave no order that the checker passes.
-        simple = self._shop.actors_only()
-        if simple is not self._shop.shop:
-            yield from self._in_orders(simple, search_s)
-
-    def _in_orders(self, shop: Shop, search_s: float) -> Iterator[PlanSchedule]:
         actors = self._shop.actors
-        for blocks in sequences(shop, TimeBudget(search_s, StepClock())):
-            found = self.schedule([actors[b] for b in blocks if b < len(actors)])
-            if found is not None:
-                yield found
+        for shop in self._shop.relaxed():
+            for blocks in sequences(shop, TimeBudget(search_s, StepClock())):
+                found = self.schedule([actors[b] for b in blocks if b < len(actors)])
+                if found is not None:
+                    yield found
 
     def valid_schedule(self, thorough: bool = False) -> PlanSchedule | tuple[Violation, ...]:
         """The shortest one that passes the checker with robots for actors, or what is wrong.

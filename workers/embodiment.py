@@ -14,12 +14,15 @@ To put a real robot behind it, map each `MotionKind` to what the robot offers (`
 
 from __future__ import annotations
 
+from contextlib import AbstractAsyncContextManager
 from typing import Any, Protocol, runtime_checkable
 
+from keyexpr_schema.errors import BrokenPlugIn, SchemaError
 from keyexpr_schema.payloads.motions import Motion, MotionOutcome, Senses
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.plug_ins import load_plug_in
 from keyexpr_schema.transport.session import Session
+from workers.errors import WorkerError
 
 EMBODIMENTS = "robotfleet.embodiments"
 """Entry-point group: each entry is an `EmbodimentFactory`."""
@@ -87,7 +90,8 @@ def installed_embodiment(name: str) -> EmbodimentFactory:
     """The factory that an installed package offers by that name.
 
     Raises:
-        BrokenPlugIn: there is none, or it is not callable.
+        BrokenPlugIn: there is none, or it is not callable; and so does the factory where it makes
+            no embodiment.
     """
 
     def accept(offered: Any) -> EmbodimentFactory:
@@ -95,4 +99,19 @@ def installed_embodiment(name: str) -> EmbodimentFactory:
             raise TypeError(f"{offered!r} is no EmbodimentFactory: it cannot be called")
         return offered  # type: ignore[no-any-return]
 
-    return load_plug_in(EMBODIMENTS, name, accept)
+    factory = load_plug_in(EMBODIMENTS, name, accept)
+
+    def make(session: Session, spec: RobotSpec, incarnation: str, /) -> Embodiment:
+        try:
+            made = factory(session, spec, incarnation)
+        except (WorkerError, SchemaError):
+            raise
+        except Exception as error:  # a stranger's constructor
+            raise BrokenPlugIn(
+                f"embodiment {name!r} cannot be made: {type(error).__name__}: {error}"
+            ) from error
+        if not isinstance(made, (Embodiment, AbstractAsyncContextManager)):
+            raise BrokenPlugIn(f"embodiment {name!r} is {made!r}, which is no Embodiment")
+        return made
+
+    return make

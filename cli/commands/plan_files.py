@@ -49,7 +49,7 @@ async def check(
     ] = None,
     skills: Annotated[
         list[Path] | None,
-        typer.Option("--skills", metavar="FILE", help="Models of skills; else the household's."),
+        typer.Option("--skills", metavar="FILE", help="Models of more skills; repeatable."),
     ] = None,
 ) -> None:
     """Check a plan in a file as the planner would; exit code 0 if nothing speaks against it.

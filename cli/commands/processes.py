@@ -65,7 +65,9 @@ def planner(
     skills: Annotated[
         list[Path] | None,
         typer.Option(
-            "--skills", metavar="FILE", help="Models of skills; repeatable. Else the household's."
+            "--skills",
+            metavar="FILE",
+            help="Models of more skills than the household's; repeatable.",
         ),
     ] = None,
     llm_config: Annotated[

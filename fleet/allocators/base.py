@@ -138,6 +138,12 @@ class Allocator(ABC):
         chosen = self._assign(problem)
         if isinstance(chosen, NotAllocated):
             return chosen
+        for actor, able in problem.able.items():
+            if (robot := chosen.allocation.get(actor)) not in able:
+                sentence = (
+                    f"allocator {self.name} makes {robot} actor {actor}, not {' or '.join(able)}"
+                )
+                return NotAllocated((Violation(code="no-allocation", sentence=sentence),))
         return _scheduled(problem, chosen)
 
     @abstractmethod

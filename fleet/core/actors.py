@@ -70,7 +70,7 @@ def tasks_nobody_can_do(invalid: InvalidPlan) -> tuple[Violation, ...]:
     None if the plan's form is wrong.
     """
     world = invalid.world
-    found = []
+    violations = []
     for task in invalid.plan.tasks if invalid.actions else ():
         action = invalid.actions[task.task]
         for parameter in action.skill.robot_parameters:
@@ -78,14 +78,14 @@ def tasks_nobody_can_do(invalid: InvalidPlan) -> tuple[Violation, ...]:
             if all(lacks):
                 reasons = "; ".join(dict.fromkeys(map(str, lacks))) or "no robot is connected"
                 role = "" if parameter == action.skill.actor_parameter else f" (as its {parameter})"
-                found.append(
+                violations.append(
                     Violation(
                         code="no-robot",
                         sentence=f"no robot can do task {task.task}, {task.skill}{role}: {reasons}",
                         task=task.task,
                     )
                 )
-    return tuple(found)
+    return tuple(violations)
 
 
 def task_counts(plan: Plan) -> dict[str, int]:

@@ -55,7 +55,7 @@ class PlanningJob(msgspec.Struct, frozen=True, kw_only=True):
     strategy: str
     planner: str
     allocator: str
-    first_task: int
+    first_task: int = 1
     proposal: Plan | None = None
     request: str | None = None
     dry_run: bool = False
@@ -70,6 +70,19 @@ class PlanningJob(msgspec.Struct, frozen=True, kw_only=True):
     under_way: tuple[str, ...] = ()
     """Tasks of the plan that were under way when the job was given."""
     reason: ReplanReason | None = None
+
+    @classmethod
+    def of(cls, number: int, plan: Plan, planner: str) -> PlanningJob:
+        """Job `number`: to make `plan`, whatever tasks it has now."""
+        return cls(
+            job=number,
+            plan=plan.plan,
+            revision=plan.revision,
+            goals=plan.goals,
+            strategy=plan.strategy,
+            planner=planner,
+            allocator=plan.allocator,
+        )
 
     @property
     def reallocation(self) -> bool:

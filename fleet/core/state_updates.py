@@ -108,20 +108,24 @@ def cancel(state: State, entry: PlanEntry) -> State:
     return set_entry(state, replace(entry, cancelling=True, job=None))
 
 
-def give_up(state: State, entry: PlanEntry, reason: str) -> State:
-    """End a plan as failed, and with it those of its goals that are not reached."""
-    records = {
+def with_waiting_cancelled(entry: PlanEntry, reason: str) -> dict[str, TaskRecord]:
+    """The entry's records, those of waiting tasks cancelled."""
+    return {
         name: record
         if record.state is not TaskState.WAITING
-        else replace(record, state=TaskState.CANCELLED, reason="the plan failed")
+        else replace(record, state=TaskState.CANCELLED, reason=reason)
         for name, record in entry.records.items()
     }
+
+
+def give_up(state: State, entry: PlanEntry, reason: str) -> State:
+    """End a plan as failed, and with it those of its goals that are not reached."""
     entry = replace(
         entry,
         state=PlanState.FAILED,
         reason=reason,
         replan=None,
-        records=records,
+        records=with_waiting_cancelled(entry, "the plan failed"),
         unwanted=tuple(record.task for record in entry.outstanding()),
         job=None,
     )

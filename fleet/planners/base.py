@@ -10,6 +10,9 @@ from fleet.core.model.world import WorldModel
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan, Violation
 
+BIG_DAG, PER_GOAL, MONOLITHIC = "big-dag", "per-goal", "monolithic"
+"""How tasks for several goals come together; a planner has some of these strategies, or others."""
+
 
 @dataclass(frozen=True)
 class PlanningProblem:
@@ -23,7 +26,7 @@ class PlanningProblem:
     goals: tuple[Goal, ...]
     world: WorldModel
     revision: int = 1
-    strategy: str = "big-dag"
+    strategy: str = BIG_DAG
     allocator: str = "makespan"
     first_task: int = 1
     searched: frozenset[str] = frozenset()

@@ -36,8 +36,6 @@ class StoreClient:
     ) -> None:
         """Put (`data` None: delete), and return when the store has it, or something newer.
 
-        The write is repeated with the same timestamp, so repeating it does no harm.
-
         Raises:
             Unconfirmed: it was not read back within `timeout_s`; it may still arrive.
         """

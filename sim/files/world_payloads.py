@@ -28,7 +28,7 @@ def object_payloads(world: WorldFile) -> tuple[Object, ...]:
     counts: dict[str, int] = {}
     found = []
     for name, entry in world.object_entries.items():
-        kind = world.object_kinds[entry.kind]
+        kind = world.kind_of(name)
         counts[entry.kind] = counts.get(entry.kind, 0) + 1
         found.append(
             Object(

@@ -122,6 +122,10 @@ class WorldFile(FileEntry, frozen=True):
                 return name
         return None
 
+    def kind_of(self, object: str) -> ObjectKind:
+        """What an object looks like."""
+        return self.object_kinds[self.object_entries[object].kind]
+
     def surface(self, name: str) -> Surface:
         """The top of a table."""
         table = self.furniture[name]

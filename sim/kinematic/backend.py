@@ -88,7 +88,7 @@ class KinematicBackend(Backend):
         }
         objects = {}
         for name, entry in world.object_entries.items():
-            mass_kg, point = world.object_kinds[entry.kind].mass_kg, world.start_point_m(name)
+            mass_kg, point = world.kind_of(name).mass_kg, world.start_point_m(name)
             objects[name] = KinematicObject(name, entry.kind, mass_kg, point, entry.on)
         self._state = KinematicState(world, states, objects)
 

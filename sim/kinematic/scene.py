@@ -31,7 +31,7 @@ def draw_scene(world: WorldFile, robots: tuple[str, ...]) -> Scene:
         fixed[solid.name] = ((*solid.center_m, 0.0), _turned(solid.yaw_rad))
     bodies += [_body(name, name, ShapeKind.CYLINDER, _ROBOT_SIZE_M, _ROBOT) for name in robots]
     for name, entry in world.object_entries.items():
-        kind = world.object_kinds[entry.kind]
+        kind = world.kind_of(name)
         length, width, height = (side / 2 for side in kind.extent_m)
         size = {
             "box": (length, width, height),

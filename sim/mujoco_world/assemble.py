@@ -168,8 +168,7 @@ def _add_furniture(worldbody: Any, solid: Solid) -> None:
 
 
 def _add_object(worldbody: Any, world: WorldFile, name: str) -> None:
-    entry = world.object_entries[name]
-    kind = world.object_kinds[entry.kind]
+    entry, kind = world.object_entries[name], world.kind_of(name)
     point, (_, _, yaw) = pose_in(world, name)
     body = worldbody.add_body(name=f"object/{name}", pos=point, quat=yaw_quaternion(yaw))
     body.add_freejoint(name=f"object/{name}")

@@ -64,8 +64,7 @@ def grasp(context: MotionContext, run: MotionRun) -> Steps:
     if robot.held is not None:
         raise MotionFailed(f"the hand is not empty: it holds {robot.held}")
     payload = robot.spec.capabilities.get("grip", 0.0)
-    entry = context.world.object_entries[name]
-    mass = context.world.object_kinds[entry.kind].mass_kg
+    mass = context.world.kind_of(name).mass_kg
     if mass > payload:
         raise MotionFailed(f"{name} weighs {mass:.2f} kg; the hand carries {payload:.2f} kg")
     yield from stow(run)
@@ -74,7 +73,7 @@ def grasp(context: MotionContext, run: MotionRun) -> Steps:
     yield from face(run, point[0], point[1])
     point = _refined(context, robot, name, point)
     yield from face(run, point[0], point[1])
-    grip_m = _grip_above_base(gripper, context.observer.height_m(name))
+    grip_m = _grip_above_base(gripper, context.world.kind_of(name).extent_m[2])
     target = (point[0], point[1], point[2] + grip_m)
     path = reach_down(arm, target, context.observer.opening_rad(name))
     robot.grip_above_base_m = grip_m
@@ -270,5 +269,4 @@ def _check_free(context: MotionContext, robot: RobotBody, held: str, point: Poin
 
 def width_m(context: MotionContext, name: str) -> float:
     """The larger horizontal extent of an object [m]."""
-    entry = context.world.object_entries[name]
-    return max(context.world.object_kinds[entry.kind].extent_m[:2])
+    return max(context.world.kind_of(name).extent_m[:2])

@@ -59,15 +59,9 @@ class Observer:
         x, y, z = (float(v) for v in self._data.xpos[self._objects[object]])
         return (x, y, z)
 
-    def height_m(self, object: str) -> float:
-        """How high an object is when it stands."""
-        entry = self._world.object_entries[object]
-        return self._world.object_kinds[entry.kind].extent_m[2]
-
     def opening_rad(self, object: str) -> float | None:
         """The heading along which fingers shall open around it; `None` for a round thing."""
-        entry = self._world.object_entries[object]
-        kind = self._world.object_kinds[entry.kind]
+        kind = self._world.kind_of(object)
         if kind.shape != "box":
             return None
         frame = self._data.xmat[self._objects[object]].reshape(3, 3)
@@ -150,7 +144,7 @@ class Observer:
         eye = np.array(self._data.site_xpos[robot.camera])
         ahead = self._data.site_xmat[robot.camera].reshape(3, 3)[:, 0]
         base = np.array(self.base_point(object))
-        length, width, height = self._extent(object)
+        length, width, height = self._world.kind_of(object).extent_m
         to = base + np.array([0.0, 0.0, height / 2]) - eye
         if np.linalg.norm(to) > robot.spec.capabilities.get("see", 0.0):
             return False
@@ -196,9 +190,6 @@ class Observer:
             if surface.distance_m(x, y) == 0.0 and abs(z - surface.z_m) < 0.06:
                 return surface.surface
         return FLOOR
-
-    def _extent(self, object: str) -> tuple[float, float, float]:
-        return self._world.object_kinds[self._world.object_entries[object].kind].extent_m
 
 
 def _support(

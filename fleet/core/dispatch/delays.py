@@ -14,7 +14,7 @@ SAME_CLOCK_S = 86400.0
 """The fleet's clock is Unix time where the two are no further apart than this, s."""
 
 
-def late_at_s(record: TaskRecord) -> float | None:
+def _late_at_s(record: TaskRecord) -> float | None:
     """When a task that runs counts as late, on the fleet's clock, s."""
     if record.started_s is None:
         return None
@@ -23,8 +23,8 @@ def late_at_s(record: TaskRecord) -> float | None:
 
 def late_task(state: State, entry: PlanEntry) -> TaskRecord | None:
     """A task that is late now, was not yet reacted to, and whose robot has more to do."""
-    for record in _that_matter(entry):
-        at_s = late_at_s(record)
+    for record in _to_be_watched(entry):
+        at_s = _late_at_s(record)
         if at_s is not None and at_s <= state.time_s:
             return record
     return None
@@ -38,8 +38,8 @@ def next_lateness(state: State) -> float | None:
         at_s
         for entry in state.plans.values()
         if not entry.ended and entry.job is None and entry.replan is None
-        for record in _that_matter(entry)
-        if (at_s := late_at_s(record)) is not None
+        for record in _to_be_watched(entry)
+        if (at_s := _late_at_s(record)) is not None
     ]
     return min(times, default=None)
 
@@ -56,7 +56,7 @@ def behind_s(state: State, robot: str) -> float:
     return 0.0
 
 
-def _that_matter(entry: PlanEntry) -> list[TaskRecord]:
+def _to_be_watched(entry: PlanEntry) -> list[TaskRecord]:
     """Tasks that run and were not reacted to, of robots that have more to do."""
     current = list(entry.current())
     running = [r for r in current if r.state is TaskState.RUNNING and r.task not in entry.late]

@@ -15,10 +15,10 @@ from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import PlanEntry, ReplanScope
 from fleet.core.revision.replanning import start_replanning
 from fleet.core.state import State
-from fleet.core.state_updates import give_up, mark_goals, set_entry
+from fleet.core.state_updates import give_up, mark_goals, set_entry, with_waiting_cancelled
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import PlanState
-from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
+from keyexpr_schema.payloads.tasks import TaskState
 
 
 def advance(state: State, skills: Skills) -> State:
@@ -48,12 +48,7 @@ def next_timer(state: State) -> float | None:
 def _cancel(state: State, entry: PlanEntry) -> State:
     if entry.outstanding():
         return state  # their orders now say `cancelled`; the workers' reports bring us back here
-    records = {
-        name: record
-        if record.state in ENDED_TASKS
-        else replace(record, state=TaskState.CANCELLED, reason="the plan was cancelled")
-        for name, record in entry.records.items()
-    }
+    records = with_waiting_cancelled(entry, "the plan was cancelled")
     entry = replace(
         entry, state=PlanState.CANCELLED, cancelling=False, records=records, replan=None
     )

@@ -63,24 +63,11 @@ def _start_planning(state: State, ask: PlanRequest, partial: bool = False) -> St
         allocator=ask.allocator,
         autostart=ask.start,
     )
-    job = _first_job(state, plan, ask.planner)
+    job = PlanningJob.of(state.jobs + 1, plan, ask.planner)
     job = replace(job, request=ask.request, dry_run=ask.dry_run, partial=partial)
     if ask.dry_run:
         return replace(state, jobs=job.job, previews=put(state.previews, ask.request, job))
     return _planning(state, plan, job)
-
-
-def _first_job(state: State, plan: Plan, planner: str) -> PlanningJob:
-    return PlanningJob(
-        job=state.jobs + 1,
-        plan=plan.plan,
-        revision=plan.revision,
-        goals=plan.goals,
-        strategy=plan.strategy,
-        planner=planner,
-        allocator=plan.allocator,
-        first_task=1,
-    )
 
 
 def _planning(state: State, plan: Plan, job: PlanningJob) -> State:
@@ -130,7 +117,8 @@ def plan_proposed(state: State, event: events.PlanProposed, skills: Skills) -> S
     plan = event.plan
     if plan.plan in state.plans or plan.plan in state.past_plans:
         return state
-    return _planning(state, plan, replace(_first_job(state, plan, "symbolic"), proposal=plan))
+    job = PlanningJob.of(state.jobs + 1, plan, "symbolic")
+    return _planning(state, plan, replace(job, proposal=plan))
 
 
 def replan_requested(state: State, event: events.ReplanRequested, skills: Skills) -> State:

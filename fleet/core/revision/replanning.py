@@ -25,14 +25,8 @@ def start_replanning(state: State, entry: PlanEntry) -> State:
         sentence = f"given up after {tried} new plans; the last: {reason.sentence}"
         return give_up(state, entry, sentence)
     revision = entry.plan.revision + 1
-    job = PlanningJob(
-        job=state.jobs + 1,
-        plan=entry.plan.plan,
-        revision=revision,
-        goals=entry.plan.goals,
-        strategy=entry.plan.strategy,
-        planner=entry.planner,
-        allocator=entry.plan.allocator,
+    job = replace(
+        PlanningJob.of(state.jobs + 1, replace(entry.plan, revision=revision), entry.planner),
         first_task=entry.next_task_number + (entry.amendment is not None),
         partial=True,
         # What is being cancelled is not what a new plan could go on with, though it wants the same.

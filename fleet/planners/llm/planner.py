@@ -11,7 +11,7 @@ from fleet.core.model.world import WorldModel
 from fleet.llm.budget import Budget
 from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
 from fleet.llm.structured_output import read_answer
-from fleet.planners.base import NoPlan, Planner, PlanningProblem
+from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, Planner, PlanningProblem
 from fleet.planners.llm.action_elimination import without_redundant_tasks
 from fleet.planners.llm.answers import GraphAnswer, ListAnswer, plan_schema
 from fleet.planners.llm.candidate import (
@@ -27,10 +27,6 @@ from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan
 
 log = logging.getLogger(__name__)
-
-MONOLITHIC = "monolithic"
-PER_GOAL = "per-goal"
-BIG_DAG = "big-dag"
 
 
 class LlmPlanner(Planner):

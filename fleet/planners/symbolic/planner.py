@@ -21,7 +21,7 @@ from math import inf, prod
 from fleet.core.actors import carried_at_end, least_loaded
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.model.world import WorldModel
-from fleet.planners.base import NoPlan, Planner, PlanningProblem
+from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, Planner, PlanningProblem
 from fleet.planners.deordering import ActionSequence, deordered
 from fleet.planners.symbolic.action_sequences import (
     UNLOADING_S,
@@ -36,7 +36,6 @@ from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
 from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.plans import Plan
 
-BIG_DAG, PER_GOAL, MONOLITHIC = "big-dag", "per-goal", "monolithic"
 MAX_COMBINATIONS = 64
 """Up to this many combinations are all compared; beyond, one sequence is changed at a time."""
 MAX_RESTORATIONS = 2

@@ -69,7 +69,7 @@ def open_stream(out: Path, name: str, live_port: int | None = None) -> rr.Record
     """
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        out.touch()
+        out.open("ab").close()
     except OSError as error:
         raise UnwritableRecording(
             f"cannot record to {out}: {error.strerror or error}; name a file you may write"

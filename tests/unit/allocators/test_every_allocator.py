@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fleet.allocators.base import Allocated, Allocator, NotAllocated
+from fleet.allocators.base import Allocated, AllocationProblem, Allocator, Assignment, NotAllocated
 from fleet.allocators.cost_based import CostBasedAllocator
 from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.allocators.round_robin import RoundRobinAllocator
@@ -55,6 +55,26 @@ def test_a_plan_without_tasks_is_allocated(allocator: Allocator) -> None:
     made = allocator.allocate(checked(drives(), home()))
     assert isinstance(made, Allocated)
     assert made.allocation == {}
+
+
+class Careless(Allocator):
+    """Answers what it was made with, whatever it is asked."""
+
+    name = "careless"
+
+    def __init__(self, answer: dict[str, str]) -> None:
+        self.answer = answer
+
+    def _assign(self, problem: AllocationProblem) -> Assignment:
+        return Assignment(self.answer)
+
+
+@pytest.mark.parametrize("answer", [{}, {"a0": "martian"}, {"a0": "c1"}])
+def test_an_answer_with_robots_that_cannot_be_the_actors_is_refused(answer: dict[str, str]) -> None:
+    made = Careless(answer).allocate(checked(drives("c2"), home(TEAM)))
+    assert isinstance(made, NotAllocated)
+    said = f"allocator careless makes {answer.get('a0')} actor a0, not c2"
+    assert [violation.sentence for violation in made.violations] == [said]
 
 
 @pytest.mark.parametrize("allocator", PLAIN, ids=lambda allocator: allocator.name)

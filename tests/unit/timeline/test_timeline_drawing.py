@@ -17,7 +17,9 @@ from fleet.timeline.drawing.sink import Sink, open_stream
 from fleet.timeline.drawing.text import DRAWN, drawable
 from fleet.timeline.drawing.trails import CORNERS, Trail
 from fleet.timeline.drawing.utilisation import Utilisation
+from fleet.timeline.drawing.world import World
 from fleet.timeline.reader import rows
+from keyexpr_schema.payloads.robots import RobotActivity, RobotSpec, RobotState
 from keyexpr_schema.payloads.tasks import TaskState
 from tests.support.reached import Reached, reaches
 from tests.support.timeline_mission import STEPS, record
@@ -212,3 +214,18 @@ def test_text_that_can_be_drawn_stays_and_other_text_becomes_plainer() -> None:
     fine = "Bring die Tasse in den Flur, “schön”; Ελλάς, кухня ✓"
     assert drawable(fine) == fine
     assert drawable("scho\u0308n ﬁne\tcup ☕杯\u200b") == "schön fine cup ??"
+
+
+def test_a_label_that_is_drawn_anew_keeps_what_the_robot_does(tmp_path: Path) -> None:
+    path = tmp_path / "label.rrd"
+    stream = open_stream(path, "test")
+    world = World(Sink(stream, Clock()), Palette())
+    world.robot_label("hsr", "pick cup_1", 1.0, None)  # nobody knows yet where it is
+    pose = (1.0, 2.0, 0.0)
+    here = RobotState(robot="hsr", incarnation="i", activity=RobotActivity.BUSY, pose_m_rad=pose)
+    world.state(here, 2.0, 2.0)
+    world.robot(RobotSpec(robot="hsr", model="hsr", label="HSR", skills=(), capabilities={}))
+    stream.disconnect()
+    labels = [row.value for row in rows(path, "/world/robots/hsr/label", "labels")]
+    assert ["hsr: pick cup_1"] in labels
+    assert ["HSR: pick cup_1"] in labels

@@ -123,10 +123,10 @@ async def _one_try(
     if running.cancelled():
         reason = f"unexpected error in skill {name}: it cancelled itself"
         return _TryFailure(ReportState.FAILED, reason, False, again=False)
-    return _of(name, error, on_failure)
+    return _failure_of(name, error, on_failure)
 
 
-def _of(
+def _failure_of(
     name: str, error: BaseException | None, on_failure: Callable[[SkillFailed], None]
 ) -> _TryFailure:
     if isinstance(error, SkillFailed):

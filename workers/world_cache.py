@@ -67,13 +67,6 @@ class WorldCache:
         """The known objects of which the facts say that they are at `place`, sorted."""
         return tuple(sorted(o for o in self.objects if self.value_of(AT, o) == place))
 
-    def surface_place(self, surface: str) -> str | None:
-        """The place that a surface stands in."""
-        for place in self.places.values():
-            if any(s.surface == surface for s in place.surfaces):
-                return place.place
-        return None
-
     def whereabouts(self, seen: Detection) -> str | None:
         """The value of `at(object)` that a detection shows.
 
@@ -85,8 +78,9 @@ class WorldCache:
                 return seen.place
             x_m, y_m, _ = seen.point_m
             return next((p.place for p in self.places.values() if p.contains(x_m, y_m)), None)
-        if (place := self.surface_place(seen.support)) is not None:
-            return place
+        for place in self.places.values():
+            if any(surface.surface == seen.support for surface in place.surfaces):
+                return place.place
         return seen.support if seen.support in self.specs else None
 
 

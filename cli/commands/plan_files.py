@@ -122,9 +122,9 @@ async def _with_goals(session: Session, plan: Plan) -> Plan:
 
 
 def _size(plan: Plan, world: WorldModel) -> str:
-    tasks = f"{len(plan.tasks)} tasks" if len(plan.tasks) != 1 else "1 task"
-    actors = len({task.actor for task in plan.tasks})
-    return f"{tasks}, {actors} actors, for {' and '.join(world.team) or 'nobody'}"
+    tasks, actors = len(plan.tasks), len({task.actor for task in plan.tasks})
+    size = f"{tasks} task{'s' * (tasks != 1)}, {actors} actor{'s' * (actors != 1)}"
+    return f"{size}, for {' and '.join(world.team) or 'nobody'}"
 
 
 async def propose(

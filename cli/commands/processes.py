@@ -229,7 +229,6 @@ def parse_speed(written: str) -> float | None:
 
 
 def _first(flag: T | None, setting: T | None, default: T) -> T:
-    """The first that says something."""
     return next((each for each in (flag, setting) if each is not None), default)
 
 

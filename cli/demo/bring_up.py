@@ -120,7 +120,6 @@ def _can_be_planned(view: FleetView, robot: str) -> bool:
 async def _token(
     session: Session, key: Key[Any, Any], fixed: dict[str, str], who: str, log: Path
 ) -> None:
-    """Wait until somebody shows the liveliness token."""
     try:
         async with asyncio.timeout(READY_S), session.watch_tokens(key, 0.5, **fixed) as watch:
             async for change in watch:

@@ -37,7 +37,6 @@ class MakespanAllocator(Allocator):
         self,
         deadline_s: float = DEADLINE_S,
         exact: bool = True,
-        seed: int = 0,
         clock: Clock = time.perf_counter,
     ) -> None:
         """`exact` allows CP-SAT, which may take up to a second more to prove an optimum.
@@ -46,18 +45,17 @@ class MakespanAllocator(Allocator):
         """
         self._deadline_s = deadline_s
         self._exact = exact
-        self._seed = seed
         self._clock = clock
 
     def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
         plan = plan_shop(problem.checked, problem.able, problem.apart, problem.context)
         if problem.context.previous_allocation:
             budget = TimeBudget(RESCHEDULE_SHARE * self._deadline_s, self._clock)
-            rescheduled = _rescheduled(plan, problem.context, budget, self._seed)
+            rescheduled = _rescheduled(plan, problem.context, budget)
             if rescheduled is not None:
                 return rescheduled
         budget = TimeBudget(self._deadline_s, self._clock)
-        schedule = solve(plan.shop, budget, self._exact, self._seed)
+        schedule = solve(plan.shop, budget, self._exact)
         if schedule is None:
             # Robots are so few that rules run into a dead end: what is left is a matching problem.
             chosen = assign_with_least_travel(problem)
@@ -78,7 +76,7 @@ def _assignment(plan: PlanShop, schedule: Schedule) -> Assignment:
 
 
 def _rescheduled(
-    plan: PlanShop, context: AllocationContext, budget: TimeBudget, seed: int
+    plan: PlanShop, context: AllocationContext, budget: TimeBudget
 ) -> Assignment | None:
     """The allocation there was, with few actors in other hands."""
     machine = {robot: i for i, robot in enumerate(plan.robots)}
@@ -88,7 +86,7 @@ def _rescheduled(
     home += [block.machines[0] for block in named]
     block_of = {actor: block for block, actor in enumerate(plan.actors)}
     order = [block_of[actor] for actor in context.actor_order if actor in block_of]
-    repaired = reschedule(plan.shop, home, order, budget, seed=seed)
+    repaired = reschedule(plan.shop, home, order, budget)
     if repaired is None:
         return None
     moved = sum(block < len(plan.actors) for block in repaired.moved)

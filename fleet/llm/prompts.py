@@ -45,9 +45,7 @@ def load_prompts(config: LlmConfig) -> Prompts:
             f"there are no prompts {config.prompts!r}; there are {', '.join(versions)}"
         )
     texts = {path.stem: path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.txt"))}
-    if config.rules_dir is None:
-        return Prompts(config.prompts, texts)
-    own = _user_prompts(Path(config.rules_dir), texts)
+    own = {} if config.rules_dir is None else _user_prompts(Path(config.rules_dir), texts)
     if not own:
         return Prompts(config.prompts, texts)
     digest = hashlib.sha256(repr(sorted(own.items())).encode()).hexdigest()[:8]

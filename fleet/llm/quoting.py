@@ -14,7 +14,7 @@ from keyexpr_schema.payloads.plans import Violation
 MAX_TEXT = 300
 """Characters of one label or sentence; more is cut."""
 MAX_VIOLATIONS = 20
-"""Reasons told in one round; more would bury the first, which is often the cause of the others."""
+"""Reasons given in one round; more would bury the first, which is often the cause of the others."""
 
 
 def cleaned(text: str) -> str:

@@ -33,7 +33,14 @@ def run_planning_job(
 ) -> PlanningSucceeded | PlanningFailed:
     """Plan, check and allocate; how it ended, as an event stamped with `at`."""
     started = time.perf_counter()
-    result = _plan_and_allocate(job, state, composition, at)
+    allocator = composition.allocators.get(job.allocator)
+    result: PlanningSucceeded | NoPlan
+    if allocator is None:
+        choices = ", ".join(sorted(composition.allocators))
+        result = NoPlan(f"there is no allocator {job.allocator}: choose one of {choices}")
+    else:
+        run = _Run(job, state, composition, at, state.world(composition.skills), allocator)
+        result = run.repaired() or run.planned()
     took_s = time.perf_counter() - started
     if isinstance(result, PlanningSucceeded):
         return replace(result, planning_time_s=took_s)
@@ -44,17 +51,6 @@ def run_planning_job(
         violations=result.violations,
         planning_time_s=took_s,
     )
-
-
-def _plan_and_allocate(
-    job: PlanningJob, state: State, composition: Composition, at: At
-) -> PlanningSucceeded | NoPlan:
-    allocator = composition.allocators.get(job.allocator)
-    if allocator is None:
-        choices = ", ".join(sorted(composition.allocators))
-        return NoPlan(f"there is no allocator {job.allocator}: choose one of {choices}")
-    run = _Run(job, state, composition, at, state.world(composition.skills), allocator)
-    return run.repaired() or run.planned()
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,6 @@ IDLE_S = 0.05
 
 
 def _print_line(sentence: str) -> None:
-    """Write a line to standard output, at once."""
     sys.stdout.write(f"{sentence}\n")
     sys.stdout.flush()
 

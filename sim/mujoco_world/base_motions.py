@@ -46,7 +46,7 @@ def approach(context: MotionContext, run: MotionRun) -> Steps:
         # that reaches into its basket.
         run.guest_of = host
         yield
-    reach = reach_m(run) if host is None else BESIDE_ROBOT_M
+    reach = _reach_m(run) if host is None else BESIDE_ROBOT_M
     yield from _navigate(
         context, run, lambda: context.navigator.approach(run.robot.name, point, reach)
     )
@@ -62,7 +62,7 @@ def _robot_at(context: MotionContext, run: MotionRun, point: PointM) -> str | No
     return None
 
 
-def reach_m(run: MotionRun) -> tuple[float, float]:
+def _reach_m(run: MotionRun) -> tuple[float, float]:
     """How far from a point a robot may stand to reach it, (least, greatest), m."""
     about = run.robot.description
     if about.arm is None:

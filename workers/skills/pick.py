@@ -41,7 +41,6 @@ async def pick(ctx: SkillContext, object: str, place: str) -> None:
 
 
 async def _find(ctx: SkillContext, object: str, place: str) -> Detection:
-    """The object, seen lying in the place."""
     viewing = Viewing.of(ctx.world.places[place], ctx.spec)
     async with aclosing(looks(ctx, viewing)) as every:
         async for seen in every:

@@ -49,15 +49,15 @@ def contradiction(entry: PlanEntry, fact: Fact, skills: Skills) -> str | None:
 
 def _before(task: str, unfinished: Mapping[str, tuple[TaskRecord, Action]]) -> set[str]:
     """The unfinished tasks that come before a task."""
-    found: set[str] = set()
+    befores: set[str] = set()
     ahead = [task]
     while ahead:
         record = unfinished[ahead.pop()][0]
         for before in (*record.after, *record.behind):
-            if before in unfinished and before not in found:
-                found.add(before)
+            if before in unfinished and before not in befores:
+                befores.add(before)
                 ahead.append(before)
-    return found
+    return befores
 
 
 def why_replan(state: State, entry: PlanEntry, skills: Skills) -> str | None:

@@ -103,7 +103,6 @@ class GoalDraft:
 
 
 def _same(one: Wish, other: Wish) -> bool:
-    """Whether both are about the same thing."""
     return one.key == other.key or (one.subjects == other.subjects and one.open == other.open)
 
 

@@ -8,7 +8,6 @@ from functools import cache
 
 from msgspec.structs import replace
 
-from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, condition_holds
 from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import ActionSequence
@@ -100,7 +99,7 @@ def alternatives_for(
         rides_with = world.value(AT, condition.subject)
         spoken_of = (condition.subject, condition.value, rides_with)
         named = frozenset(robot for robot in world.robots if robot in spoken_of)
-        content = tuple(_signature(action) for action in result.actions)
+        content = tuple((action.skill.name, *action.args.values()) for action in result.actions)
         sequences.setdefault(content, ActionSequence(subgoal.goal, result.actions, named))
     return tuple(sequences.values())[:ALTERNATIVES], found[0][0].facts
 
@@ -181,10 +180,6 @@ def _cheapest_few(
         for number in used:
             charge_s[number] += REUSE_CHARGE_S
     return solutions
-
-
-def _signature(action: Action) -> tuple[str, tuple[str, ...]]:
-    return action.skill.name, tuple(action.args.values())
 
 
 def _representatives(named: Set[Value], subject: str, facts: Facts, world: WorldModel) -> list[str]:

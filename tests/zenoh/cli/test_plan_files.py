@@ -121,7 +121,7 @@ async def test_a_plan_is_edited_checked_and_proposed(
         runs = await robotctl.soon("plan", "propose", str(out), "--id", "ours")
         order = await next_order(session, set())
     assert good.code == 0, good.err
-    assert "is valid: 4 tasks, 1 actors, for hsr" in good.out
+    assert "is valid: 4 tasks, 1 actor, for hsr" in good.out
     assert (connected.code, connected.data) == (0, [])
     assert bad.code == 1
     assert "condition" in bad.out

@@ -189,23 +189,34 @@ def _one_after_the_other(
 def schedule_of(shop: Shop, order: Sequence[int], machine_of: Sequence[int]) -> Schedule | None:
     """The earliest schedule in which machines take blocks in `order`, whatever order that is.
 
-    `None` if they would wait for each other, or if a block stands where it must not.
+    `None` if they would wait for each other. Positions are not looked at, and blocks that `order`
+    leaves out take part in any number of operations at once.
     """
-    instance = Instance(shop, merge=False)
-    predecessors = [list(befores) for befores in instance.predecessors]
-    previous: dict[int, int] = {}
+    operations, machines = shop.operations, shop.machines
+    predecessors = [list(operation.after) for operation in operations]
+    start_s = [0.0] * len(operations)
+    latest: dict[int, int] = {}
     for block in order:
         machine = machine_of[block]
-        if machine in previous:
-            last = instance.operations_of[previous[machine]][-1]
-            predecessors[instance.operations_of[block][0]].append(last)
-        previous[machine] = block
+        for op in shop.blocks[block].operations:
+            start_s[op] = max(start_s[op], machines[machine].ready_s)
+            if machine in latest:
+                predecessors[op].append(latest[machine])
+            latest[machine] = op
     try:
         sequence = topological(predecessors)
     except BadShop:
         return None
-    operations = sorted(op for row in instance.component_operations for op in row)
-    partial = PartialSchedule(instance, list(machine_of))
-    if not partial.place([[operations[number] for number in sequence]]):
-        return None
-    return Schedule(tuple(machine_of), tuple(order), tuple(partial.start_s), tuple(partial.end_s))
+    site = [machine.site for machine in machines]
+    end_s = [0.0] * len(operations)
+    for op in sequence:
+        operation = operations[op]
+        machine = machine_of[operation.blocks[0]]
+        kind = machines[machine].kind
+        start_s[op] = max([start_s[op], *(end_s[before] for before in predecessors[op])])
+        end_s[op] = start_s[op] + operation.duration_s[kind]
+        if operation.target is not None:
+            end_s[op] += shop.travel_s[kind][site[machine]][operation.target]
+        if operation.arrives is not None:
+            site[machine] = operation.arrives
+    return Schedule(tuple(machine_of), tuple(order), tuple(start_s), tuple(end_s))

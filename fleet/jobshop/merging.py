@@ -34,13 +34,6 @@ def with_chains(shop: Shop) -> list[list[int]]:
     return [sorted(rows) for rows in befores]
 
 
-def single(
-    shop: Shop, predecessors: list[list[int]]
-) -> tuple[list[int], list[list[int]], list[Row]]:
-    """Every operation by itself: which one it is, what each waits for, and rows."""
-    return list(range(len(predecessors))), predecessors, _rows(shop)
-
-
 def _rows(shop: Shop) -> list[Row]:
     """Of each operation; the travel between two operations of a block is part of the duration."""
     rows = [

@@ -10,11 +10,12 @@ a component waits for stands before it.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from math import inf
 from typing import NamedTuple
 
-from fleet.jobshop.merging import Row, merged, single, with_chains
-from fleet.jobshop.problem import BadShop, Position, Shop, topological
+from fleet.jobshop.merging import Row, merged, with_chains
+from fleet.jobshop.problem import Position, Shop, topological
 
 
 class MergedOperation(NamedTuple):
@@ -38,21 +39,18 @@ class MergedOperation(NamedTuple):
 
 
 class Instance:
-    """The shop as numbers. With `merge=False` its operations are the shop's, one by one.
+    """The shop as numbers.
 
     Raises:
         BadShop: operations wait for each other in a circle.
     """
 
-    def __init__(self, shop: Shop, merge: bool = True) -> None:
+    def __init__(self, shop: Shop) -> None:
         self.shop = shop
         self.kinds = [machine.kind for machine in shop.machines]
         self.positions = [int(block.position) for block in shop.blocks]
         predecessors = with_chains(shop)
-        order = topological(predecessors)
-        owner, self.predecessors, rows = (
-            merged(shop, predecessors, order) if merge else single(shop, predecessors)
-        )
+        owner, self.predecessors, rows = merged(shop, predecessors, topological(predecessors))
         count = len(rows)
         self.order = topological(self.predecessors)
         self.durations_s = [row.duration_s for row in rows]
@@ -86,7 +84,14 @@ class Instance:
         self._find_components(rows)
         self._find_sites(rows)
         self.weight_sum = sum(row.weight for row in rows) or 1.0
-        self.whole = all(
+        self.has_due = any(row.due_s < inf for row in rows)
+        self.travels = any(target >= 0 for target in self.targets)
+        self.has_positions = any(p != Position.ANYWHERE for p in self.positions)
+
+    @cached_property
+    def whole(self) -> bool:
+        """Whether all times are whole seconds, so that every makespan is."""
+        return all(
             time == int(time)
             for times in (
                 *self.durations_s,
@@ -95,10 +100,6 @@ class Instance:
             )
             for time in times
         )
-        """Whether all times are whole seconds, so that every makespan is."""
-        self.has_due = any(row.due_s < inf for row in rows)
-        self.travels = any(target >= 0 for target in self.targets)
-        self.has_positions = any(p != Position.ANYWHERE for p in self.positions)
 
     def _find_components(self, rows: Sequence[Row]) -> None:
         block_predecessors: list[set[int]] = [set() for _ in self.shop.blocks]
@@ -218,19 +219,12 @@ class Instance:
 
 def _strong_components(predecessors: Sequence[set[int]]) -> list[int]:
     """The strongly connected component of each node; without circles each is its own."""
-    try:
-        topological([sorted(befores) for befores in predecessors])
-        return list(range(len(predecessors)))
-    except BadShop:
-        pass
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
-
-    columns = [before for befores in predecessors for before in befores]
-    ends = [0]
-    for befores in predecessors:
-        ends.append(ends[-1] + len(befores))
-    size = len(predecessors)
-    graph = csr_array(([1] * len(columns), columns, ends), shape=(size, size))
-    labels = connected_components(graph, directed=True, connection="strong")[1]
-    return [int(label) for label in labels]
+    # Bit sets: of two nodes they are the same if each is reached from the other.
+    reached, before = [1 << node for node in range(len(predecessors))], list[int]()
+    while reached != before:
+        before = list(reached)
+        for node, others in enumerate(predecessors):
+            for other in others:
+                reached[node] |= reached[other]
+    label: dict[int, int] = {}
+    return [label.setdefault(bits, len(label)) for bits in reached]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from fleet.core.model.skills import Action
@@ -34,7 +34,7 @@ def deordered(
     overwrites, and for its robots' earlier tasks in the same sequence (deordering by causal links).
     Each robot becomes a new actor in every sequence, or with `one_actor_each` one in all of them.
     """
-    rows: list[tuple[str, str, Action]] = []
+    rows: dict[str, tuple[str, Action, dict[str, str]]] = {}
     pins: dict[str, str] = {}
     actor_count = 0
     actors: dict[str, str] = {}
@@ -43,9 +43,7 @@ def deordered(
         if not one_actor_each:
             actors, named = {}, sequence.named
         for action in sequence.actions:
-            args = dict(action.args)
-            for parameter in action.skill.robot_parameters:
-                robot = args[parameter]
+            for robot in action.participants:
                 if robot not in actors:
                     actor_count += 1
                     # Names stay unique over the revisions of a plan, as the task numbers do.
@@ -53,41 +51,43 @@ def deordered(
                     actors[robot] = f"a{revision}{actor_count}"
                     if robot in named:
                         pins[actors[robot]] = robot
-                args[parameter] = actor_arg(actors[robot])
-            lifted = action.skill.ground(args)
-            rows.append((f"t{first_task + len(rows)}", sequence.goal, lifted))
-    after = _dependencies([(name, action) for name, _, action in rows])
-    reduced = TaskGraph(after).reduced()
+            lifted = {robot: actor_arg(actors[robot]) for robot in action.participants}
+            rows[f"t{first_task + len(rows)}"] = sequence.goal, action, lifted
+    reduced = TaskGraph(_dependencies(rows)).reduced()
     tasks = tuple(
         Task(
-            task=name,
+            task=task,
             skill=action.skill.name,
-            args=dict(action.args),
-            actor=bare_name(action.actor),
-            after=reduced[name],
+            args={name: lifted.get(value, value) for name, value in action.args.items()},
+            actor=bare_name(lifted[action.actor]),
+            after=reduced[task],
             goal=goal,
             duration_s=action.skill.duration_s,
         )
-        for name, goal, action in rows
+        for task, (goal, action, lifted) in rows.items()
     )
     return tasks, pins
 
 
-def _dependencies(rows: Sequence[tuple[str, Action]]) -> dict[str, set[str]]:
+def _dependencies(
+    rows: Mapping[str, tuple[str, Action, Mapping[str, str]]],
+) -> dict[str, set[str]]:
     after: dict[str, set[str]] = {}
     writer: dict[FactKey, str] = {}
     readers: dict[FactKey, set[str]] = defaultdict(set)
     last: dict[str, str] = {}
-    for name, action in rows:
-        reads = {literal.variable for literal in action.before}
-        writes = {literal.variable for literal in action.after}
+    for task, (_, action, lifted) in rows.items():
+        reads, writes = (
+            {FactKey(relation, lifted.get(subject, subject)) for (relation, subject), _ in literals}
+            for literals in (action.before, action.after)
+        )
         befores = {writer[variable] for variable in reads | writes if variable in writer}
         befores.update(*(readers[variable] for variable in writes))
-        befores |= {last[robot] for robot in action.participants if robot in last}
-        last.update(dict.fromkeys(action.participants, name))
+        befores |= {last[actor] for actor in lifted.values() if actor in last}
+        last.update(dict.fromkeys(lifted.values(), task))
         for variable in reads:
-            readers[variable].add(name)
+            readers[variable].add(task)
         for variable in writes:
-            writer[variable], readers[variable] = name, set()
-        after[name] = befores
+            writer[variable], readers[variable] = task, set()
+        after[task] = befores
     return after

@@ -55,42 +55,38 @@ class AllocatedPlan:
         self.checked, self.allocation = checked, allocation
         robot = {actor: (allocation[actor],) for actor in checked.plan.actors}
         self._shop = plan_shop(checked, robot, context=context)
-        self._simple = self._shop.actors_only()
 
     def schedule(self, actor_order: Sequence[str]) -> PlanSchedule | None:
         """The earliest one if robots take actors in this order; `None` on deadlock."""
-        simple = self._simple
-        block_of = {actor: block for block, actor in enumerate(simple.actors)}
+        actors, shop, tasks = self._shop.actors, self._shop.shop, self._shop.tasks
+        block_of = {actor: block for block, actor in enumerate(actors)}
         order = [block_of[actor] for actor in actor_order]
-        machine_of = [block.machines[0] for block in simple.shop.blocks]
-        found = schedule_of(simple.shop, order, machine_of)
+        machine_of = [block.machines[0] for block in shop.blocks]
+        found = schedule_of(shop, order, machine_of)
         if found is None:
             return None
         by_robot: dict[str, list[int]] = {}
         for block in order:
-            by_robot.setdefault(simple.robots[machine_of[block]], []).append(block)
-        blocks, tasks = simple.shop.blocks, simple.tasks
+            by_robot.setdefault(self._shop.robots[machine_of[block]], []).append(block)
         extra_after: dict[str, set[str]] = {}
         for row in by_robot.values():
             for one, later in pairwise(row):
-                first = tasks[blocks[later].operations[0]]
-                extra_after.setdefault(first, set()).add(tasks[blocks[one].operations[-1]])
+                first = tasks[shop.blocks[later].operations[0]]
+                extra_after.setdefault(first, set()).add(tasks[shop.blocks[one].operations[-1]])
         return PlanSchedule(
             dict(zip(tasks, found.start_s, strict=True)),
             dict(zip(tasks, found.end_s, strict=True)),
-            {robot: tuple(simple.actors[b] for b in row) for robot, row in by_robot.items()},
+            {robot: tuple(actors[b] for b in row) for robot, row in by_robot.items()},
             {task: tuple(sorted(befores)) for task, befores in extra_after.items()},
         )
 
     def schedules(self, thorough: bool = False) -> Iterator[PlanSchedule]:
         """In various orders, the shortest first; none if all that were tried deadlock."""
         search_s = THOROUGH_S if thorough else QUICK_S
-        shops = [self._shop] if self._simple is self._shop else [self._shop, self._simple]
-        for made in shops:
-            # What must be first or last, or is named, may leave no order that the checker passes.
-            for blocks in sequences(made.shop, TimeBudget(search_s, StepClock())):
-                actors = [made.actors[b] for b in blocks if b < len(made.actors)]
-                found = self.schedule(actors)
+        actors = self._shop.actors
+        for shop in self._shop.relaxed():
+            for blocks in sequences(shop, TimeBudget(search_s, StepClock())):
+                found = self.schedule([actors[b] for b in blocks if b < len(actors)])
                 if found is not None:
                     yield found
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -34,18 +34,21 @@ class PlanShop:
     robots: tuple[str, ...]
     tasks: tuple[str, ...]
 
-    def actors_only(self) -> PlanShop:
-        """The same, but robots that the plan names take part in any number of tasks at once, and
-        any actor may come first or last."""
+    def relaxed(self) -> Iterator[Shop]:
+        """The shop; behind it, if it is another one, that in which robots that the plan names take
+        part in any number of tasks at once, and any actor may come first or last: what must be
+        first or last, or is named, may leave no order that the checker passes.
+        """
         count, shop = len(self.actors), self.shop
+        yield shop
         if len(shop.blocks) == count and all(b.position == ANY for b in shop.blocks):
-            return self
+            return
         blocks = tuple(replace(block, position=ANY) for block in shop.blocks[:count])
         operations = tuple(
             replace(operation, blocks=tuple(b for b in operation.blocks if b < count))
             for operation in shop.operations
         )
-        return replace(self, shop=replace(shop, blocks=blocks, operations=operations))
+        yield replace(shop, blocks=blocks, operations=operations)
 
 
 def plan_shop(

@@ -53,7 +53,7 @@ class PlanForm:
             raise _Malformed(
                 "unknown-skill", f"there is no skill {task.skill}{_among(self._world.skills)}"
             )
-        if set(task.args) != set(skill.parameters):
+        if task.args.keys() != skill.parameters.keys():
             raise _Malformed(
                 "wrong-arguments",
                 f"{task.skill} takes {', '.join(skill.parameters)}, "

@@ -14,20 +14,9 @@ SAME_CLOCK_S = 86400.0
 """The fleet's clock is Unix time where the two are no further apart than this, s."""
 
 
-def _late_at_s(record: TaskRecord) -> float | None:
-    """When a task that runs counts as late, on the fleet's clock, s."""
-    if record.started_s is None:
-        return None
-    return record.started_s + FACTOR * record.duration_s + MARGIN_S
-
-
 def late_task(state: State, entry: PlanEntry) -> TaskRecord | None:
     """A task that is late now, was not yet reacted to, and whose robot has more to do."""
-    for record in _to_be_watched(entry):
-        at_s = _late_at_s(record)
-        if at_s is not None and at_s <= state.time_s:
-            return record
-    return None
+    return next((task for at_s, task in _when_late(entry) if at_s <= state.time_s), None)
 
 
 def next_lateness(state: State) -> float | None:
@@ -38,8 +27,7 @@ def next_lateness(state: State) -> float | None:
         at_s
         for entry in state.plans.values()
         if not entry.ended and entry.job is None and entry.replan is None
-        for record in _to_be_watched(entry)
-        if (at_s := _late_at_s(record)) is not None
+        for at_s, _ in _when_late(entry)
     ]
     return min(times, default=None)
 
@@ -56,9 +44,14 @@ def behind_s(state: State, robot: str) -> float:
     return 0.0
 
 
-def _to_be_watched(entry: PlanEntry) -> list[TaskRecord]:
-    """Tasks that run and were not reacted to, of robots that have more to do."""
+def _when_late(entry: PlanEntry) -> list[tuple[float, TaskRecord]]:
+    """When tasks that run count as late, on the fleet's clock [s]: those that were not reacted to,
+    of robots that have more to do."""
     current = list(entry.current())
     running = [r for r in current if r.state is TaskState.RUNNING and r.task not in entry.late]
     waiting = {r.robot for r in current if r.state is TaskState.WAITING} if running else set()
-    return [record for record in running if record.robot in waiting]
+    return [
+        (record.started_s + FACTOR * record.duration_s + MARGIN_S, record)
+        for record in running
+        if record.robot in waiting and record.started_s is not None
+    ]

@@ -91,13 +91,13 @@ class SkillModel:
         """
 
         def fill(rows: Iterable[Literal]) -> tuple[Literal, ...]:
-            return tuple(
+            return tuple([
                 Literal(
                     FactKey(relation, args[subject]),
                     args[value] if isinstance(value, str) and value in self.parameters else value,
                 )
                 for (relation, subject), value in rows
-            )
+            ])  # fmt: skip
 
         return Action(
             self,

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
+from itertools import cycle, product
 from math import inf, prod
 
 from fleet.core.actors import carried_at_end, least_loaded
@@ -201,14 +201,15 @@ def _best(
     else:
         current = [alternatives[0] for alternatives in options]
         better(candidate(current))
-        improved = True
-        while improved:
-            improved = False
-            for number, alternatives in enumerate(options):
-                for sequence in alternatives:
-                    changed = [*current[:number], sequence, *current[number + 1 :]]
-                    if changed != current and better(candidate(changed)):
-                        current, improved = changed, True
+        unchanged = 0
+        for number, alternatives in cycle(enumerate(options)):
+            if unchanged == len(options):
+                break
+            unchanged += 1
+            for sequence in alternatives:
+                changed = [*current[:number], sequence, *current[number + 1 :]]
+                if changed != current and better(candidate(changed)):
+                    current, unchanged = changed, 1
     return best or failure or NoPlan("no combination of action sequences passes the checker")
 
 

@@ -196,7 +196,9 @@ def uniform_cost_search(
         (
             number,
             action,
-            [(index[row.variable], row.value) for row in action.before if row.variable in index],
+            [index[row.variable] for row in action.before if row.variable in index],
+            [row.value for row in action.before if row.variable in index],
+            [(index[row.variable], row.value) for row in action.after],
         )
         for number, action in enumerate(actions)
         if all(
@@ -218,14 +220,14 @@ def uniform_cost_search(
         facts = {**start, **dict(zip(variables, state, strict=True))}
         if condition_holds(facts, goal):
             return Solution(_path(state, came), spent, facts)
-        for number, action, needs in moves:
-            if not all(state[i] == value for i, value in needs):
+        for number, action, reads, needed, writes in moves:
+            if [state[i] for i in reads] != needed:
                 continue
             if action.space_in and not applicable(action, facts, world):
                 continue
             values = list(state)
-            for variable, value in action.after:
-                values[index[variable]] = value
+            for i, value in writes:
+                values[i] = value
             reached = tuple(values)
             total = spent + cost_s(number, facts)
             if total < best.get(reached, float("inf")):

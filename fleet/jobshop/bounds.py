@@ -10,6 +10,8 @@
   subgradient steps.
 - Travel: each block comes after another one, or after a machine's start, each of those once; the
   cheapest assignment is what machines travel at least (the assignment relaxation of routing).
+
+`portfolio.solve` takes the largest of these and of what branch and bound or CP-SAT prove by search.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The ready set: tasks whose turn has come and whose robots are free, ordered at once."""
+"""The ready set: tasks whose turn has come and whose robots are free, ordered at once.
+
+The dispatcher asks for each waiting task, plans by priority and tasks in the plan's order.
+"""
 
 from __future__ import annotations
 

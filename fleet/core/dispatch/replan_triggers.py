@@ -1,10 +1,10 @@
 """Replan triggers: what comes up that a plan does not provide for.
 
 Here are facts against it, finds, conditions that do not hold at its end, and robots that came. A
-task that failed is one in `handlers.reports`, a robot lost or late in `lost_robots` and `delays`, a
-goal that changed in `handlers.goals`, a person's word in `handlers.requests`. Each sets
-`PlanEntry.replan`; `revision.replanning` makes a planning job of it, which `planners.plan_repair`
-answers.
+task that failed is one in `handlers.reports`, one that cannot start in `ready_tasks`, a robot lost
+or late in `lost_robots` and `delays`, a goal that changed in `handlers.goals`, a person's word in
+`handlers.requests`. Each sets `PlanEntry.replan`; `revision.replanning` makes a planning job of it,
+and the shell runs that: `planners.plan_repair` first, a new plan otherwise.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The verbs that goals use, in the forms that sentences use."""
+"""The verbs that goals use, in the forms that sentences use, and the conditions they ask for."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from fleet.language.words.tokens import Phrase, tokens_of
 
 
 class VerbSense(Enum):
-    """What a verb asks for."""
+    """What a verb asks for, as the condition that shall hold."""
 
-    MOVE = "move"
+    MOVE = "move"  # at(object) = place: `goals.moving`, as GO and GIVE
     FETCH = "fetch"  # MOVE, and where to may be said later
-    GO = "go"
-    FIND = "find"
-    SEARCH = "search"
-    PICK = "pick"
-    GIVE = "give"
-    TIDY = "tidy"
+    GO = "go"  # at(robot) = place
+    FIND = "find"  # located(object) = true: `goals.clauses`, as SEARCH and PICK
+    SEARCH = "search"  # searched(place) = true
+    PICK = "pick"  # held(object) = true
+    GIVE = "give"  # at(object) = robot
+    TIDY = "tidy"  # at(object) = its home: `goals.tidying`
     PATROL = "patrol"  # SEARCH, or going from place to place if a robot is named
 
 

@@ -163,6 +163,8 @@ async def test_a_viewer_can_look_on_while_it_records(router, session_config, tmp
             looking = viewer.start([line.split()[-1], "--save", str(seen)])
             await session.confirm(GOAL_SPEC, GoalAddress(goal="g1"), Goal(goal="g1", text="see"))
             await until_written(out, "/fleet/log/goals", "text", 1)
+            # Whoever has not connected when the recorder ends gets nothing.
+            await until(seen.exists, "what the viewer saves")
         process.send_signal(signal.SIGTERM)
         assert await asyncio.to_thread(process.wait, DEADLINE_S) == 0
         await until_written(seen, "/fleet/log/goals", "text", 1)

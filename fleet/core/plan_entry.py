@@ -8,12 +8,11 @@ from enum import Enum
 import msgspec
 from msgspec.structs import replace
 
+from fleet.core.model.skills import Skills
+from fleet.core.plan_index import EMPTY_INDEX, PlanGraph, PlanIndex
 from fleet.core.table import Table
 from keyexpr_schema.payloads.plans import ENDED_PLANS, Plan, PlanChange, PlanState, Task, Violation
-from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
-
-OUTSTANDING = frozenset({TaskState.ORDERED, TaskState.RUNNING})
-"""Tasks that a robot has an order for."""
+from keyexpr_schema.payloads.tasks import TaskRecord
 
 
 class ReplanScope(Enum):
@@ -91,7 +90,7 @@ class PlanningJob(msgspec.Struct, frozen=True, kw_only=True):
         return self.reason is not None and self.reason.scope is ReplanScope.REALLOCATE
 
 
-class PlanEntry(msgspec.Struct, frozen=True, kw_only=True):
+class PlanEntry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A plan with everything the planner keeps about it.
 
     `records` hold the tasks of every revision; `plan` only those of the current one. With a
@@ -125,6 +124,7 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True):
     reason: str | None = None
     violations: tuple[Violation, ...] = ()
     changed_s: float = 0.0
+    index: PlanIndex = EMPTY_INDEX
 
     @property
     def ended(self) -> bool:
@@ -142,7 +142,17 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True):
 
     def outstanding(self) -> list[TaskRecord]:
         """Tasks that a robot has an order for."""
-        return [record for record in self.records.values() if record.state in OUTSTANDING]
+        return [self.records[task] for task in self.index.outstanding]
+
+    def indexed(self, known: PlanEntry | None, skills: Skills) -> PlanEntry:
+        """The entry with its index, as far as it differs from the entry `known` before."""
+        graph = known.index.graph if known is not None else None
+        if known is None or known.plan.tasks is not self.plan.tasks or graph is None:
+            graph = PlanGraph(self.current(), skills)
+        elif known.records is self.records:
+            return self
+        names = (task.task for task in self.plan.tasks)
+        return replace(self, index=PlanIndex.of(names, self.records, graph))
 
     def to_replan(self, scope: ReplanScope, sentence: str) -> PlanEntry:
         """The entry with a new reason to make the plan again, in place of one before."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from fleet.core.plan_entry import PlanEntry, ReplanScope
+from fleet.core.plan_entry import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import set_entry
-from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
+from keyexpr_schema.payloads.tasks import TaskState
 
 
 def fail_tasks_of_lost_robots(state: State) -> State:
@@ -18,8 +18,9 @@ def fail_tasks_of_lost_robots(state: State) -> State:
         reason = f"robot {robot} has been away for {state.policy.lost_after_s:g} s"
         if robot not in state.robots:
             reason = f"robot {robot} was unregistered"
-        for entry in state.plans.values():
-            if entry.ended or not _needs(entry, robot):
+        for plan in state.index.active:
+            entry = state.plans[plan]
+            if robot not in entry.index.needs:
                 continue
             failed = {
                 record.task: replace(record, state=TaskState.FAILED, reason=reason)
@@ -34,21 +35,14 @@ def fail_tasks_of_lost_robots(state: State) -> State:
 
 def next_loss(state: State) -> float | None:
     """The Unix time [s] at which a robot that is away becomes lost to a plan that counts on it."""
-    counting = [
-        entry
-        for entry in state.plans.values()
-        if not entry.ended and entry.job is None and entry.replan is None
-    ]
+    if not state.gone_since:
+        return None
+    active = (state.plans[plan] for plan in state.index.active)
+    counting = [entry for entry in active if entry.job is None and entry.replan is None]
     times = [
         since + state.policy.lost_after_s
         for robot, since in state.gone_since.items()
-        if any(_needs(entry, robot) for entry in counting)
+        if any(robot in entry.index.needs for entry in counting)
     ]
     return min(times, default=None)
 
-
-def _needs(entry: PlanEntry, robot: str) -> bool:
-    return any(
-        record.state not in ENDED_TASKS and robot in (record.robot, *record.args.values())
-        for record in entry.current()
-    )

@@ -9,15 +9,12 @@ and the shell runs that: `planners.plan_repair` first, a new plan otherwise.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from fleet.core.model.preconditions import action_of
-from fleet.core.model.skills import Action
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
+from fleet.core.plan_entry import PlanEntry, ReplanScope
+from fleet.core.plan_index import OUTSTANDING
 from fleet.core.state import State
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import GoalState
-from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact
 
 
@@ -27,38 +24,16 @@ def contradiction(state: State, entry: PlanEntry, fact: Fact) -> str | None:
     What a robot says of the work it is doing is part of that work.
     """
     known = fact.key
-    unfinished = {
-        record.task: (record, action)
-        for record in entry.current()
-        if record.state not in ENDED_TASKS
-        and (action := action_of(record, state.skills)) is not None
-    }
-    for record, action in unfinished.values():
-        needed = [literal for literal in action.before if literal.variable == known]
+    for task in entry.index.exposed.get(known, ()):
+        record = entry.records[task]
+        action = action_of(record, state.skills)
+        needed = [row for row in action.before if row.variable == known] if action else []
         if not needed or needed[0].value == fact.value:
             continue
         if record.state in OUTSTANDING and fact.source == record.robot:
             continue
-        if not any(
-            known == literal.variable
-            for before in _before(record.task, unfinished)
-            for literal in unfinished[before][1].after
-        ):
-            return f"{record.task} needs {needed[0]}, and {fact.source} says otherwise"
+        return f"{record.task} needs {needed[0]}, and {fact.source} says otherwise"
     return None
-
-
-def _before(task: str, unfinished: Mapping[str, tuple[TaskRecord, Action]]) -> set[str]:
-    """The unfinished tasks that come before a task."""
-    befores: set[str] = set()
-    ahead = [task]
-    while ahead:
-        record = unfinished[ahead.pop()][0]
-        for before in (*record.after, *record.behind):
-            if before in unfinished and before not in befores:
-                befores.add(before)
-                ahead.append(before)
-    return befores
 
 
 def why_replan(state: State, entry: PlanEntry) -> str | None:
@@ -68,8 +43,7 @@ def why_replan(state: State, entry: PlanEntry) -> str | None:
         where = world.value(AT, thing)
         if where is not None:
             return f"{thing} was found: it is at {where}"
-    current = list(entry.current())
-    if all(record.state is TaskState.SUCCEEDED for record in current):
+    if entry.index.unfinished == 0:
         for goal in entry.plan.goals:
             status = state.goal_states.get(goal)
             if status is None or status.state is GoalState.REACHED:
@@ -86,8 +60,10 @@ def new_robots(state: State, entry: PlanEntry) -> PlanEntry | None:
     More of a kind that is there already can share what is left. A new kind may help in ways that
     the plan knows nothing of, so that everything is planned again.
     """
+    if not entry.team or entry.team == state.team() or not entry.index.waiting:
+        return None
     new = sorted(set(state.team()) - set(entry.team))
-    if not entry.team or not new or all(r.state is not TaskState.WAITING for r in entry.current()):
+    if not new:
         return None
     reason = f"{' and '.join(new)} can help now"
     kinds = {state.robots[robot].model for robot in entry.team if robot in state.robots}

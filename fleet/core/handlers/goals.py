@@ -8,7 +8,17 @@ from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.plan_entry import ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import believe, cancel, set_entry, set_goal, without_goal
+from fleet.core.state_updates import (
+    believe,
+    cancel,
+    forget_goal,
+    set_entry,
+    set_goal,
+    set_spec,
+    touch,
+    without_goal,
+)
+from fleet.core.touches import Part, Touch
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, read_goal
 from keyexpr_schema.facts import AT, NOTHING, SEARCHED, Value
@@ -22,7 +32,7 @@ def goal_put(state: State, event: events.GoalPut) -> State:
     if state.goals.get(goal.goal) == goal:
         return state
     known_ended = goal.goal not in state.goals and goal.goal in state.goal_states
-    state = replace(state, goals=state.goals.set(goal.goal, goal))
+    state = set_spec(state, goal)
     if known_ended:
         return state  # under an earlier planner
     return _take_goal(state, goal)
@@ -32,17 +42,13 @@ def goal_deleted(state: State, event: events.GoalDeleted) -> State:
     """Drop the goal; a plan that works on it is made again without it."""
     if event.goal not in state.goals:
         return state
-    state = replace(
-        state,
-        goals=state.goals.without(event.goal),
-        goal_states=state.goal_states.without(event.goal),
-    )
-    for entry in state.plans.values():
-        if event.goal in entry.plan.goals and not entry.ended:
-            rest = without_goal(state, entry.plan, event.goal)
-            entry = replace(entry, plan=rest)
-            entry = entry.to_replan(ReplanScope.REALLOCATE, f"goal {event.goal} was deleted")
-            state = set_entry(state, entry) if rest.goals else cancel(state, entry)
+    state = forget_goal(state, event.goal)
+    for plan in state.index.plans_of.get(event.goal, ()):
+        entry = state.plans[plan]
+        rest = without_goal(state, entry.plan, event.goal)
+        entry = replace(entry, plan=rest)
+        entry = entry.to_replan(ReplanScope.REALLOCATE, f"goal {event.goal} was deleted")
+        state = set_entry(state, entry) if rest.goals else cancel(state, entry)
     return state
 
 
@@ -73,9 +79,10 @@ def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
 
 def understand_again(state: State) -> State:
     """Read goals' sentences again, now that there are other names."""
-    for goal in state.goals.values():
+    names = [name for known in state.index.in_state.values() for name in known]
+    for goal in sorted((state.goals[n] for n in names if n in state.goals), key=_in_order):
         status = state.goal_states[goal.goal]
-        read = _understand(state, goal)
+        read, _ = _understand(state, goal)
         if status.state is GoalState.REJECTED and read.reason != status.reason:
             state = _take_goal(state, goal)
         elif status.state is GoalState.WAITING and read.stages and read.stages != status.stages:
@@ -102,13 +109,15 @@ def next_stage(state: State, goal: str) -> State:
 
 def _take_goal(state: State, goal: Goal) -> State:
     """Say what a goal means; a sentence that the grammar refuses may go to a language model."""
-    status = _understand(state, goal)
+    status, reading = _understand(state, goal)
     state = set_goal(state, status)
-    if status.state is GoalState.WAITING:
-        state = _presume(state, goal.goal, _reading(state, goal))
+    if reading is not None:
+        state = _presume(state, goal.goal, reading)
     if status.state is GoalState.REJECTED and state.policy.interpreter and not goal.conditions:
         state = set_goal(state, replace(status, state=GoalState.READING))
-        return replace(state, interpreting=tuple({*state.interpreting, goal.goal}))
+        interpreting = tuple(dict.fromkeys([*state.interpreting, goal.goal]))
+        state = replace(state, interpreting=interpreting)
+        return touch(state, Touch(Part.INTERPRETING, goal.goal))
     return _begin_stage(state, goal.goal)
 
 
@@ -122,7 +131,11 @@ def _begin_stage(state: State, goal: str) -> State:
     return state
 
 
-def _understand(state: State, goal: Goal) -> GoalStatus:
+def _in_order(goal: Goal) -> tuple[int, str]:
+    return goal.ordinal, goal.goal
+
+
+def _understand(state: State, goal: Goal) -> tuple[GoalStatus, Reading | None]:
     try:
         reading = _reading(state, goal)
         stages = reading.stages
@@ -130,10 +143,12 @@ def _understand(state: State, goal: Goal) -> GoalStatus:
             for name in (*condition.subjects, condition.value):
                 _check_name(state, name)
     except NotUnderstood as error:
-        return GoalStatus(
-            goal=goal.goal, state=GoalState.REJECTED, reason=str(error), time_s=state.time_s
+        reason = str(error)
+        status = GoalStatus(
+            goal=goal.goal, state=GoalState.REJECTED, reason=reason, time_s=state.time_s
         )
-    return GoalStatus(
+        return status, None
+    status = GoalStatus(
         goal=goal.goal,
         state=GoalState.WAITING,
         conditions=stages[0],
@@ -141,6 +156,7 @@ def _understand(state: State, goal: Goal) -> GoalStatus:
         note=_note(state, reading),
         time_s=state.time_s,
     )
+    return status, reading
 
 
 def _reading(state: State, goal: Goal) -> Reading:
@@ -170,8 +186,10 @@ def _presume(state: State, goal: str, reading: Reading) -> State:
 
 
 def _check_name(state: State, name: Value) -> None:
-    known = {**state.places, **state.objects, **state.robots}
-    if isinstance(name, str) and name not in known and name != NOTHING:
+    if not isinstance(name, str) or name == NOTHING:
+        return
+    if not any(name in known for known in (state.places, state.objects, state.robots)):
+        known = (*state.places, *state.objects, *state.robots)
         raise NotUnderstood(
             f"{name!r} is nothing that is known; known are {', '.join(sorted(known)) or 'none'}"
         )

@@ -11,7 +11,7 @@ from fleet.core.effects import status_of
 from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanReason
 from fleet.core.revision.reconcile import reconcile
 from fleet.core.state import State
-from fleet.core.state_updates import answer, give_up, mark_goals, set_entry, without_goal
+from fleet.core.state_updates import answer, give_up, mark_goals, put_answer, set_entry, without_goal
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Answer
@@ -122,11 +122,7 @@ def _show(state: State, job: PlanningJob, event: events.PlanningSucceeded) -> St
         preview=event.plan,
         preview_status=status_of(entry),
     )
-    return replace(
-        state,
-        previews=state.previews.without(job.request),
-        answers=state.answers.set(job.request, reply),
-    )
+    return put_answer(replace(state, previews=state.previews.without(job.request)), reply)
 
 
 def planning_failed(state: State, event: events.PlanningFailed) -> State:

@@ -18,8 +18,10 @@ from fleet.core.state_updates import (
     mark_goals,
     open_goals,
     set_record,
+    touch,
     without_goal,
 )
+from fleet.core.touches import Part, Touch
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.tasks import Report, ReportState, TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact
@@ -108,7 +110,9 @@ def _learned(state: State, record: TaskRecord, report: Report, action: Action | 
         return state
     took_s = report.ended_s - report.started_s
     known = learn(state.durations, spec.model, action.skill, took_s, record.way_s, report.ended_s)
-    return state if known is state.durations else replace(state, durations=dict(known))
+    if known is state.durations:
+        return state
+    return touch(replace(state, durations=dict(known)), Touch(Part.DURATIONS, spec.model))
 
 
 def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) -> State:

@@ -9,7 +9,16 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import active_plan_of, answer, cancel, mark_goals, set_entry
+from fleet.core.state_updates import (
+    active_plan_of,
+    answer,
+    cancel,
+    forget_entry,
+    mark_goals,
+    set_entry,
+    touch,
+)
+from fleet.core.touches import Part, Touch
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState, Task
@@ -23,12 +32,13 @@ def plan_requested(state: State, event: events.PlanRequested) -> State:
 
 def plan_waiting_goals(state: State) -> State:
     """Goals that wait go into the running plan, or, where none runs, into a new one."""
+    active = [state.plans[plan] for plan in state.index.active]
+    if any(entry.state is PlanState.PLANNING for entry in active):
+        return state  # what comes meanwhile goes into the plan that is being made
     waiting = tuple(g for g in _waiting_goals(state) if state.goal_states[g].reason is None)
     if not waiting:
         return state
-    if any(entry.state is PlanState.PLANNING for entry in state.plans.values()):
-        return state  # what comes meanwhile goes into the plan that is being made
-    for entry in state.plans.values():
+    for entry in active:
         if entry.state is PlanState.RUNNING and not entry.cancelling:
             goals = (*entry.plan.goals, *waiting)
             entry = replace(entry, plan=replace(entry.plan, goals=goals))
@@ -65,7 +75,9 @@ def _start_planning(state: State, ask: PlanRequest, partial: bool = False) -> St
     job = PlanningJob.of(state.jobs + 1, plan, ask.planner)
     job = replace(job, request=ask.request, dry_run=ask.dry_run, partial=partial)
     if ask.dry_run:
-        return replace(state, jobs=job.job, previews=state.previews.set(ask.request, job))
+        previews = state.previews.set(ask.request, job)
+        state = replace(state, jobs=job.job, previews=previews)
+        return touch(state, Touch(Part.PREVIEW, ask.request))
     return _planning(state, plan, job)
 
 
@@ -99,8 +111,9 @@ def _why_not_plan(state: State, plan: str | None, goals: tuple[str, ...]) -> str
 
 def _waiting_goals(state: State) -> Iterator[str]:
     """Goals that no plan works on, in their order."""
-    for goal in sorted(state.goals, key=lambda g: (state.goals[g].ordinal, g)):
-        if state.goal_states[goal].state is GoalState.WAITING and not active_plan_of(state, goal):
+    waiting = (g for g in state.index.in_state.get(GoalState.WAITING, ()) if g in state.goals)
+    for goal in sorted(waiting, key=lambda g: (state.goals[g].ordinal, g)):
+        if not active_plan_of(state, goal):
             yield goal
 
 
@@ -194,7 +207,7 @@ def _delete(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if not entry.ended and entry.state not in (PlanState.READY, PlanState.PROPOSED):
         return f"plan {ask.plan} is {entry.state.value}; cancel it before deleting it"
     state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None)
-    state = replace(state, plans=state.plans.without(ask.plan))
+    state = forget_entry(state, ask.plan)
     return answer(state, ask.request, True, f"plan {ask.plan} is deleted")
 
 

@@ -9,7 +9,7 @@ from fleet.core.dispatch.replan_triggers import contradiction
 from fleet.core.handlers import goals, statements
 from fleet.core.plan_entry import ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import believe, set_entry
+from fleet.core.state_updates import believe, forget_fact, set_entry
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.payloads.plans import PlanState
 
@@ -21,7 +21,8 @@ def fact_put(state: State, event: events.FactPut) -> State:
     if changed is state:
         return state
     state = changed
-    for entry in state.plans.values():
+    for plan in state.index.active:
+        entry = state.plans[plan]
         if entry.state is PlanState.RUNNING and entry.replan is None:
             reason = contradiction(state, entry, fact)
             if reason is not None:
@@ -31,8 +32,7 @@ def fact_put(state: State, event: events.FactPut) -> State:
 
 def fact_deleted(state: State, event: events.FactDeleted) -> State:
     """No longer believe anything of that variable."""
-    key = FactKey(event.relation, event.subject)
-    return replace(state, facts=state.facts.without(key)) if key in state.facts else state
+    return forget_fact(state, FactKey(event.relation, event.subject))
 
 
 def place_put(state: State, event: events.PlacePut) -> State:

@@ -11,6 +11,8 @@ What holds on any Zenoh storage, the embedded one or zenohd's:
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from keyexpr_schema.errors import Unconfirmed, Unreachable
@@ -23,6 +25,22 @@ from keyexpr_schema.transport.trace import Trace
 
 SETTLE_S = 0.5
 _RESEND_S = 0.25
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A point in the life of a store: which one, and the number of its latest change by then."""
+
+    store: str
+    number: int
+
+
+@dataclass(frozen=True)
+class Changes:
+    """The newest value, or the deletion, of every key that changed, up to `mark`."""
+
+    samples: tuple[Sample, ...]
+    mark: Mark
 
 
 class StoreClient:
@@ -118,6 +136,30 @@ class StoreClient:
                 proven = generation
                 continue
             await asyncio.sleep(0.05)
+
+    async def pages(self, pattern: str, timeout_s: float) -> AsyncIterator[tuple[Sample, ...]]:
+        """What `list` returns, piece by piece; `timeout_s` holds for each.
+
+        Raises:
+            Unreachable: no router and store could be asked within `timeout_s`.
+        """
+        yield await self.list(pattern, timeout_s)
+
+    async def mark(self, timeout_s: float) -> Mark | None:
+        """Where the store's changes are now; None: the storage does not number them."""
+        return None
+
+    async def changes(
+        self, patterns: Sequence[str], since: Mark, timeout_s: float
+    ) -> Changes | None:
+        """What changed after `since` of the keys that match one of the patterns.
+
+        None: the store cannot say, and everything has to be listed.
+
+        Raises:
+            Unreachable: no router and store could be asked within `timeout_s`.
+        """
+        return None
 
     async def answers(self, timeout_s: float) -> bool:
         """Whether a store that keeps a journal answers now; a zenohd storage never does."""

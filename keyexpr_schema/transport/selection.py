@@ -74,6 +74,11 @@ class Selection:
         """How many keys are remembered, those that were deleted included."""
         return len(self._stamps) + len(self._gone)
 
+    def expect(self, keyexpr: str) -> None:
+        """Take a key to have a value that is older than any; what a listing lacks is deleted."""
+        if self._matches.includes(keyexpr):
+            self._stamps.setdefault(keyexpr, 0)
+
     def offer(self, sample: Sample) -> None:
         """Pass on what is newer than what is known of its key."""
         keyexpr, stamp = sample.keyexpr, sample.stamp

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass
 from typing import Any
 
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload, Unreachable
 from keyexpr_schema.ids import check_id
-from keyexpr_schema.key import A, Delivery, Key, P, Payload
+from keyexpr_schema.key import A, Address, Delivery, Key, P, Payload
 from keyexpr_schema.transport.connecting import open_link
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
@@ -187,11 +187,14 @@ class Session:
     def watch(
         self,
         *selections: Key[Any, Any] | tuple[Key[Any, Any], dict[str, str | int]] | Narrowed,
+        known: Iterable[tuple[Key[Any, Any], Address]] = (),
         on_trouble: Callable[[str | None], None] | None = None,
     ) -> AbstractAsyncContextManager[Watch]:
         """Watch keys, or `(key, {field: value})`: first all that is stored, then what changes.
 
-        `on_trouble` hears why what is stored cannot be read, and None when it can be again.
+        `known` are keys that had a value when it was looked last: those that have none any more
+        are shown as deleted. `on_trouble` hears why what is stored cannot be read, and None when
+        it can be again.
         """
         patterns: list[tuple[Key[Any, Any], str, Narrowed | None]] = []
         for selection in selections:
@@ -202,7 +205,9 @@ class Session:
                 raise TypeError(f"{key.name} is a {key.delivery.value}: it cannot be watched")
             patterns.append((key, key.pattern(**fixed), narrowed))
             self._trace.note("watch", key, key.pattern(**fixed))
-        return Watch(self.link, self._store, self._undecodable, patterns, on_trouble).running()
+        return Watch(
+            self.link, self._store, self._undecodable, patterns, known, on_trouble
+        ).running()
 
     # --- tokens ----------------------------------------------------------------------------------
 

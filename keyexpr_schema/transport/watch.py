@@ -1,9 +1,9 @@
 """Level-triggered watching of keys: what is stored, then what changes, then what was missed.
 
-Our store numbers its changes. Once everything was listed, a watch asks every now and then, and
-after each reconnection, what has changed since: one question, and no answer when nothing has. It
-lists everything again only where the store cannot say (it is another one, or what it remembers
-begins later).
+Our store keeps its changes in order. Once everything was listed, page by page, a watch asks every
+now and then, and after each reconnection, what has changed since: one question, and an empty answer
+when nothing has. It lists everything again only where the store cannot say (it is another one, or
+has forgotten deletions). What is in no page is gone.
 
 A storage that cannot say at all (zenohd's) is listed again and again, the more seldom the longer a
 listing takes, and there deletions are a matter of their own. One that passes on the link is
@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any
 
@@ -26,7 +26,7 @@ from keyexpr_schema.key import Address, Delivery, Key
 from keyexpr_schema.transport.change_stream import ChangeStream
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.selection import Change, Narrowed, Selection
-from keyexpr_schema.transport.store_client import Mark, StoreClient
+from keyexpr_schema.transport.store_client import StoreClient
 from keyexpr_schema.transport.undecodable import UndecodableReports
 
 __all__ = ["RELIST_S", "Change", "Narrowed", "Watch"]
@@ -56,6 +56,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
         store: StoreClient,
         undecodable: UndecodableReports,
         selections: Sequence[tuple[Key[Any, Any], str, Narrowed | None]],
+        known: Iterable[tuple[Key[Any, Any], Address]] = (),
         on_trouble: Callable[[str | None], None] | None = None,
     ) -> None:
         super().__init__()
@@ -65,8 +66,12 @@ class Watch(ChangeStream[Change[Any, Any]]):
             for selection in selections
         ]
         self._stored = [each for each in self._selections if each.key.stored]
-        self._mark: Mark | None = None
-        """Up to where the changes of the store are known; None: everything has to be listed."""
+        for key, address in known:
+            for selection in self._selections:
+                if selection.key is key:
+                    selection.expect(key.build(address))
+        self._position = ""
+        """Up to where the changes of the store are known; empty: everything has to be listed."""
         self._on_trouble = on_trouble
         self._trouble: str | None = None
         self.listings = 0
@@ -115,7 +120,7 @@ class Watch(ChangeStream[Change[Any, Any]]):
             try:
                 pause_s = _RETRY_S
                 if await self._update():
-                    took_s = 0.0 if self._mark else loop.time() - begun_s
+                    took_s = 0.0 if self._position else loop.time() - begun_s
                     pause_s = max(RELIST_S, took_s / LISTING_SHARE)
                     self._synced.set()
                 self.updates += 1
@@ -145,42 +150,69 @@ class Watch(ChangeStream[Change[Any, Any]]):
 
     async def _update(self) -> bool:
         """Take in what was missed; whether that is all, or a look has to follow soon."""
-        if self._mark is not None:
-            patterns = [selection.pattern for selection in self._stored]
-            changes = await self._store.changes(patterns, self._mark, ANSWER_S)
-            if changes is not None:
-                for sample in changes.samples:
-                    for selection in self._stored:
-                        selection.changed(sample)
-                self._mark = changes.mark
-                return True
-        self._mark = None
-        mark = await self._store.mark(ANSWER_S)
+        if (self._position and await self._take_changes()) or await self._list():
+            return True
         complete = True
         for selection in self._stored:
-            complete &= await self._list(selection, vouched=mark is not None)
+            complete &= await self._list_storage(selection)
         self.listings += 1
-        self._mark = mark
         return complete
 
-    async def _list(self, selection: Selection, vouched: bool) -> bool:
-        """List once; False if something known was not in it and has to be looked for again."""
+    async def _take_changes(self) -> bool:
+        """Take in what changed since the last time; False where the store cannot say."""
+        patterns = [selection.pattern for selection in self._stored]
+        while True:
+            page = await self._store.changes(patterns, self._position, ANSWER_S)
+            if page is None or page.whole:
+                return False
+            for sample in page.samples:
+                for selection in self._stored:
+                    selection.changed(sample)
+            self._position = page.position
+            if not page.more:
+                return True
+
+    async def _list(self) -> bool:
+        """Take in all that is stored, page by page; False: no store can tell it in that way."""
+        for selection in self._stored:
+            selection.forget()
+        known = [(selection, selection.known()) for selection in self._stored]
+        patterns = [pattern for selection in self._stored for pattern in selection.patterns()]
+        listed: set[str] = set()
+        position = ""
+        while (page := await self._store.changes(patterns, position, ANSWER_S)) is not None:
+            if page.whole:
+                listed.clear()
+            for sample in page.samples:
+                (listed.discard if sample.deleted else listed.add)(sample.keyexpr)
+                for selection in self._stored:
+                    selection.changed(sample)
+            position = page.position
+            if not page.more:
+                break
+        else:
+            return False
+        for selection, before in known:
+            selection.delete(selection.missing(before, listed))
+        self._position = position
+        self.listings += 1
+        return True
+
+    async def _list_storage(self, selection: Selection) -> bool:
+        """List what a storage has; False if something known was not in it and has to be looked for
+        again."""
         router = self._link.router
         generation = router.generation
         selection.forget()
         known = selection.known()
         listed: set[str] = set()
         for pattern in list(selection.patterns()):
-            async for page in self._store.pages(pattern, ANSWER_S):
-                for sample in page:
-                    selection.offer(sample)
-                    listed.add(sample.keyexpr)
-        missing = selection.missing(known, listed)
-        if vouched:
-            selection.delete(missing)
-            return True
+            for sample in await self._store.list(pattern, ANSWER_S):
+                selection.offer(sample)
+                listed.add(sample.keyexpr)
         if router.generation != generation or not router.up:
             return False
+        missing = selection.missing(known, listed)
         again = selection.missing_twice(missing, generation)
         # An empty listing looks like one of a storage that is away.
         if again and (listed or await self._store.answers(1.0)):

@@ -26,7 +26,7 @@ from keyexpr_schema.key import Address, Delivery, Key
 from keyexpr_schema.transport.change_stream import ChangeStream
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.selection import Change, Narrowed, Selection
-from keyexpr_schema.transport.store_client import StoreClient
+from keyexpr_schema.transport.store_client import SETTLE_S, StoreClient
 from keyexpr_schema.transport.undecodable import UndecodableReports
 
 __all__ = ["RELIST_S", "Change", "Narrowed", "Watch"]
@@ -152,6 +152,8 @@ class Watch(ChangeStream[Change[Any, Any]]):
         """Take in what was missed; whether that is all, or a look has to follow soon."""
         if (self._position and await self._take_changes()) or await self._list():
             return True
+        if self._link.router.age_s < SETTLE_S:
+            return False  # the store may be there, and not be known to this link yet
         complete = True
         for selection in self._stored:
             complete &= await self._list_storage(selection)

@@ -162,7 +162,7 @@ class Archive:
                 _packed(record),
             ),
         )
-        if entry is None or not added.rowcount:
+        if isinstance(record, RequestRecord) or entry is None or not added.rowcount:
             return
         number = added.lastrowid
         goals = record.goals if isinstance(record, PlanRecord) else (record,)

@@ -30,8 +30,7 @@ def past_goal(record: GoalRecord) -> PastGoal:
     return PastGoal(
         goal=record.spec.goal,
         text=record.spec.text,
-        outcome=outcome
-        or (HistoryOutcome.DELETED if record.deleted else HistoryOutcome.OPEN),
+        outcome=outcome or (HistoryOutcome.DELETED if record.deleted else HistoryOutcome.OPEN),
         reason=status.reason,
         plan=status.plan,
         # A simulation that began again in the meantime has set the clock back.

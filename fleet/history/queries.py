@@ -104,9 +104,7 @@ class _Period:
     tasks: Counter[str] = field(default_factory=Counter)
     busy_s: dict[str, float] = field(default_factory=lambda: defaultdict(float))
 
-    def count_goal(
-        self, outcome: HistoryOutcome, reason: str | None, took_s: float | None
-    ) -> None:
+    def count_goal(self, outcome: HistoryOutcome, reason: str | None, took_s: float | None) -> None:
         self.goals[outcome] += 1
         if outcome is HistoryOutcome.REACHED and took_s is not None:
             self.took_s.append(took_s)

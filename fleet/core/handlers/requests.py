@@ -71,7 +71,13 @@ def _start_planning(state: State, ask: PlanRequest, partial: bool = False) -> St
 
 def _planning(state: State, plan: Plan, job: PlanningJob) -> State:
     entry = PlanEntry(
-        plan=plan, state=PlanState.PLANNING, planner=job.planner, start=plan.autostart, job=job
+        plan=plan,
+        state=PlanState.PLANNING,
+        planner=job.planner,
+        start=plan.autostart,
+        job=job,
+        begun_s=state.time_s,
+        begun_wall_s=state.wall_time_s,
     )
     return set_entry(replace(state, jobs=job.job), entry)
 

@@ -14,7 +14,13 @@ from typing import Any
 
 from msgspec.structs import asdict
 
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry, PlanningJob
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.planning_input import (
+    InterpretationInput,
+    PlanningInput,
+    interpretation_input,
+    planning_input,
+)
 from fleet.core.state import State
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
@@ -65,15 +71,14 @@ class Retract:
 class MakePlan:
     """Do this planning job, and say how it ended as an event."""
 
-    job: PlanningJob
+    given: PlanningInput
 
 
 @dataclass(frozen=True)
 class Interpret:
     """Have a goal's sentence read by a language model, and say what it means as an event."""
 
-    goal: str
-    text: str
+    given: InterpretationInput
 
 
 @dataclass(frozen=True)
@@ -83,7 +88,14 @@ class Archive:
     record: Ended
 
 
-Effect = Publish | Retract | MakePlan | Interpret | Archive
+@dataclass(frozen=True)
+class DropJob:
+    """Nobody waits any more for this planning job's answer; it may have been given."""
+
+    job: int
+
+
+Effect = Publish | Retract | MakePlan | Interpret | DropJob | Archive
 
 
 def effects_between(old: State, new: State) -> tuple[Effect, ...]:
@@ -268,13 +280,20 @@ def _own_facts(old: State, new: State) -> Iterator[Effect]:
 
 
 def _jobs(old: State, new: State) -> Iterator[Effect]:
+    for plan, before in old.plans.items():
+        after = new.plans.get(plan)
+        if before.job is not None and (after is None or after.job != before.job):
+            yield DropJob(before.job.job)
+    for request, job in old.previews.items():
+        if request not in new.previews:
+            yield DropJob(job.job)
     for plan, entry in new.plans.items():
-        before = old.plans.get(plan)
-        if entry.job is not None and (before is None or before.job != entry.job):
-            yield MakePlan(entry.job)
+        known = old.plans.get(plan)
+        if entry.job is not None and (known is None or known.job != entry.job):
+            yield MakePlan(planning_input(new, entry.job))
     for request, job in new.previews.items():
         if request not in old.previews:
-            yield MakePlan(job)
+            yield MakePlan(planning_input(new, job))
     for goal in new.interpreting:
         if goal not in old.interpreting and goal in new.goals:
-            yield Interpret(goal, new.goals[goal].text)
+            yield Interpret(interpretation_input(new, goal))

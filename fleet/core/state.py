@@ -28,13 +28,15 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     `approval`: a person has to approve every new plan. `auto_plan`: goals that wait are planned
     without being asked for, into a running plan where there is one. `interpreter`: sentences that
     the grammar refuses go to a language model. `lost_after_s`: a robot whose worker is gone for
-    longer (wall time, s) counts as lost. `skill_phrases` are skills that goals can ask for by name.
+    longer (wall time, s) counts as lost. `planning_limit_s`: a plan has to be made within that many
+    seconds. `skill_phrases` are skills that goals can ask for by name.
     """
 
     approval: bool = False
     auto_plan: bool = False
     interpreter: bool = False
     lost_after_s: float = 30.0
+    planning_limit_s: float = 120.0
     skill_phrases: tuple[SkillPhrase, ...] = msgspec.field(default=(), name="deeds")
 
 

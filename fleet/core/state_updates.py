@@ -124,8 +124,9 @@ def with_waiting_cancelled(entry: PlanEntry, reason: str) -> Table[str, TaskReco
     )
 
 
-def give_up(state: State, entry: PlanEntry, reason: str) -> State:
-    """End a plan as failed, and with it those of its goals that are not reached."""
+def give_up(state: State, entry: PlanEntry, reason: str, to: GoalState = GoalState.FAILED) -> State:
+    """End a plan as failed, and with it those of its goals that are not reached; or, with `to`,
+    have them wait for another."""
     entry = replace(
         entry,
         state=PlanState.FAILED,
@@ -136,7 +137,8 @@ def give_up(state: State, entry: PlanEntry, reason: str) -> State:
         job=None,
     )
     state = set_entry(state, entry)
-    return mark_goals(state, entry.plan.goals, GoalState.FAILED, entry.plan.plan, reason)
+    plan = entry.plan.plan if to is GoalState.FAILED else None
+    return mark_goals(state, entry.plan.goals, to, plan, reason)
 
 
 def answer(

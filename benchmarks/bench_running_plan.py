@@ -18,14 +18,15 @@ from rich.console import Console
 from rich.table import Table
 
 from fleet.core import events
-from fleet.core.dispatch.delays import FACTOR, MARGIN_S
 from fleet.core.effects import MakePlan
 from fleet.core.events import PlanningSucceeded
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.model.durations import FACTOR, MARGIN_S
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_index import OUTSTANDING
 from fleet.core.state import Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
-from fleet.service.planning_job import run_planning_job
+from fleet.service.planning.planning_job import run_planning_job
 from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import PlanChange
@@ -133,7 +134,7 @@ class Running:
         self.state, effects = step(self.state, kind(**at, **fields))
         for effect in effects:
             if isinstance(effect, MakePlan):
-                made = run_planning_job(effect.job, self.state, self.composition, at)
+                made = run_planning_job(effect.given, self.composition)
                 if not isinstance(made, PlanningSucceeded):
                     raise SystemExit(f"there is no plan: {made.reason}")
                 self.made = made

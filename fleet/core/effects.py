@@ -7,15 +7,22 @@ whatever was lost.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from msgspec.structs import asdict
 
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry, PlanningJob
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_index import OUTSTANDING
+from fleet.core.planning_input import (
+    InterpretationInput,
+    PlanningInput,
+    interpretation_input,
+    planning_input,
+)
 from fleet.core.state import State
+from fleet.core.touches import Part, Touch
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
     ANSWER,
@@ -28,7 +35,10 @@ from keyexpr_schema.keyspace import (
     STATEMENT_STATUS,
     TASK_RECORD,
 )
+from keyexpr_schema.payloads.goals import OVER_GOALS, GoalAddress, GoalStatus
+from keyexpr_schema.payloads.history import Ended, GoalRecord, PlanRecord, RequestRecord
 from keyexpr_schema.payloads.plans import PlanAddress, PlanStatus
+from keyexpr_schema.payloads.requests import Answer, RequestAddress
 from keyexpr_schema.payloads.tasks import Order, OrderAddress, TaskAddress, TaskRecord
 from keyexpr_schema.payloads.world import FactAddress
 
@@ -62,23 +72,63 @@ class Retract:
 class MakePlan:
     """Do this planning job, and say how it ended as an event."""
 
-    job: PlanningJob
+    given: PlanningInput
 
 
 @dataclass(frozen=True)
 class Interpret:
     """Have a goal's sentence read by a language model, and say what it means as an event."""
 
-    goal: str
-    text: str
+    given: InterpretationInput
 
 
-Effect = Publish | Retract | MakePlan | Interpret
+@dataclass(frozen=True)
+class Archive:
+    """Keep this, which is over, before anything else is done."""
+
+    record: Ended
 
 
-def effects_between(old: State, new: State) -> tuple[Effect, ...]:
-    """What to do so that keys and planning jobs follow the state from `old` to `new`."""
-    return (*_documents(old, new), *_own_facts(old, new), *_jobs(old, new))
+@dataclass(frozen=True)
+class DropJob:
+    """Nobody waits any more for this planning job's answer; it may have been given."""
+
+    job: int
+
+
+Effect = Publish | Retract | MakePlan | Interpret | DropJob | Archive
+
+
+def effects_between(old: State, new: State, touches: Iterable[Touch]) -> tuple[Effect, ...]:
+    """What to do so that keys and planning jobs follow the state from `old` to `new`.
+
+    Only what `touches` name is looked at. What is over in `new` is of its view for the last time:
+    the keys keep their last values. It is archived, and what was over in `old` is none of this.
+    """
+    scope = _Scope.of(touches, new)
+    return (
+        *_archived(new),
+        *_documents(old, new, scope),
+        *_own_facts(old, new, scope),
+        *_jobs(old, new, scope),
+    )
+
+
+def all_touches(old: State, new: State) -> tuple[Touch, ...]:
+    """Touches of everything that is in one of two states, or over in the newer one."""
+    over = _Over.of(new)
+    names: tuple[tuple[Part, Iterable[Any]], ...] = (
+        (Part.GOAL, (*old.goal_states, *new.goal_states, *over.goals)),
+        (Part.STATEMENT, (*old.statement_states, *new.statement_states)),
+        (Part.ANSWER, (*old.answers, *new.answers, *over.answers)),
+        (Part.DURATIONS, (*old.durations, *new.durations)),
+        (Part.PLAN, (*old.plans, *new.plans, *over.plans)),
+        (Part.RECORDS, (*old.plans, *new.plans, *over.plans)),
+        (Part.FACT, (*old.concluded, *new.concluded)),
+        (Part.PREVIEW, (*old.previews, *new.previews)),
+        (Part.INTERPRETING, new.interpreting),
+    )
+    return tuple(Touch(part, name) for part, found in names for name in dict.fromkeys(found))
 
 
 def effects_of(state: State) -> tuple[Effect, ...]:
@@ -87,62 +137,157 @@ def effects_of(state: State) -> tuple[Effect, ...]:
     Facts are left out: other writers may have newer ones.
     """
     empty = State()
-    return (*_documents(empty, state), *_jobs(empty, state))
-
-
-def _documents(old: State, new: State) -> Iterator[Effect]:
-    views: tuple[tuple[Key[Any, Any], Mapping[str, Payload], Mapping[str, Payload]], ...] = (
-        (GOAL_STATUS, old.goal_states, new.goal_states),
-        (STATEMENT_STATUS, old.statement_states, new.statement_states),
-        (ANSWER, old.answers, new.answers),
-        (DURATIONS, old.durations, new.durations),
+    scope = _Scope.of(all_touches(empty, state), state)
+    return (
+        *_archived(state),
+        *_documents(empty, state, scope),
+        *_jobs(empty, state, scope),
     )
-    for key, before, after in views:
-        if before is not after:
-            yield from _difference(key, key.address, before, after)
-    for plan in {**old.plans, **new.plans}:
-        if old.plans.get(plan) is not new.plans.get(plan) or old.epoch != new.epoch:
-            yield from _plan_documents(plan, old, new)
 
 
-def _plan_documents(plan: str, old: State, new: State) -> Iterator[Effect]:
+def documents_of(record: Ended) -> Iterator[Publish]:
+    """The last values of the keys of something that is over."""
+    match record:
+        case RequestRecord():
+            yield Publish(ANSWER, RequestAddress(record.answer.request), record.answer)
+        case GoalRecord():
+            if not record.deleted:
+                yield Publish(GOAL_STATUS, GoalAddress(record.spec.goal), record.status)
+        case PlanRecord():
+            plan = record.spec.plan
+            for goal in record.goals:
+                if goal.status.state in OVER_GOALS:
+                    yield from documents_of(goal)
+            if record.spec.tasks:
+                yield Publish(PLAN_SPEC, PlanAddress(plan), record.spec)
+            yield Publish(PLAN_STATUS, PlanAddress(plan), record.status)
+            for task in record.tasks:
+                yield Publish(TASK_RECORD, TaskAddress(plan, task.task), task)
+
+
+def _archived(state: State) -> Iterator[Archive]:
+    return (Archive(record) for record in state.over)
+
+
+@dataclass(frozen=True)
+class _Scope:
+    """Which parts of two states to compare."""
+
+    names: Mapping[Part, tuple[Any, ...]]
+    tasks: Mapping[str, tuple[str, ...]]
+    """Tasks by plan, where not all of a plan's are compared."""
+    plans: tuple[str, ...]
+
+    @classmethod
+    def of(cls, touches: Iterable[Touch], new: State) -> _Scope:
+        names: dict[Part, dict[Any, None]] = {}
+        tasks: dict[str, dict[str, None]] = {}
+        plans: dict[str, None] = {}
+        for part, name, task in touches:
+            names.setdefault(part, {})[name] = None
+            if part is Part.RECORD:
+                tasks.setdefault(name, {})[task] = None
+            if part in (Part.PLAN, Part.RECORD, Part.RECORDS):
+                plans[name] = None
+        if Part.EPOCH in names:  # orders carry it
+            plans |= dict.fromkeys(new.plans)
+        return cls(
+            {part: tuple(found) for part, found in names.items()},
+            {plan: tuple(found) for plan, found in tasks.items()},
+            tuple(plans),
+        )
+
+    def has(self, part: Part, name: str) -> bool:
+        """Whether a part of this name is to be compared."""
+        return name in self.names.get(part, ())
+
+
+def _documents(old: State, new: State, scope: _Scope) -> Iterator[Effect]:
+    over = _Over.of(new)
+    views: tuple[
+        tuple[
+            Part,
+            Key[Any, Any],
+            Mapping[str, Payload],
+            Mapping[str, Payload],
+            Mapping[str, Payload],
+        ],
+        ...,
+    ] = (
+        (Part.GOAL, GOAL_STATUS, old.goal_states, new.goal_states, over.goals),
+        (Part.STATEMENT, STATEMENT_STATUS, old.statement_states, new.statement_states, {}),
+        (Part.ANSWER, ANSWER, old.answers, new.answers, over.answers),
+        (Part.DURATIONS, DURATIONS, old.durations, new.durations, {}),
+    )
+    for part, key, before, after, gone in views:
+        for name in scope.names.get(part, ()):
+            now = after.get(name) or gone.get(name)
+            yield from _difference(key, key.address(name), before.get(name), now)
+    for plan in scope.plans:
+        yield from _plan_documents(plan, old, new, over.plans.get(plan), scope)
+
+
+@dataclass(frozen=True)
+class _Over:
+    """What is over in an event, by the names that its documents go by."""
+
+    goals: dict[str, GoalStatus]
+    answers: dict[str, Answer]
+    plans: dict[str, PlanRecord]
+
+    @classmethod
+    def of(cls, state: State) -> _Over:
+        plans = {r.spec.plan: r for r in state.over if isinstance(r, PlanRecord)}
+        goals = [r for r in state.over if isinstance(r, GoalRecord) and not r.deleted]
+        goals += [goal for plan in plans.values() for goal in plan.goals]
+        answers = [r.answer for r in state.over if isinstance(r, RequestRecord)]
+        return cls(
+            {goal.spec.goal: goal.status for goal in goals if goal.status.state in OVER_GOALS},
+            {answer.request: answer for answer in answers},
+            plans,
+        )
+
+
+def _plan_documents(
+    plan: str, old: State, new: State, over: PlanRecord | None, scope: _Scope
+) -> Iterator[Effect]:
     before, after = old.plans.get(plan), new.plans.get(plan)
-    yield from _difference(
-        PLAN_SPEC,
-        PlanAddress,
-        {plan: before.plan} if before and before.plan.tasks else {},
-        {plan: after.plan} if after and after.plan.tasks else {},
-    )
-    yield from _difference(
-        PLAN_STATUS,
-        PlanAddress,
-        {plan: status_of(before)} if before else {},
-        {plan: status_of(after)} if after else {},
-    )
-    yield from _difference(
-        TASK_RECORD,
-        partial(TaskAddress, plan),
-        before.records if before else {},
-        after.records if after else {},
-    )
-    orders = _orders(before, old.epoch), _orders(after, new.epoch)
-    yield from _difference(ORDER, lambda address: address, *orders)
+    if scope.has(Part.PLAN, plan):
+        spec = after.plan if after else over.spec if over else None
+        status = status_of(after) if after else over.status if over else None
+        address = PlanAddress(plan)
+        known = before.plan if before and before.plan.tasks else None
+        yield from _difference(PLAN_SPEC, address, known, spec if spec and spec.tasks else None)
+        yield from _difference(PLAN_STATUS, address, status_of(before) if before else None, status)
+    was: Mapping[str, TaskRecord] = before.records if before else {}
+    now: Mapping[str, TaskRecord] = after.records if after else {}
+    if over:
+        now = {task.task: task for task in over.tasks}
+    tasks: Iterable[str] = scope.tasks.get(plan, ())
+    if scope.has(Part.RECORDS, plan):
+        tasks = dict.fromkeys([*was, *now])
+    for task in tasks:
+        yield from _difference(TASK_RECORD, TaskAddress(plan, task), was.get(task), now.get(task))
+    if scope.has(Part.PLAN, plan) or Part.EPOCH in scope.names:
+        outstanding = [entry.index.outstanding for entry in (before, after) if entry]
+        tasks = dict.fromkeys(task for tasks in outstanding for task in tasks)
+    for task in tasks:
+        first, then = _order_of(before, task, old.epoch), _order_of(after, task, new.epoch)
+        if first and (not then or then.robot != first.robot):
+            yield Retract(ORDER, OrderAddress.of(first))
+            first = None
+        if then:
+            yield from _difference(ORDER, OrderAddress.of(then), first, then)
 
 
 def _difference(
-    key: Key[Any, Any],
-    address: Callable[[Any], Address],
-    old: Mapping[Any, Payload],
-    new: Mapping[Any, Payload],
+    key: Key[Any, Any], address: Address, old: Payload | None, new: Payload | None
 ) -> Iterator[Effect]:
-    for name in old:
-        if name not in new:
-            yield Retract(key, address(name))
-    for name, payload in new.items():
-        known = old.get(name)
-        # Of a thousand records one has changed: the others are the very same objects.
-        if payload is not known and payload != known:
-            yield Publish(key, address(name), payload)
+    if new is None:
+        if old is not None:
+            yield Retract(key, address)
+    elif new is not old and new != old:
+        yield Publish(key, address, new)
 
 
 def status_of(entry: PlanEntry) -> PlanStatus:
@@ -163,14 +308,11 @@ def status_of(entry: PlanEntry) -> PlanStatus:
     )
 
 
-def _orders(entry: PlanEntry | None, epoch: int) -> dict[OrderAddress, Order]:
-    if entry is None:
-        return {}
-    return {
-        OrderAddress(record.robot, record.plan, record.task): _order(record, entry, epoch)
-        for record in entry.records.values()
-        if record.state in OUTSTANDING and record.robot is not None
-    }
+def _order_of(entry: PlanEntry | None, task: str, epoch: int) -> Order | None:
+    record = entry.records.get(task) if entry is not None else None
+    if entry is None or record is None or record.state not in OUTSTANDING or record.robot is None:
+        return None
+    return _order(record, entry, epoch)
 
 
 def _order(record: TaskRecord, entry: PlanEntry, epoch: int) -> Order:
@@ -189,22 +331,29 @@ def _order(record: TaskRecord, entry: PlanEntry, epoch: int) -> Order:
     )
 
 
-def _own_facts(old: State, new: State) -> Iterator[Effect]:
-    if old.facts is new.facts:
-        return
-    for key, fact in new.facts.items():
-        if fact is not old.facts.get(key) and fact.source.startswith(PLANNER_SOURCE):
+def _own_facts(old: State, new: State, scope: _Scope) -> Iterator[Effect]:
+    for key in scope.names.get(Part.FACT, ()):
+        fact = new.concluded.get(key)
+        if fact is not None and fact is not old.concluded.get(key):
             yield Publish(FACT, FactAddress.of(key), fact)
 
 
-def _jobs(old: State, new: State) -> Iterator[Effect]:
-    for plan, entry in new.plans.items():
-        before = old.plans.get(plan)
-        if entry.job is not None and (before is None or before.job != entry.job):
-            yield MakePlan(entry.job)
-    for request, job in new.previews.items():
-        if request not in old.previews:
-            yield MakePlan(job)
-    for goal in new.interpreting:
-        if goal not in old.interpreting and goal in new.goals:
-            yield Interpret(goal, new.goals[goal].text)
+def _jobs(old: State, new: State, scope: _Scope) -> Iterator[Effect]:
+    jobs = [
+        (old.plans[plan].job if plan in old.plans else None,
+         new.plans[plan].job if plan in new.plans else None)
+        for plan in scope.names.get(Part.PLAN, ())
+    ]  # fmt: skip
+    jobs += [
+        (old.previews.get(request), new.previews.get(request))
+        for request in scope.names.get(Part.PREVIEW, ())
+    ]
+    for before, after in jobs:
+        if before is not None and before != after:
+            yield DropJob(before.job)
+    for before, after in jobs:
+        if after is not None and before != after:
+            yield MakePlan(planning_input(new, after))
+    for goal in scope.names.get(Part.INTERPRETING, ()):
+        if goal in new.interpreting and goal not in old.interpreting and goal in new.goals:
+            yield Interpret(interpretation_input(new, goal))

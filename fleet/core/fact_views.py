@@ -35,7 +35,11 @@ class Whereabouts(Mapping[str, str]):
         return _name(self._facts, AT, subject)
 
     def __iter__(self) -> Iterator[str]:
-        return (k.subject for k, f in self._facts.items() if k.relation == AT and isinstance(f.value, str))
+        return (
+            k.subject
+            for k, f in self._facts.items()
+            if k.relation == AT and isinstance(f.value, str)
+        )
 
     def __len__(self) -> int:
         return sum(1 for _ in self)

@@ -1,7 +1,7 @@
 """What is derived from the state as a whole, so that an event need not walk through it.
 
-`fleet.core.state_updates` keeps it up; `FleetIndex.of` derives it anew. Both come to the same, which
-is a test.
+`fleet.core.state_updates` keeps it up; `index_of` derives it anew. Both come to the same, which is
+a test.
 """
 
 from __future__ import annotations
@@ -24,6 +24,10 @@ Names = immutables.Map[str, None]
 EMPTY: Names = immutables.Map()
 Sets = immutables.Map[str, Names]
 S = TypeVar("S")
+Order = tuple[str, str]
+"""A plan and one of its tasks."""
+Orders = immutables.Map[Order, None]
+NO_ORDERS: Orders = immutables.Map()
 
 
 class FleetIndex(msgspec.Struct, frozen=True, eq=False):
@@ -37,7 +41,7 @@ class FleetIndex(msgspec.Struct, frozen=True, eq=False):
     """
 
     active: Table[str, int] = Table()
-    work: immutables.Map[str, immutables.Map[tuple[str, str], None]] = immutables.Map()
+    work: immutables.Map[str, Orders] = immutables.Map()
     things_at: Sets = immutables.Map()
     goals_about: Sets = immutables.Map()
     plans_of: immutables.Map[str, tuple[str, ...]] = immutables.Map()
@@ -95,7 +99,7 @@ def index_of(
     team: Iterable[str],
 ) -> FleetIndex:
     """The index of these plans, goals and facts, derived anew."""
-    work: dict[str, dict[tuple[str, str], None]] = {}
+    work: dict[str, dict[Order, None]] = {}
     plans_of: dict[str, list[str]] = {}
     for plan, entry in plans.items():
         for record in entry.outstanding():
@@ -109,21 +113,19 @@ def index_of(
         if (place := place_of(fact)) is not None:
             things_at = in_set(things_at, place, fact.subject, True)
     goals_about: Sets = immutables.Map()
+    in_state: immutables.Map[GoalState, Names] = immutables.Map()
     for goal, status in goal_states.items():
+        if status.state in UNPLANNED:
+            in_state = in_set(in_state, status.state, goal, True)
         for subject in subjects_of(status):
             goals_about = in_set(goals_about, subject, goal, True)
     return FleetIndex(
         active=Table({p: priority_of(e, goals) for p, e in plans.items() if not e.ended}),
-        work=immutables.Map({robot: immutables.Map(orders) for robot, orders in work.items()}),
+        work=immutables.Map({robot: Orders(orders) for robot, orders in work.items()}),
         things_at=things_at,
         goals_about=goals_about,
         plans_of=immutables.Map({goal: tuple(names) for goal, names in plans_of.items()}),
-        in_state=immutables.Map(
-            {
-                state: immutables.Map({g: None for g, s in goal_states.items() if s.state is state})
-                for state in UNPLANNED
-            }
-        ),
+        in_state=in_state,
         team=tuple(team),
     )
 

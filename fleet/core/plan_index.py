@@ -210,8 +210,8 @@ class PlanIndex(msgspec.Struct, frozen=True, eq=False):
         task, graph = new.task, self.graph
         step = partial(_step, before=before, after=after)
         changes["waiting_of"] = step(self.waiting_of, new.robot, state=TaskState.WAITING)
-        changes["waiting"] = self.waiting + (after is TaskState.WAITING) - (
-            before is TaskState.WAITING
+        changes["waiting"] = (
+            self.waiting + (after is TaskState.WAITING) - (before is TaskState.WAITING)
         )
         ended = frozenset({TaskState.FAILED, TaskState.CANCELLED})
         changes["broken"] = self.broken + (after in ended) - (before in ended)
@@ -248,9 +248,7 @@ class PlanIndex(msgspec.Struct, frozen=True, eq=False):
                     ready = _offered(ready, records[later], open_[later] == 0, graph.position)
         if (before is TaskState.WAITING) != (after is TaskState.WAITING):
             if after is TaskState.WAITING:
-                open_ = open_.set(
-                    task, sum(_unmet(records, name) for name in graph.befores[task])
-                )
+                open_ = open_.set(task, sum(_unmet(records, name) for name in graph.befores[task]))
             else:
                 open_ = open_.delete(task)
             ready = _offered(ready, new, open_.get(task) == 0, graph.position)

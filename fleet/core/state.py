@@ -18,6 +18,7 @@ from fleet.language.vocabulary import SkillPhrase
 from keyexpr_schema.facts import HOLDING, FactKey
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
+from keyexpr_schema.payloads.history import Ended
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
@@ -32,13 +33,15 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     `approval`: a person has to approve every new plan. `auto_plan`: goals that wait are planned
     without being asked for, into a running plan where there is one. `interpreter`: sentences that
     the grammar refuses go to a language model. `lost_after_s`: a robot whose worker is gone for
-    longer (wall time, s) counts as lost. `skill_phrases` are skills that goals can ask for by name.
+    longer (wall time, s) counts as lost. `planning_limit_s`: a plan has to be made within that many
+    seconds. `skill_phrases` are skills that goals can ask for by name.
     """
 
     approval: bool = False
     auto_plan: bool = False
     interpreter: bool = False
     lost_after_s: float = 30.0
+    planning_limit_s: float = 120.0
     skill_phrases: tuple[SkillPhrase, ...] = msgspec.field(default=(), name="deeds")
 
 
@@ -62,6 +65,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     objects: Table[str, Object] = Table()
     robots: Table[str, RobotSpec] = Table()
     facts: Table[FactKey, Fact] = Table()
+    concluded: Table[FactKey, Fact] = Table()
+    """What the planner itself concluded last of each variable, whatever is believed of it now."""
     durations: dict[str, Durations] = {}
     """Learned from reports, by type of robot."""
     connected: Table[str, tuple[str, ...]] = Table()
@@ -77,7 +82,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     interpreting: tuple[str, ...] = ()
     """Goals whose sentences a language model reads now."""
     policy: Policy = Policy()
-
+    over: tuple[Ended, ...] = ()
+    """What left the state in the latest event, because it is over."""
     index: FleetIndex = NO_FLEET
     touches: Touches = UNTOUCHED
     """What the event under way has changed so far; empty between two events."""
@@ -125,11 +131,13 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         plans = Table(
             {plan: replace(entry, index=EMPTY_INDEX) for plan, entry in self.plans.items()}
         )
-        return replace(self, plans=plans, index=NO_FLEET)
+        return replace(self, plans=plans, index=NO_FLEET, touches=UNTOUCHED)
 
     def reindexed(self) -> State:
         """The state with everything derived anew, as after it was read or got other skills."""
-        plans = Table({plan: entry.indexed(None, self.skills) for plan, entry in self.plans.items()})
+        plans = Table(
+            {plan: entry.indexed(None, self.skills) for plan, entry in self.plans.items()}
+        )
         team = sorted(robot for robot in self.connected if self.ready(robot))
         index = index_of(plans, self.goals, self.goal_states, self.facts, team)
         return replace(self, plans=plans, index=index)

@@ -8,10 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import immutables
 from msgspec.structs import replace
 
-from fleet.core.fleet_index import FleetIndex, UNPLANNED, in_set, place_of, priority_of, subjects_of
+from fleet.core.fleet_index import (
+    NO_ORDERS,
+    UNPLANNED,
+    FleetIndex,
+    in_set,
+    place_of,
+    priority_of,
+    subjects_of,
+)
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.plan_index import OUTSTANDING, robots_of
 from fleet.core.state import State
@@ -33,6 +40,14 @@ def believe(state: State, fact: Fact) -> State:
     if known == fact:
         return state
     return _fact_changed(state, fact.key, known, fact)
+
+
+def conclude(state: State, fact: Fact) -> State:
+    """Believe what the planner concludes itself, and so publishes."""
+    believed = believe(state, fact)
+    if believed is state:
+        return state
+    return replace(believed, concluded=state.concluded.set(fact.key, fact))
 
 
 def believe_if_newer(state: State, fact: Fact) -> State:
@@ -84,6 +99,7 @@ def touch(state: State, what: Touch) -> State:
 
 def set_goal(state: State, status: GoalStatus) -> State:
     """Change what is published of a goal."""
+    status = replace(status, time_s=state.time_s, wall_time_s=state.wall_time_s)
     goal_states = state.goal_states.set(status.goal, status)
     return _goal_changed(state, status.goal, goal_states)
 
@@ -122,7 +138,7 @@ def _goal_changed(state: State, goal: str, goal_states: Table[str, GoalStatus]) 
             in_state = in_set(in_state, after, goal, True)
         index = replace(index, in_state=in_state)
     touches = state.touches.and_(Touch(Part.GOAL, goal))
-    for subject in was - now:  # whoever carries it is no longer reserved for this goal
+    for subject in was ^ now:  # whoever carries it is reserved for this goal, or no longer
         if (where := place_of(state.fact(AT, subject))) is not None:
             touches = touches.and_(Touch(Part.ROBOT, where))
     return replace(state, goal_states=goal_states, index=index, touches=touches)
@@ -144,9 +160,7 @@ def mark_goals(
             or (status.state is to and status.reason == reason and status.plan == plan)
         ):
             continue
-        state = set_goal(
-            state, replace(status, state=to, plan=plan, reason=reason, time_s=state.time_s)
-        )
+        state = set_goal(state, replace(status, state=to, plan=plan, reason=reason))
     return state
 
 
@@ -240,7 +254,7 @@ def _order_changed(index: FleetIndex, record: TaskRecord, there: bool) -> FleetI
     for robot in robots_of(record):
         orders = work.get(robot)
         if there:
-            work = work.set(robot, (immutables.Map() if orders is None else orders).set(order, None))
+            work = work.set(robot, (orders or NO_ORDERS).set(order, None))
         elif orders is not None and order in orders:
             rest = orders.delete(order)
             work = work.set(robot, rest) if rest else work.delete(robot)
@@ -288,8 +302,9 @@ def with_waiting_cancelled(entry: PlanEntry, reason: str) -> Table[str, TaskReco
     )
 
 
-def give_up(state: State, entry: PlanEntry, reason: str) -> State:
-    """End a plan as failed, and with it those of its goals that are not reached."""
+def give_up(state: State, entry: PlanEntry, reason: str, to: GoalState = GoalState.FAILED) -> State:
+    """End a plan as failed, and with it those of its goals that are not reached; or, with `to`,
+    have them wait for another."""
     entry = replace(
         entry,
         state=PlanState.FAILED,
@@ -300,7 +315,8 @@ def give_up(state: State, entry: PlanEntry, reason: str) -> State:
         job=None,
     )
     state = set_entry(state, entry)
-    return mark_goals(state, entry.plan.goals, GoalState.FAILED, entry.plan.plan, reason)
+    plan = entry.plan.plan if to is GoalState.FAILED else None
+    return mark_goals(state, entry.plan.goals, to, plan, reason)
 
 
 # --- requests ------------------------------------------------------------------------------------

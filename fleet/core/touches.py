@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from enum import Enum, auto
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 
 class Part(Enum):
@@ -33,7 +32,7 @@ class Touch(NamedTuple):
     """One change."""
 
     part: Part
-    name: Hashable = None
+    name: Any = None
     task: str = ""
 
 

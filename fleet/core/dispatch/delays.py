@@ -44,18 +44,6 @@ def next_lateness(state: State) -> float | None:
     return None if next_s == inf else next_s
 
 
-def behind_s(state: State, robot: str) -> float:
-    """How much longer than predicted a robot's present task is expected to take, s.
-
-    A task that is late is expected to take as long again as it has taken so far.
-    """
-    for plan, task in state.index.work.get(robot, ()):
-        record = state.plans[plan].records[task]
-        if record.robot == robot and record.started_s is not None:
-            return max(0.0, state.time_s - record.started_s - record.duration_s)
-    return 0.0
-
-
 def _counts(entry: PlanEntry) -> bool:
     """Whether a delay would lead to anything now."""
     return entry.state is PlanState.RUNNING and entry.job is None and entry.replan is None

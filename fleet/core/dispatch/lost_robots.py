@@ -45,4 +45,3 @@ def next_loss(state: State) -> float | None:
         if any(robot in entry.index.needs for entry in counting)
     ]
     return min(times, default=None)
-

@@ -54,7 +54,7 @@ def may_order(entry: PlanEntry) -> bool:
     return entry.state is PlanState.RUNNING and entry.job is None and entry.replan is None
 
 
-def order_if_ready(state: State, plan: str, record: TaskRecord, reservations: bool = True) -> State:
+def order_if_ready(state: State, plan: str, task: str, reservations: bool = True) -> State:
     """Order a waiting task if nothing holds it back; replan if the world is not as it must be.
 
     See `_is_free` for `reservations`.

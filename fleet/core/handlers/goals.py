@@ -6,12 +6,12 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
+from fleet.core.over import goal_taken_back
 from fleet.core.plan_entry import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import (
-    believe,
     cancel,
-    forget_goal,
+    conclude,
     set_entry,
     set_goal,
     set_spec,
@@ -42,7 +42,7 @@ def goal_deleted(state: State, event: events.GoalDeleted) -> State:
     """Drop the goal; a plan that works on it is made again without it."""
     if event.goal not in state.goals:
         return state
-    state = forget_goal(state, event.goal)
+    state = goal_taken_back(state, event.goal)
     for plan in state.index.plans_of.get(event.goal, ()):
         entry = state.plans[plan]
         rest = without_goal(state, entry.plan, event.goal)
@@ -82,9 +82,9 @@ def understand_again(state: State) -> State:
     names = [name for known in state.index.in_state.values() for name in known]
     for goal in sorted((state.goals[n] for n in names if n in state.goals), key=_in_order):
         status = state.goal_states[goal.goal]
-        read, _ = _understand(state, goal)
+        read, _ = _understand(state, goal, status)
         if status.state is GoalState.REJECTED and read.reason != status.reason:
-            state = _take_goal(state, goal)
+            state = _take_goal(state, goal, status)
         elif status.state is GoalState.WAITING and read.stages and read.stages != status.stages:
             state = set_goal(state, read)  # "some robot" now has more to choose from
     return state
@@ -103,13 +103,13 @@ def next_stage(state: State, goal: str) -> State:
         and about.isdisjoint(condition.subjects)
         and not state.robots.keys() & set(condition.subjects)
     )
-    status = replace(status, stage=number, conditions=(*wanted, *kept), time_s=state.time_s)
+    status = replace(status, stage=number, conditions=(*wanted, *kept))
     return _begin_stage(set_goal(state, status), goal)
 
 
-def _take_goal(state: State, goal: Goal) -> State:
+def _take_goal(state: State, goal: Goal, known: GoalStatus | None = None) -> State:
     """Say what a goal means; a sentence that the grammar refuses may go to a language model."""
-    status, reading = _understand(state, goal)
+    status, reading = _understand(state, goal, known)
     state = set_goal(state, status)
     if reading is not None:
         state = _presume(state, goal.goal, reading)
@@ -127,7 +127,7 @@ def _begin_stage(state: State, goal: str) -> State:
         for subject in condition.subjects:
             fact = state.fact(condition.relation, subject)
             if condition.relation == SEARCHED and fact is not None and fact.value is True:
-                state = believe(state, replace(fact, value=False, source=PLANNER_SOURCE))
+                state = conclude(state, replace(fact, value=False, source=PLANNER_SOURCE))
     return state
 
 
@@ -135,7 +135,17 @@ def _in_order(goal: Goal) -> tuple[int, str]:
     return goal.ordinal, goal.goal
 
 
-def _understand(state: State, goal: Goal) -> tuple[GoalStatus, Reading | None]:
+def _understand(
+    state: State, goal: Goal, known: GoalStatus | None
+) -> tuple[GoalStatus, Reading | None]:
+    """How a goal stands, read now, and its reading if it has one; `known` is how it stood, if it is
+    not a new one."""
+    status = GoalStatus(
+        goal=goal.goal,
+        state=GoalState.WAITING,
+        given_s=state.time_s if known is None else known.given_s,
+        given_wall_s=state.wall_time_s if known is None else known.given_wall_s,
+    )
     try:
         reading = _reading(state, goal)
         stages = reading.stages
@@ -143,19 +153,8 @@ def _understand(state: State, goal: Goal) -> tuple[GoalStatus, Reading | None]:
             for name in (*condition.subjects, condition.value):
                 _check_name(state, name)
     except NotUnderstood as error:
-        reason = str(error)
-        status = GoalStatus(
-            goal=goal.goal, state=GoalState.REJECTED, reason=reason, time_s=state.time_s
-        )
-        return status, None
-    status = GoalStatus(
-        goal=goal.goal,
-        state=GoalState.WAITING,
-        conditions=stages[0],
-        stages=stages,
-        note=_note(state, reading),
-        time_s=state.time_s,
-    )
+        return replace(status, state=GoalState.REJECTED, reason=str(error)), None
+    status = replace(status, conditions=stages[0], stages=stages, note=_note(state, reading))
     return status, reading
 
 
@@ -181,7 +180,7 @@ def _presume(state: State, goal: str, reading: Reading) -> State:
         fact = state.fact(*literal.variable)
         if fact is None or fact.value is None:
             source = f"{PLANNER_SOURCE}:{goal}"
-            state = believe(state, Fact.of(literal, source, state.time_s))
+            state = conclude(state, Fact.of(literal, source, state.time_s))
     return state
 
 

@@ -11,7 +11,16 @@ from fleet.core.effects import status_of
 from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanReason
 from fleet.core.revision.reconcile import reconcile
 from fleet.core.state import State
-from fleet.core.state_updates import answer, give_up, mark_goals, put_answer, set_entry, without_goal
+from fleet.core.state_updates import (
+    answer,
+    give_up,
+    mark_goals,
+    put_answer,
+    set_entry,
+    touch,
+    without_goal,
+)
+from fleet.core.touches import Part, Touch
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Answer
@@ -33,6 +42,8 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
         return set_entry(state, replace(entry, job=None, replan=newer, team=team))
     for goal, reason in event.left_out.items():
         state = mark_goals(state, (goal,), GoalState.FAILED, entry.plan.plan, reason)
+    for goal, reason in event.postponed.items():
+        state = mark_goals(state, (goal,), GoalState.WAITING, None, reason)
     event = replace(event, plan=_for_goals_of_now(state, entry, job, event))
     revision = reconcile(entry, event, state.world(), frozenset(job.under_way))
     added = (goal for goal in entry.plan.goals if goal not in job.goals)
@@ -83,6 +94,7 @@ def _as_it_was(entry: PlanEntry, job: PlanningJob, event: events.PlanningSucceed
         event.repaired
         and job.reallocation
         and not event.left_out
+        and not event.postponed
         and event.allocation.items() <= job.previous_allocation.items()
         and all(record.state not in (TaskState.FAILED, TaskState.CANCELLED) for record in current)
         and len(event.plan.tasks) == sum(record.state not in ENDED_TASKS for record in current)
@@ -100,7 +112,8 @@ def _made_sentence(event: events.PlanningSucceeded) -> str:
     sentences = [f"plan {plan.plan} has {tasks} for {goals}"]
     if plan.making.fallback:
         sentences.append(plan.making.fallback)
-    sentences += [f"goal {goal} is left out: {reason}" for goal, reason in event.left_out.items()]
+    missing = {**event.left_out, **event.postponed}
+    sentences += [f"goal {goal} is left out: {reason}" for goal, reason in missing.items()]
     return "; ".join(sentences)
 
 
@@ -122,14 +135,19 @@ def _show(state: State, job: PlanningJob, event: events.PlanningSucceeded) -> St
         preview=event.plan,
         preview_status=status_of(entry),
     )
-    return put_answer(replace(state, previews=state.previews.without(job.request)), reply)
+    return put_answer(_without_preview(state, job.request), reply)
+
+
+def _without_preview(state: State, request: str) -> State:
+    state = replace(state, previews=state.previews.without(request))
+    return touch(state, Touch(Part.PREVIEW, request))
 
 
 def planning_failed(state: State, event: events.PlanningFailed) -> State:
     """A job failed: a first plan is rejected, a running one goes on or is given up."""
     if (preview := _preview_of(state, event.job)) is not None:
         assert preview.request is not None
-        state = replace(state, previews=state.previews.without(preview.request))
+        state = _without_preview(state, preview.request)
         return answer(state, preview.request, False, event.reason, violations=event.violations)
     entry = next(
         (b for b in state.plans.values() if b.job is not None and b.job.job == event.job), None
@@ -154,4 +172,5 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
         state = set_entry(state, entry)
         state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None, event.reason)
         return answer(state, request, False, event.reason, entry.plan.plan, event.violations)
-    return give_up(state, entry, event.reason)
+    to = GoalState.WAITING if event.postponed else GoalState.FAILED
+    return give_up(state, entry, event.reason, to)

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.state import State
-from fleet.core.state_updates import believe, touch
+from fleet.core.state_updates import conclude, touch
 from fleet.core.touches import Part, Touch
 from fleet.errors import NotUnderstood
 from fleet.language import statement_facts
@@ -51,7 +51,7 @@ def _read_statement(state: State, name: str) -> State:
     source = f"{PLANNER_SOURCE}:{name}"
     facts = tuple(Fact.of(literal, source, state.time_s) for literal in read)
     for fact in facts:
-        state = believe(state, fact)
+        state = conclude(state, fact)
     return _set_status(state, StatementStatus(statement=name, facts=facts))
 
 

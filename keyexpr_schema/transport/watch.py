@@ -20,7 +20,7 @@ from keyexpr_schema.errors import ForeignKey, UndecodablePayload, Unreachable
 from keyexpr_schema.key import A, Delivery, Key, P
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.samples import Sample, decode_value, text_of_stamp
-from keyexpr_schema.transport.store_client import StoreClient
+from keyexpr_schema.transport.store.client import StoreClient
 from keyexpr_schema.transport.undecodable import UndecodableReports
 
 T = TypeVar("T")

@@ -15,7 +15,7 @@ from keyexpr_schema.payloads.simulation import SimAddress, SimClock, SimRobotAdd
 from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.session import open_session
-from keyexpr_schema.transport.storage import Write
+from keyexpr_schema.transport.store.storage import Write
 from tests.support.polling import until
 from tests.support.session_values import (
     AT,

@@ -9,6 +9,7 @@ from typing import Any
 
 import msgspec
 
+from fleet.core.model.skills import SkillModel
 from fleet.core.plan_entry import PlanOutcome
 from fleet.core.state import Policy
 from keyexpr_schema.payloads.durations import Durations
@@ -31,11 +32,19 @@ class Event(msgspec.Struct, frozen=True, kw_only=True, tag_field="event", tag=Tr
 
 
 class PlannerStarted(Event, frozen=True, kw_only=True):
-    """A run of the planner begins; its epoch is higher than that of any run before."""
+    """A run of the planner begins; its epoch is higher than that of any run before.
+
+    It brings all that decides how events are handled from here on: the policy, the skill models,
+    and the number of the core's logic (`fleet.core.state.LOGIC`). Journals from before that leave
+    the skills to whoever replays them. `lineage` is new in the first run over a journal.
+    """
 
     epoch: int
     incarnation: str
     policy: Policy = Policy()
+    skills: dict[str, SkillModel] | None = None
+    logic: int = 0
+    lineage: str = ""
 
 
 class GoalPut(Event, frozen=True, kw_only=True):
@@ -160,7 +169,8 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
 
     `durations_s` and `extra_after` are by task, `sequence` lists each robot's actors in order.
     `repaired` says that the residual plan goes on, perhaps with goals planned anew beside it,
-    `left_out` which goals the plan does without, and why.
+    `left_out` which goals the plan does without since they cannot be reached, and why, `postponed`
+    those for which the time did not suffice.
     """
 
     job: int
@@ -175,6 +185,7 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
     notes: tuple[str, ...] = ()
     repaired: bool = msgspec.field(default=False, name="mended")
     left_out: dict[str, str] = {}
+    postponed: dict[str, str] = {}
 
     @property
     def outcome(self) -> PlanOutcome:
@@ -183,12 +194,16 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
 
 
 class PlanningFailed(Event, frozen=True, kw_only=True):
-    """A planning job ended without a plan."""
+    """A planning job ended without a plan.
+
+    `postponed`: nothing is known against one, only the time (or the process) did not suffice.
+    """
 
     job: int
     reason: str
     violations: tuple[Violation, ...] = ()
     planning_time_s: float = 0.0
+    postponed: bool = False
 
 
 class GoalInterpreted(Event, frozen=True, kw_only=True):

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from msgspec.structs import replace
 
 from fleet.core.plan_entry import PlanEntry
-from fleet.core.state import State, put
+from fleet.core.state import State
+from fleet.core.table import Table
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, Violation
 from keyexpr_schema.payloads.requests import Answer
@@ -19,7 +20,15 @@ def believe(state: State, fact: Fact) -> State:
     """Believe a fact, whatever was known of its variable."""
     if state.facts.get(fact.key) == fact:
         return state
-    return replace(state, facts=put(state.facts, fact.key, fact))
+    return replace(state, facts=state.facts.set(fact.key, fact))
+
+
+def conclude(state: State, fact: Fact) -> State:
+    """Believe what the planner concludes itself, and so publishes."""
+    believed = believe(state, fact)
+    if believed is state:
+        return state
+    return replace(believed, concluded=state.concluded.set(fact.key, fact))
 
 
 def believe_if_newer(state: State, fact: Fact) -> State:
@@ -30,7 +39,11 @@ def believe_if_newer(state: State, fact: Fact) -> State:
 
 def set_goal(state: State, status: GoalStatus) -> State:
     """Change what is published of a goal."""
-    return replace(state, goal_states=put(state.goal_states, status.goal, status))
+    status = replace(status, time_s=state.time_s, wall_time_s=state.wall_time_s)
+    state = replace(state, goal_states=state.goal_states.set(status.goal, status))
+    if status.state not in ENDED_GOALS:
+        return state
+    return replace(state, perhaps_over_goals=(*state.perhaps_over_goals, status.goal))
 
 
 def mark_goals(
@@ -49,9 +62,7 @@ def mark_goals(
             or (status.state is to and status.reason == reason and status.plan == plan)
         ):
             continue
-        state = set_goal(
-            state, replace(status, state=to, plan=plan, reason=reason, time_s=state.time_s)
-        )
+        state = set_goal(state, replace(status, state=to, plan=plan, reason=reason))
     return state
 
 
@@ -90,14 +101,16 @@ def without_goal(state: State, plan: Plan, goal: str) -> Plan:
 
 def set_entry(state: State, entry: PlanEntry) -> State:
     """Change what is kept of a plan."""
-    return replace(
-        state, plans=put(state.plans, entry.plan.plan, replace(entry, changed_s=state.time_s))
-    )
+    plan = entry.plan.plan
+    state = replace(state, plans=state.plans.set(plan, replace(entry, changed_s=state.time_s)))
+    if not entry.ended:
+        return state
+    return replace(state, perhaps_over_plans=(*state.perhaps_over_plans, plan))
 
 
 def set_record(state: State, entry: PlanEntry, record: TaskRecord) -> State:
     """Change what is kept of a task."""
-    return set_entry(state, replace(entry, records=put(entry.records, record.task, record)))
+    return set_entry(state, replace(entry, records=entry.records.set(record.task, record)))
 
 
 def cancel(state: State, entry: PlanEntry) -> State:
@@ -108,18 +121,20 @@ def cancel(state: State, entry: PlanEntry) -> State:
     return set_entry(state, replace(entry, cancelling=True, job=None))
 
 
-def with_waiting_cancelled(entry: PlanEntry, reason: str) -> dict[str, TaskRecord]:
+def with_waiting_cancelled(entry: PlanEntry, reason: str) -> Table[str, TaskRecord]:
     """The entry's records, those of waiting tasks cancelled."""
-    return {
-        name: record
-        if record.state is not TaskState.WAITING
-        else replace(record, state=TaskState.CANCELLED, reason=reason)
-        for name, record in entry.records.items()
-    }
+    return entry.records.updated(
+        {
+            name: replace(record, state=TaskState.CANCELLED, reason=reason)
+            for name, record in entry.records.items()
+            if record.state is TaskState.WAITING
+        }
+    )
 
 
-def give_up(state: State, entry: PlanEntry, reason: str) -> State:
-    """End a plan as failed, and with it those of its goals that are not reached."""
+def give_up(state: State, entry: PlanEntry, reason: str, to: GoalState = GoalState.FAILED) -> State:
+    """End a plan as failed, and with it those of its goals that are not reached; or, with `to`,
+    have them wait for another."""
     entry = replace(
         entry,
         state=PlanState.FAILED,
@@ -130,7 +145,8 @@ def give_up(state: State, entry: PlanEntry, reason: str) -> State:
         job=None,
     )
     state = set_entry(state, entry)
-    return mark_goals(state, entry.plan.goals, GoalState.FAILED, entry.plan.plan, reason)
+    plan = entry.plan.plan if to is GoalState.FAILED else None
+    return mark_goals(state, entry.plan.goals, to, plan, reason)
 
 
 def answer(
@@ -147,4 +163,4 @@ def answer(
     reply = Answer(
         request=request, accepted=accepted, sentence=sentence, plan=plan, violations=violations
     )
-    return replace(state, answers=put(state.answers, request, reply))
+    return replace(state, answers=state.answers.set(request, reply))

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from fleet.core import events
 from fleet.core.events import Event
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, PlanningJob, ReplanScope
+from fleet.core.planning_input import PlanningInput
 from fleet.core.revision.reconcile import Revision, reconcile
 from fleet.core.revision.residual_plan import residual_plan
 from keyexpr_schema.facts import HOLDING, NOTHING
@@ -22,7 +23,7 @@ from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.requests import ReplanRequest
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
 from tests.support.fleet_model import Answer, FleetModel
-from tests.support.household import SKILLS, bring, carrier, manipulator
+from tests.support.household import bring, carrier, manipulator
 from tests.support.reached import Reached, reaches
 
 UNFINISHED = {TaskState.WAITING, *OUTSTANDING}
@@ -31,9 +32,10 @@ UNFINISHED = {TaskState.WAITING, *OUTSTANDING}
 class Watched(FleetModel):
     """A fleet whose plans' revisions are looked at."""
 
-    def run(self, job: PlanningJob) -> Answer:
+    def run(self, given: PlanningInput) -> Answer:
+        job = given.job
         entry = self.state.plans.get(job.plan)
-        answer = super().run(job)
+        answer = super().run(given)
         if entry is not None and job.residual is not None:
             gone = {r for r in entry.outcome.allocation.values() if not self.state.ready(r)}
             check_residual(entry, job.residual, gone, self.met)
@@ -46,7 +48,7 @@ class Watched(FleetModel):
             entry = self.state.plans.get(event.plan.plan)
             if entry is not None and entry.job is not None and entry.job.job == event.job:
                 started = frozenset(entry.job.under_way)
-                world = self.state.world(SKILLS)
+                world = self.state.world()
                 check_reconciled(entry, event, reconcile(entry, event, world, started), self.met)
         super().apply(event)
 

@@ -32,9 +32,9 @@ def events_in(name: str) -> list[Event]:
 
 def effects_of(journal: list[Event]) -> Iterator[str]:
     """What the core does with a journal: a line an effect, an empty line an event."""
-    state = State()
+    state = State(skills=SKILLS)
     for event in journal:
-        state, effects = step(state, event, SKILLS)
+        state, effects = step(state, event)
         for effect in effects:
             match effect:
                 case Publish(key, address, payload):
@@ -46,10 +46,10 @@ def effects_of(journal: list[Event]) -> Iterator[str]:
                     yield f"put {key.build(address)} {' '.join(shown)}"
                 case Retract(key, address):
                     yield f"delete {key.build(address)}"
-                case MakePlan(job):
-                    yield f"plan {job.plan} revision {job.revision}"
-                case Interpret(goal, _):
-                    yield f"interpret {goal}"
+                case MakePlan(given):
+                    yield f"plan {given.job.plan} revision {given.job.revision}"
+                case Interpret(given):
+                    yield f"interpret {given.goal}"
         yield ""
 
 

@@ -13,6 +13,7 @@ from fleet.language.vocabulary import SkillPhrase
 from keyexpr_schema.facts import AT, HOLDING, ON, FactKey
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
+from keyexpr_schema.payloads.history import Ended
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
@@ -59,6 +60,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     objects: Table[str, Object] = Table()
     robots: Table[str, RobotSpec] = Table()
     facts: Table[FactKey, Fact] = Table()
+    concluded: Table[FactKey, Fact] = Table()
+    """What the planner itself concluded last of each variable, whatever is believed of it now."""
     durations: dict[str, Durations] = {}
     """Learned from reports, by type of robot."""
     connected: Table[str, tuple[str, ...]] = Table()
@@ -74,6 +77,11 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     interpreting: tuple[str, ...] = ()
     """Goals whose sentences a language model reads now."""
     policy: Policy = Policy()
+    over: tuple[Ended, ...] = ()
+    """What left the state in the latest event, because it is over."""
+    perhaps_over_plans: tuple[str, ...] = ()
+    perhaps_over_goals: tuple[str, ...] = ()
+    """What may leave it in the event that is being handled."""
 
     def vocabulary(self) -> Vocabulary:
         """The names that sentences can use."""

@@ -127,9 +127,8 @@ def _answer(job: Job, composition: Composition) -> bytes:
         return frame(run_interpretation(job, composition))
     except BaseException as error:  # whatever a stranger's planner raises, SystemExit, too
         log.exception("a planning job failed")
-        return frame(
-            failed_answer(job, f"the planner failed: {str(error) or type(error).__name__}")
-        )
+        said = str(error) or type(error).__name__
+        return frame(failed_answer(job, f"the planner failed: {said}"))
 
 
 if __name__ == "__main__":

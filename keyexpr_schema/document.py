@@ -53,8 +53,10 @@ def document() -> str:
             f"| `{key.template}` | {payload} | {_named(key.writers)} | {_named(key.readers)} "
             f"| {key.delivery.value} |"
         )
-    trees = ", ".join(f"`{tree.template}`" for tree in KEY_TREES)
-    lines.append(f"\nThe planner deletes, after the retention, what is over: {trees}.")
+    lines.append("\nWhen what they are about has been over for long, the planner deletes keys,")
+    lines.append("whoever wrote them, by wildcards:\n\n```text")
+    lines += [tree.template for tree in KEY_TREES]
+    lines.append("```")
     lines.append("\n## Keys\n")
     lines += [f"- `{key.template}` (`{key.schema}`): {key.about}" for key in KEYSPACE]
     lines.append("\n## Payloads")

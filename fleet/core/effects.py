@@ -272,10 +272,10 @@ def _order(record: TaskRecord, entry: PlanEntry, epoch: int) -> Order:
 
 
 def _own_facts(old: State, new: State) -> Iterator[Effect]:
-    if old.facts is new.facts:
+    if old.concluded is new.concluded:
         return
-    for key, fact in new.facts.items():
-        if fact is not old.facts.get(key) and fact.source.startswith(PLANNER_SOURCE):
+    for key, fact in new.concluded.items():
+        if fact is not old.concluded.get(key):
             yield Publish(FACT, FactAddress.of(key), fact)
 
 

@@ -60,6 +60,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     objects: Table[str, Object] = Table()
     robots: Table[str, RobotSpec] = Table()
     facts: Table[FactKey, Fact] = Table()
+    concluded: Table[FactKey, Fact] = Table()
+    """What the planner itself concluded last of each variable, whatever is believed of it now."""
     durations: dict[str, Durations] = {}
     """Learned from reports, by type of robot."""
     connected: Table[str, tuple[str, ...]] = Table()

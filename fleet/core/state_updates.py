@@ -23,6 +23,14 @@ def believe(state: State, fact: Fact) -> State:
     return replace(state, facts=state.facts.set(fact.key, fact))
 
 
+def conclude(state: State, fact: Fact) -> State:
+    """Believe what the planner concludes itself, and so publishes."""
+    believed = believe(state, fact)
+    if believed is state:
+        return state
+    return replace(believed, concluded=state.concluded.set(fact.key, fact))
+
+
 def believe_if_newer(state: State, fact: Fact) -> State:
     """Believe a fact that came on another way than its key, unless a newer one is known."""
     known = state.fact(fact.relation, fact.subject)

@@ -74,12 +74,12 @@ class Past:
         session: Session,
         archive: Archive,
         outbox: Outbox,
-        retention: Retention,
+        retention: Retention | None,
         state: Callable[[], State],
     ) -> None:
         self._session, self._archive, self._outbox = session, archive, outbox
         self._state = state
-        self._retirement = Retirement(session, archive, retention, self._rejected)
+        self._retirement = Retirement(session, archive, retention or Retention(), self._rejected)
         self._tasks: set[asyncio.Task[None]] = set()
         self._settling: set[asyncio.Task[None]] = set()
 

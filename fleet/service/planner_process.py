@@ -27,7 +27,7 @@ def run(
     skill_files: tuple[Path, ...] = (),
     llm_file: Path | None = None,
     policy: Policy | None = None,
-    retention: Retention = Retention(),
+    retention: Retention | None = None,
 ) -> None:
     """Be the central planner of a realm until SIGTERM or SIGINT; prints a line once it is ready.
 
@@ -55,7 +55,7 @@ async def _run(
     data_dir: Path,
     composition: Composition,
     policy: Policy | None,
-    retention: Retention,
+    retention: Retention | None,
 ) -> None:
     config = SessionConfig(
         endpoints=endpoints, realm=realm, component="planner", connect_timeout_s=None

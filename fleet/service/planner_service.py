@@ -54,7 +54,7 @@ class PlannerService:
         composition: Composition,
         archive: Archive,
         policy: Policy | None = None,
-        retention: Retention = Retention(),
+        retention: Retention | None = None,
     ) -> None:
         self._session = session
         self._journal = journal
@@ -68,7 +68,9 @@ class PlannerService:
         self._state = State()
         self._time_s = 0.0
         self._outbox = Outbox(session)
-        self._past = Past(session, archive, self._outbox, retention, lambda: self._state)
+        self._past = Past(
+            session, archive, self._outbox, retention or Retention(), lambda: self._state
+        )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
         self._planning: set[asyncio.Task[None]] = set()
         self._held: list[Effect] | None = []

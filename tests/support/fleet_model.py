@@ -181,7 +181,8 @@ class FleetModel:
         for goal in goals:
             self.receive(events.GoalPut, goal=goal)
         number = sum(b"PlanRequested" in line for line in self.journal)
-        self.receive(events.PlanRequested, request=PlanRequest(request=f"r{number}", **more))
+        request = PlanRequest(**{"request": f"r{number}", **more})
+        self.receive(events.PlanRequested, request=request)
 
     # --- what robots do --------------------------------------------------------------------------
 

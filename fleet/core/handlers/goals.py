@@ -9,7 +9,7 @@ from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.over import goal_taken_back
 from fleet.core.plan_entry import ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import believe, cancel, set_entry, set_goal, without_goal
+from fleet.core.state_updates import cancel, conclude, set_entry, set_goal, without_goal
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, read_goal
 from keyexpr_schema.facts import AT, NOTHING, SEARCHED, Value
@@ -115,7 +115,7 @@ def _begin_stage(state: State, goal: str) -> State:
         for subject in condition.subjects:
             fact = state.fact(condition.relation, subject)
             if condition.relation == SEARCHED and fact is not None and fact.value is True:
-                state = believe(state, replace(fact, value=False, source=PLANNER_SOURCE))
+                state = conclude(state, replace(fact, value=False, source=PLANNER_SOURCE))
     return state
 
 
@@ -160,7 +160,7 @@ def _presume(state: State, goal: str, reading: Reading) -> State:
         fact = state.fact(*literal.variable)
         if fact is None or fact.value is None:
             source = f"{PLANNER_SOURCE}:{goal}"
-            state = believe(state, Fact.of(literal, source, state.time_s))
+            state = conclude(state, Fact.of(literal, source, state.time_s))
     return state
 
 

@@ -20,6 +20,7 @@ from keyexpr_schema.payloads.system import StoreAddress, StoreChanges, StoreChan
 from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState
 from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.connecting import zenoh_config
+from keyexpr_schema.transport.link import Put
 from keyexpr_schema.transport.session import Narrowed, Session, Watch, open_session
 from keyexpr_schema.transport.store.storage import Write
 from tests.support.polling import until

@@ -86,8 +86,8 @@ class PlanIndex(msgspec.Struct, frozen=True, eq=False):
     `open` counts what a waiting task still waits for; `ready` has, by robot, the waiting tasks that
     wait for nothing but robots, in the plan's order. `unfinished` are tasks of the revision that
     have not succeeded, `broken` those that failed or were cancelled, `goal_open` the unfinished
-    by goal, `waiting_of` the waiting by the robot that is to do them, `needs` the tasks not ended
-    by whom they concern. `outstanding`, `begun`, `todo` and `reserved` are about records of every
+    by goal, `waiting_of` the waiting by the robot that is to do them, `needs` the waiting by whom
+    they concern. `outstanding`, `begun`, `todo` and `reserved` are about records of every
     revision: orders, tasks done and waiting by robot and actor, and how many actors a robot has
     begun and has more of. `exposed` has, by variable, tasks not ended that need it and have no
     unfinished supplier. No task becomes late before `late_s`, on the fleet's clock.
@@ -132,7 +132,7 @@ class PlanIndex(msgspec.Struct, frozen=True, eq=False):
             if open_.get(record.task) == 0:
                 for robot in sorted(robots_of(record)):
                     ready[robot].append(record.task)
-            if record.state not in ENDED_TASKS:
+            if record.task in open_:
                 needs.update(robots_of(record))
         begun: Counter[tuple[str, str]] = Counter()
         todo: Counter[tuple[str, str]] = Counter()
@@ -224,10 +224,6 @@ class PlanIndex(msgspec.Struct, frozen=True, eq=False):
         alive = (after not in ENDED_TASKS) - (before is not None and before not in ENDED_TASKS)
         exposed = self.exposed
         if alive:
-            needs = self.needs
-            for name in robots_of(new):
-                needs = _add(needs, name, alive)
-            changes["needs"] = needs
             for variable in graph.needs.get(task, ()):
                 show = alive > 0 and not _supplied(graph, records, task, variable)
                 exposed = _listed(exposed, variable, task, show, graph.position)
@@ -247,6 +243,10 @@ class PlanIndex(msgspec.Struct, frozen=True, eq=False):
                     open_ = open_.set(later, open_[later] + undone)
                     ready = _offered(ready, records[later], open_[later] == 0, graph.position)
         if (before is TaskState.WAITING) != (after is TaskState.WAITING):
+            needs = self.needs
+            for name in robots_of(new):
+                needs = _add(needs, name, 1 if after is TaskState.WAITING else -1)
+            changes["needs"] = needs
             if after is TaskState.WAITING:
                 open_ = open_.set(task, sum(_unmet(records, name) for name in graph.befores[task]))
             else:

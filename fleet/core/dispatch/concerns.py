@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from fleet.core.fleet_index import place_of, subjects_of
-from fleet.core.plan_entry import PlanEntry
 from fleet.core.plan_index import robots_of
 from fleet.core.state import State
 from fleet.core.touches import Part, Touch
@@ -41,7 +40,7 @@ class Concerns:
                 case Part.PLAN:
                     found._plan(state, name)
                 case Part.RECORD:
-                    found._record(state.plans.get(name), task)
+                    found._record(state, name, task)
                 case Part.GOAL:
                     found._goals(state, [name])
                 case Part.FACT:
@@ -62,11 +61,12 @@ class Concerns:
         else:
             self.robots.update(entry.index.ready)
 
-    def _record(self, entry: PlanEntry | None, task: str) -> None:
+    def _record(self, state: State, plan: str, task: str) -> None:
+        entry = state.plans.get(plan)
         record: TaskRecord | None = entry.records.get(task) if entry is not None else None
         if entry is None or record is None or task in entry.index.outstanding:
             return
-        plan, index = entry.plan.plan, entry.index
+        index = entry.index
         self.robots.update(robots_of(record))
         if record.state is TaskState.WAITING:
             self.tasks[plan].add(task)
@@ -76,8 +76,9 @@ class Concerns:
                 self.goals[plan].add(record.goal)
         if index.unfinished == 0 or index.broken or entry.cancelling:
             self.plans.add(plan)
-        if entry.unwanted:
-            self.robots.update(index.ready)
+        if task in entry.unwanted:  # what is about the same facts may start now
+            for other in state.index.active:
+                self.robots.update(state.plans[other].index.ready)
 
     def _goals(self, state: State, goals: Iterable[str]) -> None:
         for goal in goals:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fleet.core.dispatch.lost_robots import lost
 from fleet.core.dispatch.ready_tasks import by_priority, may_order, order_if_ready
 from fleet.core.state import State
 
@@ -10,7 +11,10 @@ def break_deadlock(state: State) -> State:
     """Where nobody moves, one task gets its robots in spite of reservations; what that upsets is
     planned again."""
     alive = [state.plans[plan] for plan in by_priority(state, state.index.active)]
-    if any(entry.job is not None or entry.index.outstanding for entry in alive):
+    if any(entry.job is not None for entry in alive):
+        return state
+    robots = (record.robot for entry in alive for record in entry.outstanding())
+    if any(robot is not None and not lost(state, robot) for robot in robots):
         return state
     for entry in alive:
         if not may_order(entry):

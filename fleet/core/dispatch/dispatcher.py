@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from fleet.core.dispatch.concerns import Concerns
 from fleet.core.dispatch.deadlock import break_deadlock
 from fleet.core.dispatch.delays import next_lateness, react_to_delays
-from fleet.core.dispatch.lost_robots import fail_tasks_of_lost_robots, next_loss
+from fleet.core.dispatch.lost_robots import give_up_work_of_lost_robots, lost, next_loss
 from fleet.core.dispatch.ready_tasks import by_priority, may_order, order_ready
 from fleet.core.dispatch.replan_triggers import new_robots, why_replan
 from fleet.core.handlers.goals import next_stage
@@ -30,7 +30,7 @@ def advance(state: State) -> State:
     """
     looked = UNTOUCHED
     while True:
-        state = react_to_delays(fail_tasks_of_lost_robots(state))
+        state = react_to_delays(give_up_work_of_lost_robots(state))
         if state.policy.auto_plan:
             state = plan_waiting_goals(state)
         if state.touches is looked:
@@ -88,11 +88,18 @@ def _look_at_plan(state: State, entry: PlanEntry) -> State:
 
 
 def _cancel(state: State, entry: PlanEntry) -> State:
-    if entry.index.outstanding:
+    outstanding = entry.outstanding()
+    if any(record.robot is None or not lost(state, record.robot) for record in outstanding):
         return state  # their orders now say `cancelled`; the workers' reports bring us back here
+    unwanted = tuple(record.task for record in outstanding)
     records = with_waiting_cancelled(entry, "the plan was cancelled")
     entry = replace(
-        entry, state=PlanState.CANCELLED, cancelling=False, records=records, replan=None
+        entry,
+        state=PlanState.CANCELLED,
+        cancelling=False,
+        records=records,
+        unwanted=unwanted,
+        replan=None,
     )
     state = set_entry(state, entry)
     return mark_goals(

@@ -34,7 +34,7 @@ MAX_ATTEMPTS = 3
 
 
 def report_received(state: State, event: events.ReportReceived) -> State:
-    """A report of an attempt that is not current only brings facts."""
+    """A report of an attempt that is not current, or of another planner's, only brings facts."""
     report = event.report
     for fact in report.facts:
         state = believe_if_newer(state, fact)
@@ -43,6 +43,7 @@ def report_received(state: State, event: events.ReportReceived) -> State:
     if (
         entry is None
         or record is None
+        or report.planner not in (None, entry.lineage)
         or record.state not in OUTSTANDING
         or (report.robot, report.attempt) != (record.robot, record.attempt)
     ):
@@ -62,6 +63,8 @@ def report_received(state: State, event: events.ReportReceived) -> State:
         case ReportState.INTERRUPTED:
             return _interrupted(state, entry, record, report)
         case ReportState.REFUSED:
+            if entry.ended or record.task in entry.unwanted:
+                return set_record(state, entry, _ended(record, report, TaskState.CANCELLED))
             if report.retryable and record.attempt < MAX_ATTEMPTS:
                 return set_record(state, entry, _again(record, report))
             return _failed(state, entry, record, report)
@@ -95,7 +98,23 @@ def _succeeded(state: State, entry: PlanEntry, record: TaskRecord, report: Repor
         if literal.variable not in reported:
             time_s = report.ended_s or state.time_s
             state = conclude(state, Fact.of(literal, PLANNER_SOURCE, time_s))
-    return set_record(state, entry, _ended(record, report, TaskState.SUCCEEDED))
+    state = set_record(state, entry, _ended(record, report, TaskState.SUCCEEDED))
+    if record.task in entry.unwanted:
+        entry = state.plans[entry.plan.plan]
+        if (again := _wanted_again(entry, record)) is not None:
+            state = set_record(state, entry, again)
+    return state
+
+
+def _wanted_again(entry: PlanEntry, done: TaskRecord) -> TaskRecord | None:
+    """What was done after it had been given up need not be done again, if it is still wanted."""
+    for record in entry.current():
+        if (record.skill, record.args) == (done.skill, done.args) and not entry.index.open.get(
+            record.task, 1
+        ):
+            reason = f"{done.robot} had done it as {done.task}"
+            return replace(record, state=TaskState.SUCCEEDED, reason=reason)
+    return None
 
 
 def _learned(state: State, record: TaskRecord, report: Report, action: Action | None) -> State:

@@ -29,21 +29,19 @@ def robot_unregistered(state: State, event: events.RobotUnregistered) -> State:
     state = replace(
         state,
         robots=state.robots.without(event.robot),
-        gone_since=state.gone_since.set(event.robot, 0.0),
+        gone_since=state.gone_since.set(event.robot, event.wall_time_s),
     )
     return robot_changed(state, event.robot)
 
 
 def worker_connected(state: State, event: events.WorkerConnected) -> State:
-    """The robot is no longer away."""
+    """The robot is no longer away, if it is registered."""
     runs = state.connected.get(event.robot, ())
     if event.incarnation in runs:
         return state
-    state = replace(
-        state,
-        connected=state.connected.set(event.robot, (*runs, event.incarnation)),
-        gone_since=state.gone_since.without(event.robot),
-    )
+    state = replace(state, connected=state.connected.set(event.robot, (*runs, event.incarnation)))
+    if event.robot in state.robots:
+        state = replace(state, gone_since=state.gone_since.without(event.robot))
     return robot_changed(state, event.robot)
 
 

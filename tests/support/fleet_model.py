@@ -143,7 +143,8 @@ class FleetModel:
             assert entry.job is not None
             ended = [t for t in entry.job.under_way if entry.records[t].state not in OUTSTANDING]
             self.met["work ended meanwhile"] += bool(ended)
-            self.met["another reason meanwhile"] += entry.replan != entry.job.reason
+            new = [r for r in entry.open_reasons if r.number not in entry.job.takes_up]
+            self.met["another reason meanwhile"] += bool(new)
 
     def _check_order(self, order: Any) -> None:
         assert isinstance(order, Order)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from fleet.core.plan_entry import PlanEntry, ReplanScope
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import set_entry
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
@@ -28,7 +29,8 @@ def fail_tasks_of_lost_robots(state: State) -> State:
             }
             if failed or entry.replan is None:
                 entry = replace(entry, records=entry.records.updated(failed))
-                state = set_entry(state, entry.to_replan(ReplanScope.REALLOCATE, reason))
+                entry = entry.to_replan(ReplanScope.REALLOCATE, reason, robots=(robot,))
+                state = set_entry(state, entry)
     return state
 
 

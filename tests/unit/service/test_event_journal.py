@@ -10,7 +10,8 @@ import msgspec
 import pytest
 
 from fleet.core.events import decode_event
-from fleet.core.plan_entry import PlanEntry, PlanningJob, PlanOutcome, ReplanReason
+from fleet.core.plan_entry import PlanEntry, PlanningJob, PlanOutcome
+from fleet.core.replan_reasons import ReplanReason
 from fleet.core.state import Policy, State
 from fleet.core.step import replay, step
 from fleet.service import event_journal

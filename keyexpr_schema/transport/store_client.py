@@ -107,14 +107,17 @@ class StoreClient:
     async def list(self, pattern: str, timeout_s: float) -> tuple[Sample, ...]:
         """The newest stored value of every key that `pattern` matches, undecoded.
 
+        `timeout_s` holds for each page of a long listing, not for the whole of it.
+
         Raises:
             Unreachable: no router and store could be asked within `timeout_s`.
         """
         try:
+            await self._link.router.wait_up(timeout_s)
+            if "*" in pattern and (paged := await self._paged(pattern, timeout_s)) is not None:
+                return paged
             async with asyncio.timeout(timeout_s):
-                await self._link.router.wait_up()
-                paged = await self._paged(pattern, timeout_s) if "*" in pattern else None
-                return paged if paged is not None else await self._settled(pattern, timeout_s)
+                return await self._settled(pattern, timeout_s)
         except TimeoutError:
             if not self._link.router.up:
                 raise Unreachable.no_router(self._endpoints, timeout_s) from None
@@ -146,9 +149,16 @@ class StoreClient:
 
         None: no store answered that can tell, be it that there is none now (this link may be new),
         or that it is a zenohd storage.
+
+        Raises:
+            Unreachable: there is one, but it failed or took longer than `timeout_s`.
         """
         asked = StoreChangesQuery(patterns=tuple(patterns), position=position, limit=limit)
         replies = await self._ask(STORE_CHANGES, asked, timeout_s)
+        if replies.errors:
+            raise Unreachable(f"the store cannot list what it has: {replies.errors[0]}")
+        if replies.timed_out and not replies.values:
+            raise Unreachable(f"the store did not answer within {timeout_s:g} s")
         if not replies.values:
             return None
         answer: StoreChanges = decode_reply(STORE_CHANGES, replies.values[0])  # type: ignore[assignment]

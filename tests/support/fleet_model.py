@@ -79,6 +79,8 @@ class FleetModel:
 
     def receive(self, kind: type[Event], **fields: Any) -> None:
         """One event into the core; its effects are carried out."""
+        if kind is events.PlannerStarted:
+            fields.setdefault("logic", 1)
         self.time_s += 1.0
         self.wall_s += 0.01
         self.apply(kind(time_s=self.time_s, wall_time_s=self.wall_s, **fields))

@@ -9,6 +9,7 @@ from fleet.core.dispatch.delays import next_lateness
 from fleet.core.dispatch.lost_robots import fail_tasks_of_lost_robots, next_loss
 from fleet.core.dispatch.ready_tasks import by_priority, order_if_ready
 from fleet.core.dispatch.replan_triggers import unforeseen
+from fleet.core.dispatch.while_replanning import stands_still
 from fleet.core.handlers.goals import next_stage
 from fleet.core.handlers.requests import plan_waiting_goals
 from fleet.core.plan_entry import PlanEntry
@@ -59,7 +60,7 @@ def _cancel(state: State, entry: PlanEntry) -> State:
 def _run(state: State, plan: str) -> State:
     """What is reached is marked, what is done ends, and what is ready is ordered: also while the
     plan is made again, as far as that does not touch it."""
-    if state.plans[plan].cancelling:
+    if state.plans[plan].cancelling or stands_still(state, state.plans[plan]):
         return state
     state = _mark_reached(state, state.plans[plan])
     entry = state.plans[plan]

@@ -45,7 +45,7 @@ def order_if_ready(state: State, plan: str, record: TaskRecord, reservations: bo
     if action is None:
         reason = f"{record.task} cannot start: there is no skill {record.skill} any more"
         return give_up(state, entry, reason)
-    if waits_for_new_plan(entry, record, action):
+    if waits_for_new_plan(state, entry, record, action):
         return state
     if not all(_is_free(state, robot, plan, reservations) for robot in action.participants):
         return state

@@ -40,7 +40,8 @@ def contradicted(state: State, entry: PlanEntry, fact: Fact) -> PlanEntry | None
         and (action := action_of(record, state.skills)) is not None
     }
     under_way = [each for each in unfinished.values() if each[0].state in OUTSTANDING]
-    if any(_is_of_its_making(record, action, fact) for record, action in under_way):
+    making = any(_is_of_its_making(record, action, fact) for record, action in under_way)
+    if making and state.plans_while_acting:
         return None
     for record, action in unfinished.values():
         needed = [literal for literal in action.before if literal.variable == known]

@@ -12,16 +12,22 @@ from __future__ import annotations
 from fleet.core.model.skills import Action
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry
 from fleet.core.replan_reasons import ReplanReason
+from fleet.core.state import State
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 
-def waits_for_new_plan(entry: PlanEntry, record: TaskRecord, action: Action) -> bool:
+def stands_still(state: State, entry: PlanEntry) -> bool:
+    """Whether nothing of a plan is to be ordered, whatever it is."""
+    return not state.plans_while_acting and (entry.job is not None or entry.replan is not None)
+
+
+def waits_for_new_plan(state: State, entry: PlanEntry, record: TaskRecord, action: Action) -> bool:
     """Whether a task of a plan that is made again is not to be ordered before that is done."""
-    if not entry.is_wanted(record):
-        return True
     reasons = entry.open_reasons
     if not reasons and entry.job is None:
         return False
+    if stands_still(state, entry) or not entry.is_wanted(record):
+        return True
     if any(_touches(reason, record, action) for reason in reasons):
         return True
     if entry.job is None or (entry.discarded == 0 and _keeps_actors(entry)):

@@ -104,6 +104,8 @@ def _without_moot_reasons(state: State, entry: PlanEntry) -> PlanEntry:
     ahead = {record.task for record in entry.current() if record.state not in ENDED_TASKS}
 
     def holds(reason: ReplanReason) -> bool:
+        if not state.plans_while_acting:
+            return True
         if reason.variables:
             facts = (state.facts.get(variable) for variable in reason.variables)
             return any(f is not None and contradicted(state, entry, f) is not None for f in facts)
@@ -188,7 +190,7 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
         state = mark_goals(state, wish.goals, GoalState.WAITING, None, event.reason)
     if not reasons:
         return set_entry(state, entry)  # the plan as it was still stands
-    if wishes or entry.replan is not None:
+    if wishes or (entry.replan is not None and state.plans_while_acting):
         again = replace(
             entry,
             reasons=(*reasons, *entry.reasons),

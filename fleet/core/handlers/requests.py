@@ -218,6 +218,8 @@ def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State | st
         return "the request names no skill for the new task"
     if entry.cancelling:
         return f"plan {ask.plan} is being cancelled"
+    if entry.job is not None and not state.plans_while_acting:
+        return f"plan {ask.plan} is being changed; add the task when that is done"
     for before in ask.after:
         if before not in entry.records:
             tasks = ", ".join(entry.records) or "no tasks"

@@ -6,6 +6,7 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.dispatch.replan_triggers import contradicted
+from fleet.core.dispatch.while_replanning import stands_still
 from fleet.core.handlers import goals, statements
 from fleet.core.state import State
 from fleet.core.state_updates import believe, set_entry
@@ -21,14 +22,11 @@ def fact_put(state: State, event: events.FactPut) -> State:
         return state
     state = changed
     for entry in state.plans.values():
-        if entry.state is not PlanState.RUNNING:
+        if entry.state is not PlanState.RUNNING or stands_still(state, entry):
             continue
-        if (
-            known is not None
-            and known.value == fact.value
-            and any(fact.key in reason.variables for reason in entry.reasons)
-        ):
-            continue  # said again, and being seen to
+        said_again = known is not None and known.value == fact.value
+        if said_again and any(fact.key in reason.variables for reason in entry.reasons):
+            continue  # it is being seen to
         if (against := contradicted(state, entry, fact)) is not None:
             state = set_entry(state, against)
     return state

@@ -92,6 +92,7 @@ def _as_it_was(entry: PlanEntry, job: PlanningJob, event: events.PlanningSucceed
         and len(event.plan.tasks) == len(job.residual.tasks)
         and not any(
             record.state in (TaskState.FAILED, TaskState.CANCELLED)
+            or record.task in entry.unwanted
             or (record.state is not TaskState.SUCCEEDED and not entry.is_wanted(record))
             for record in entry.current()
         )

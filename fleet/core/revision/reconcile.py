@@ -73,9 +73,11 @@ def reconcile(entry: PlanEntry, event: events.PlanningSucceeded, world: WorldMod
 
 
 def _under_way(entry: PlanEntry, started: Iterable[str]) -> Iterator[str]:
-    """Those of the tasks that a new plan can go on with: they are done, or being done."""
+    """Those of the tasks that a new plan can go on with: they are done, or being done, and not
+    being cancelled."""
     for name in started:
-        if entry.records[name].state in {*OUTSTANDING, TaskState.SUCCEEDED}:
+        state = entry.records[name].state
+        if state in {*OUTSTANDING, TaskState.SUCCEEDED} and name not in entry.unwanted:
             yield name
 
 

@@ -296,6 +296,19 @@ class FleetModel:
                 return
         raise AssertionError("the plan does not come to an end")
 
+    def finish_cancelling(self, limit: int = 500) -> None:
+        """As `finish`, but what is cancelled is stopped and not carried out."""
+        for _ in range(limit):
+            if self.answers:
+                self.answer()
+            elif stopped := [order for order in self.orders() if order.cancelled]:
+                self.cancelled(stopped[0])
+            elif orders := self.orders():
+                self.succeed(orders[0])
+            else:
+                return
+        raise AssertionError("the plan does not come to an end")
+
     # --- the planner crashes ---------------------------------------------------------------------
 
     def crash(self) -> None:

@@ -89,7 +89,12 @@ class Running:
 
     def __post_init__(self) -> None:
         self.state, self.time_s = State(), 0.0
-        self.receive(events.PlannerStarted, epoch=1, incarnation="bench")
+        self.receive(
+            events.PlannerStarted,
+            epoch=1,
+            incarnation="bench",
+            skills=dict(self.composition.skills),
+        )
         for number in range(PLACES):
             ways = {f"room_{n}": abs(n - number) * STEP_M for n in range(PLACES) if n != number}
             place = Place(place=f"room_{number}", label=f"room {number}", travel_m=ways)
@@ -125,14 +130,14 @@ class Running:
         """One event; planning jobs are done at once."""
         self.time_s += wait_s
         at = {"time_s": self.time_s, "wall_time_s": self.time_s}
-        self.state, effects = step(self.state, kind(**at, **fields), self.composition.skills)
+        self.state, effects = step(self.state, kind(**at, **fields))
         for effect in effects:
             if isinstance(effect, MakePlan):
                 made = run_planning_job(effect.job, self.state, self.composition, at)
                 if not isinstance(made, PlanningSucceeded):
                     raise SystemExit(f"there is no plan: {made.reason}")
                 self.made = made
-                self.state, _ = step(self.state, made, self.composition.skills)
+                self.state, _ = step(self.state, made)
 
     def put_fact(self, subject: str, relation: str, value: str) -> None:
         """A fact is put."""

@@ -199,7 +199,13 @@ class FleetRun:
 
     def _introduce(self) -> None:
         policy = Policy(interpreter=self._interpreter is not None)
-        self._handle(events.PlannerStarted, epoch=1, incarnation=INCARNATION, policy=policy)
+        self._handle(
+            events.PlannerStarted,
+            epoch=1,
+            incarnation=INCARNATION,
+            policy=policy,
+            skills=dict(self._composition.skills),
+        )
         for place in self._places.values():
             self._world.apply(Change(PLACE, PlaceAddress(place.place), place, ""))
             self._handle(events.PlacePut, place=place)
@@ -259,7 +265,7 @@ class FleetRun:
         self._busy = True
         while self._pending:
             before = self.state
-            self.state, effects = step(before, self._pending.popleft(), self._composition.skills)
+            self.state, effects = step(before, self._pending.popleft())
             # All of a step's effects hold together: what ends makes room for what begins.
             for effect in sorted(effects, key=lambda e: not isinstance(e, Retract)):
                 self._carry_out(effect)

@@ -9,6 +9,7 @@ from typing import Any
 
 import msgspec
 
+from fleet.core.model.skills import SkillModel
 from fleet.core.plan_entry import PlanOutcome
 from fleet.core.state import Policy
 from keyexpr_schema.payloads.durations import Durations
@@ -31,11 +32,19 @@ class Event(msgspec.Struct, frozen=True, kw_only=True, tag_field="event", tag=Tr
 
 
 class PlannerStarted(Event, frozen=True, kw_only=True):
-    """A run of the planner begins; its epoch is higher than that of any run before."""
+    """A run of the planner begins; its epoch is higher than that of any run before.
+
+    It brings all that decides how events are handled from here on: the policy, the skill models,
+    and the number of the core's logic (`fleet.core.state.LOGIC`). Journals from before that leave
+    the skills to whoever replays them. `lineage` is new in the first run over a journal.
+    """
 
     epoch: int
     incarnation: str
     policy: Policy = Policy()
+    skills: dict[str, SkillModel] | None = None
+    logic: int = 0
+    lineage: str = ""
 
 
 class GoalPut(Event, frozen=True, kw_only=True):

@@ -8,6 +8,7 @@ from enum import Enum
 import msgspec
 from msgspec.structs import replace
 
+from fleet.core.table import Table
 from keyexpr_schema.payloads.plans import ENDED_PLANS, Plan, PlanChange, PlanState, Task, Violation
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
@@ -105,14 +106,14 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True):
     state: PlanState
     planner: str = "symbolic"
     start: bool = True
-    records: dict[str, TaskRecord] = {}
+    records: Table[str, TaskRecord] = Table()
     outcome: PlanOutcome = PlanOutcome()
     job: PlanningJob | None = None
     replan: ReplanReason | None = None
     replan_reasons: int = 0
     """How many reasons to plan again there have been."""
     late: tuple[str, ...] = ()
-    failures: dict[str, int] = {}
+    failures: Table[str, int] = Table()
     amendment: Task | None = None
     """A task that someone wants added, and the request for it."""
     amendment_request: str | None = None

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TypeVar
-
 import msgspec
 
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import PlanEntry, PlanningJob
+from fleet.core.table import Table
 from fleet.language import Vocabulary
 from fleet.language.vocabulary import SkillPhrase
 from keyexpr_schema.facts import AT, HOLDING, ON, FactKey
@@ -19,8 +17,8 @@ from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
-K = TypeVar("K")
-T = TypeVar("T")
+LOGIC = 1
+"""Counts up whenever the core comes to handle an event otherwise than before."""
 
 
 class Policy(msgspec.Struct, frozen=True, kw_only=True):
@@ -42,29 +40,34 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
 class State(msgspec.Struct, frozen=True, kw_only=True):
     """What the planner knows."""
 
+    skills: dict[str, SkillModel] = {}
+    logic: int = 0
+    """The logic that the planner's latest run handles events by."""
+    lineage: str = ""
+    """Names the journal that this state comes from; attempts of another planner have another."""
     epoch: int = 0
     incarnation: str = "none"
     time_s: float = 0.0
     wall_time_s: float = 0.0
-    goals: dict[str, Goal] = {}
-    goal_states: dict[str, GoalStatus] = {}
-    statements: dict[str, Statement] = {}
-    statement_states: dict[str, StatementStatus] = {}
-    places: dict[str, Place] = {}
-    objects: dict[str, Object] = {}
-    robots: dict[str, RobotSpec] = {}
-    facts: dict[FactKey, Fact] = {}
+    goals: Table[str, Goal] = Table()
+    goal_states: Table[str, GoalStatus] = Table()
+    statements: Table[str, Statement] = Table()
+    statement_states: Table[str, StatementStatus] = Table()
+    places: Table[str, Place] = Table()
+    objects: Table[str, Object] = Table()
+    robots: Table[str, RobotSpec] = Table()
+    facts: Table[FactKey, Fact] = Table()
     durations: dict[str, Durations] = {}
     """Learned from reports, by type of robot."""
-    connected: dict[str, tuple[str, ...]] = {}
+    connected: Table[str, tuple[str, ...]] = Table()
     """The runs of each robot's worker that are connected."""
-    gone_since: dict[str, float] = {}
+    gone_since: Table[str, float] = Table()
     """Unix time [s] at which the last worker of a robot went away."""
-    plans: dict[str, PlanEntry] = {}
+    plans: Table[str, PlanEntry] = Table()
     past_plans: tuple[str, ...] = ()
-    answers: dict[str, Answer] = {}
+    answers: Table[str, Answer] = Table()
     jobs: int = 0
-    previews: dict[str, PlanningJob] = {}
+    previews: Table[str, PlanningJob] = Table()
     """Planning jobs of dry runs, by request."""
     interpreting: tuple[str, ...] = ()
     """Goals whose sentences a language model reads now."""
@@ -89,10 +92,10 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
         phrases = self.policy.skill_phrases
         return Vocabulary(self.places, self.objects, self.robots, whereabouts, rests, phrases)
 
-    def world(self, skills: Mapping[str, SkillModel]) -> WorldModel:
+    def world(self) -> WorldModel:
         """The world as believed now."""
         return WorldModel.of(
-            skills,
+            self.skills,
             self.places.values(),
             self.objects.values(),
             self.robots.values(),
@@ -115,13 +118,3 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     def fact(self, relation: str, subject: str) -> Fact | None:
         """The fact about a variable, if there is one."""
         return self.facts.get(FactKey(relation, subject))
-
-
-def put(mapping: Mapping[K, T], key: K, value: T) -> dict[K, T]:
-    """A copy of `mapping` with one entry set."""
-    return {**mapping, key: value}
-
-
-def without(mapping: Mapping[K, T], key: K) -> dict[K, T]:
-    """A copy of `mapping` with one entry left out."""
-    return {name: value for name, value in mapping.items() if name != key}

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from msgspec.structs import replace
 
 from fleet.core.plan_entry import PlanEntry
-from fleet.core.state import State, put
+from fleet.core.state import State
+from fleet.core.table import Table
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, Violation
 from keyexpr_schema.payloads.requests import Answer
@@ -19,7 +20,7 @@ def believe(state: State, fact: Fact) -> State:
     """Believe a fact, whatever was known of its variable."""
     if state.facts.get(fact.key) == fact:
         return state
-    return replace(state, facts=put(state.facts, fact.key, fact))
+    return replace(state, facts=state.facts.set(fact.key, fact))
 
 
 def believe_if_newer(state: State, fact: Fact) -> State:
@@ -30,7 +31,7 @@ def believe_if_newer(state: State, fact: Fact) -> State:
 
 def set_goal(state: State, status: GoalStatus) -> State:
     """Change what is published of a goal."""
-    return replace(state, goal_states=put(state.goal_states, status.goal, status))
+    return replace(state, goal_states=state.goal_states.set(status.goal, status))
 
 
 def mark_goals(
@@ -91,13 +92,13 @@ def without_goal(state: State, plan: Plan, goal: str) -> Plan:
 def set_entry(state: State, entry: PlanEntry) -> State:
     """Change what is kept of a plan."""
     return replace(
-        state, plans=put(state.plans, entry.plan.plan, replace(entry, changed_s=state.time_s))
+        state, plans=state.plans.set(entry.plan.plan, replace(entry, changed_s=state.time_s))
     )
 
 
 def set_record(state: State, entry: PlanEntry, record: TaskRecord) -> State:
     """Change what is kept of a task."""
-    return set_entry(state, replace(entry, records=put(entry.records, record.task, record)))
+    return set_entry(state, replace(entry, records=entry.records.set(record.task, record)))
 
 
 def cancel(state: State, entry: PlanEntry) -> State:
@@ -108,14 +109,15 @@ def cancel(state: State, entry: PlanEntry) -> State:
     return set_entry(state, replace(entry, cancelling=True, job=None))
 
 
-def with_waiting_cancelled(entry: PlanEntry, reason: str) -> dict[str, TaskRecord]:
+def with_waiting_cancelled(entry: PlanEntry, reason: str) -> Table[str, TaskRecord]:
     """The entry's records, those of waiting tasks cancelled."""
-    return {
-        name: record
-        if record.state is not TaskState.WAITING
-        else replace(record, state=TaskState.CANCELLED, reason=reason)
-        for name, record in entry.records.items()
-    }
+    return entry.records.updated(
+        {
+            name: replace(record, state=TaskState.CANCELLED, reason=reason)
+            for name, record in entry.records.items()
+            if record.state is TaskState.WAITING
+        }
+    )
 
 
 def give_up(state: State, entry: PlanEntry, reason: str) -> State:
@@ -147,4 +149,4 @@ def answer(
     reply = Answer(
         request=request, accepted=accepted, sentence=sentence, plan=plan, violations=violations
     )
-    return replace(state, answers=put(state.answers, request, reply))
+    return replace(state, answers=state.answers.set(request, reply))

@@ -1,4 +1,4 @@
-"""The planner's pure core: `step(state, event, skills)` gives the next state and effects.
+"""The planner's pure core: `step(state, event)` gives the next state and effects.
 
 It is total: whatever the outside world sends, it returns. It asks no clock and opens no socket;
 time comes in with the events. So a journal of events replays to the same state and effects.
@@ -16,33 +16,41 @@ from fleet.core.dispatch import dispatcher
 from fleet.core.effects import Effect, effects_between
 from fleet.core.events import Event
 from fleet.core.handlers import goals, plan_results, reports, requests, robots, statements, world
-from fleet.core.model.skills import Skills
 from fleet.core.state import State
+from fleet.core.table import Table
 from keyexpr_schema.payloads.goals import ENDED_GOALS
 
 
-def _planner_started(state: State, event: events.PlannerStarted, skills: Skills) -> State:
-    return replace(state, epoch=event.epoch, incarnation=event.incarnation, policy=event.policy)
+def _planner_started(state: State, event: events.PlannerStarted) -> State:
+    return replace(
+        state,
+        epoch=event.epoch,
+        incarnation=event.incarnation,
+        policy=event.policy,
+        skills=state.skills if event.skills is None else event.skills,
+        logic=event.logic,
+        lineage=state.lineage or event.lineage,
+    )
 
 
-def _prior_state_loaded(state: State, event: events.PriorStateLoaded, skills: Skills) -> State:
+def _prior_state_loaded(state: State, event: events.PriorStateLoaded) -> State:
     """Take over what an earlier planner left, so that nothing is done a second time."""
     answers = {answer.request: answer for answer in event.answers}
     goals = {status.goal: status for status in event.goals if status.state in ENDED_GOALS}
     return replace(
         state,
-        answers={**answers, **state.answers},
+        answers=Table({**answers, **state.answers}),
         durations={**{known.model: known for known in event.durations}, **state.durations},
-        goal_states={**goals, **state.goal_states},
+        goal_states=Table({**goals, **state.goal_states}),
         past_plans=(*state.past_plans, *(p for p in event.plans if p not in state.plans)),
     )
 
 
-_Handler = Callable[[State, Any, Skills], State]
+_Handler = Callable[[State, Any], State]
 _HANDLERS: dict[type[Event], _Handler] = {
     events.PlannerStarted: _planner_started,
     events.PriorStateLoaded: _prior_state_loaded,
-    events.TimerFired: lambda state, event, skills: state,
+    events.TimerFired: lambda state, event: state,
     events.GoalPut: goals.goal_put,
     events.GoalDeleted: goals.goal_deleted,
     events.GoalInterpreted: goals.goal_interpreted,
@@ -68,7 +76,7 @@ _HANDLERS: dict[type[Event], _Handler] = {
 }
 
 
-def step(state: State, event: Event, skills: Skills) -> tuple[State, tuple[Effect, ...]]:
+def step(state: State, event: Event) -> tuple[State, tuple[Effect, ...]]:
     """The state after an event, and what is to be done about it.
 
     An event that changes nothing gives back the very same state and no effects.
@@ -78,16 +86,16 @@ def step(state: State, event: Event, skills: Skills) -> tuple[State, tuple[Effec
         time_s=max(state.time_s, event.time_s),
         wall_time_s=max(state.wall_time_s, event.wall_time_s),
     )
-    handled = _HANDLERS[type(event)](now, event, skills)
-    settled = dispatcher.advance(handled, skills)
+    handled = _HANDLERS[type(event)](now, event)
+    settled = dispatcher.advance(handled)
     if settled is now:
         return state, ()
     return settled, effects_between(state, settled)
 
 
-def replay(journal: Iterable[Event], skills: Skills, state: State | None = None) -> State:
+def replay(journal: Iterable[Event], state: State | None = None) -> State:
     """The state after all events of a journal."""
     now = State() if state is None else state
     for event in journal:
-        now, _ = step(now, event, skills)
+        now, _ = step(now, event)
     return now

@@ -17,10 +17,13 @@ import msgspec
 
 from fleet.core.events import Event, decode_event, encode_event
 from fleet.core.state import State
+from fleet.core.table import decode_table, encode_table
 from fleet.errors import FleetError
 
-SNAPSHOT_FORMAT = 2
+SNAPSHOT_FORMAT = 3
 """Counts up whenever a field of the state gets another name or meaning."""
+_READABLE = frozenset({2, SNAPSHOT_FORMAT})
+"""Formats that decode; in format 2 a state had no skills."""
 SNAPSHOT_EVERY = 2000
 """Events between two snapshots; replaying this many takes well under a second."""
 
@@ -86,7 +89,7 @@ class EventJournal:
             self._db.execute("DELETE FROM snapshots")
             self._db.execute(
                 "INSERT INTO snapshots (number, state) VALUES (?, ?)",
-                (cursor.lastrowid, msgspec.msgpack.encode(kept)),
+                (cursor.lastrowid, msgspec.msgpack.encode(kept, enc_hook=encode_table)),
             )
             self._db.execute("COMMIT")
 
@@ -104,10 +107,10 @@ class EventJournal:
         if row is None:
             return 0, State()
         try:
-            kept = msgspec.msgpack.decode(row[1], type=_Snapshot)
+            kept = msgspec.msgpack.decode(row[1], type=_Snapshot, dec_hook=decode_table)
         except msgspec.DecodeError:
             return 0, State()
-        return (int(row[0]), kept.state) if kept.format == SNAPSHOT_FORMAT else (0, State())
+        return (int(row[0]), kept.state) if kept.format in _READABLE else (0, State())
 
     def events(self, after: int = 0) -> Iterator[Event]:
         """Every event with a higher number than `after`, in order."""

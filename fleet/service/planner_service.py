@@ -19,7 +19,7 @@ from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, ef
 from fleet.core.events import At, Event
 from fleet.core.model.skills import phrases_of
 from fleet.core.plan_entry import PlanningJob
-from fleet.core.state import Policy, State
+from fleet.core.state import LOGIC, Policy, State
 from fleet.core.step import replay, step
 from fleet.errors import Superseded
 from fleet.service.catch_up import prior_state, stale_documents, until_synced
@@ -53,7 +53,6 @@ class PlannerService:
         self._session = session
         self._journal = journal
         self._composition = composition
-        self._skills = composition.skills
         self._policy = replace(
             policy or Policy(),
             interpreter=composition.language_model.configured,
@@ -80,8 +79,10 @@ class PlannerService:
             Superseded: a planner with a higher epoch is in charge.
         """
         number, snapshot = self._journal.snapshot()
+        if not snapshot.skills:  # in journals of earlier versions no event brings them
+            snapshot = replace(snapshot, skills=dict(self._composition.skills))
         first_run = self._journal.empty
-        self._state = replay(self._journal.events(number), self._skills, snapshot)
+        self._state = replay(self._journal.events(number), snapshot)
         async with AsyncExitStack() as stack:
             watch = await stack.enter_async_context(
                 self._session.watch(*WATCHED, SIM_CLOCK, PLANNER_STATUS)
@@ -123,7 +124,13 @@ class PlannerService:
         epoch = 1 + max(self._state.epoch, status.epoch if status else 0)
         self._apply(
             events.PlannerStarted(
-                epoch=epoch, incarnation=self._incarnation, policy=self._policy, **self._at()
+                epoch=epoch,
+                incarnation=self._incarnation,
+                policy=self._policy,
+                skills=dict(self._composition.skills),
+                logic=LOGIC,
+                lineage=self._incarnation,
+                **self._at(),
             )
         )
         await self._session.confirm(
@@ -135,7 +142,7 @@ class PlannerService:
                 planners=tuple(self._composition.planners),
                 strategies=self._composition.strategies,
                 allocators=tuple(self._composition.allocators),
-                skills=tuple(self._skills),
+                skills=tuple(self._composition.skills),
             ),
             timeout_s=3600.0,
         )
@@ -211,7 +218,7 @@ class PlannerService:
             self._apply(event)
 
     def _apply(self, event: Event) -> None:
-        state, effects = step(self._state, event, self._skills)
+        state, effects = step(self._state, event)
         if state is self._state:
             return
         self._journal.append(event, state)

@@ -39,7 +39,7 @@ def run_planning_job(
         choices = ", ".join(sorted(composition.allocators))
         result = NoPlan(f"there is no allocator {job.allocator}: choose one of {choices}")
     else:
-        run = _Run(job, state, composition, at, state.world(composition.skills), allocator)
+        run = _Run(job, state, composition, at, state.world(), allocator)
         result = run.repaired() or run.planned()
     took_s = time.perf_counter() - started
     if isinstance(result, PlanningSucceeded):

@@ -101,6 +101,13 @@ class Order(Payload, frozen=True, kw_only=True):
     `(epoch, revision, attempt)` fences it: a worker refuses an order older than one it has seen.
     `cancelled` asks the worker to stop the attempt and report. `deadline_s` bounds the whole
     attempt on the fleet's clock, counted from its start.
+
+    `planner` is the lineage of the planner's journal: made once with it, and kept over restarts. A
+    planner that lost its journal counts anew under another one, and what it orders by the same
+    names are other attempts. `None`: from a planner that does not say so.
+
+    `serial` numbers the attempts of a lineage, over all plans and robots: it rises by each and
+    never returns, so that a worker can forget what is over and still refuse it. 0: not numbered.
     """
 
     robot: Id
@@ -113,6 +120,8 @@ class Order(Payload, frozen=True, kw_only=True):
     args: dict[str, str]
     deadline_s: float
     cancelled: bool = False
+    planner: Id | None = None
+    serial: int = 0
 
 
 class ReportState(str, Enum):
@@ -134,7 +143,8 @@ class Report(Payload, frozen=True, kw_only=True):
     """What a worker says of an attempt. Put again on the same key as the attempt goes on.
 
     `facts` are what the attempt changed or discovered. `retryable` says whether the same order
-    could succeed if it were given again.
+    could succeed if it were given again. `planner` is that of the attempt's order: a planner hears
+    reports of its own lineage, and those that name none.
     """
 
     robot: Id
@@ -151,3 +161,4 @@ class Report(Payload, frozen=True, kw_only=True):
     retryable: bool = True
     started_s: float | None = None
     ended_s: float | None = None
+    planner: Id | None = None

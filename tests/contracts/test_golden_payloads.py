@@ -1,7 +1,8 @@
 """Bytes of every payload as they were once written still decode, and nothing in them is lost.
 
-For a new payload type run `python -m tests.contracts.test_golden_payloads` and commit what it adds
-under golden/. Bytes that are there are never rewritten.
+For a new payload type or a new field run `python -m tests.contracts.test_golden_payloads` and
+commit what it adds under golden/ (`full-2` beside `full` for a field more). Bytes that are there
+are never rewritten.
 """
 
 from __future__ import annotations
@@ -65,7 +66,13 @@ def variants(kind: type[Payload]) -> dict[str, Payload]:
     return {"full": sample(kind), "least": required_only(kind)}
 
 
-CASES = [(name, kind, v) for name, kind in top_level().items() for v in ("full", "least")]
+def variants_of(name: str) -> list[str]:
+    """The variants that must be there, and those that earlier fields left."""
+    later = sorted(path.name.split(".")[-2] for path in GOLDEN.glob(f"{name}.full-*.json"))
+    return ["full", "least", *later]
+
+
+CASES = [(name, kind, v) for name, kind in top_level().items() for v in variants_of(name)]
 
 
 @pytest.mark.parametrize(("name", "kind", "variant"), CASES)
@@ -93,6 +100,15 @@ def test_no_golden_bytes_without_a_payload():
     """A version that is gone from the table would leave bytes that nobody can read any more."""
     names = {f"{name}.{variant}.json" for name, _, variant in CASES}
     assert {path.name for path in GOLDEN.glob("*.json")} == names
+
+
+@pytest.mark.parametrize(("name", "kind"), top_level().items())
+def test_every_field_stands_in_golden_bytes(name, kind):
+    fresh = msgspec.json.decode(msgspec.json.encode(sample(kind)))
+    assert any(
+        covers(msgspec.json.decode(path.read_bytes()), fresh)
+        for path in GOLDEN.glob(f"{name}.full*.json")
+    ), "run python -m tests.contracts.test_golden_payloads and commit what it adds"
 
 
 @pytest.mark.parametrize("kind", top_level().values(), ids=top_level().keys())
@@ -159,6 +175,11 @@ def main() -> None:
             path = GOLDEN / f"{name}.{variant}.json"
             if not path.exists():
                 path.write_bytes(msgspec.json.encode(value))
+        full = sorted(GOLDEN.glob(f"{name}.full*.json"))
+        fresh = msgspec.json.encode(sample(kind))
+        wanted = msgspec.json.decode(fresh)
+        if not any(covers(msgspec.json.decode(path.read_bytes()), wanted) for path in full):
+            (GOLDEN / f"{name}.full-{len(full) + 1}.json").write_bytes(fresh)
 
 
 if __name__ == "__main__":

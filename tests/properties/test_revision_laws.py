@@ -22,7 +22,7 @@ from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.requests import ReplanRequest
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
 from tests.support.fleet_model import Answer, FleetModel
-from tests.support.household import SKILLS, bring, carrier, manipulator
+from tests.support.household import bring, carrier, manipulator
 from tests.support.reached import Reached, reaches
 
 UNFINISHED = {TaskState.WAITING, *OUTSTANDING}
@@ -46,7 +46,7 @@ class Watched(FleetModel):
             entry = self.state.plans.get(event.plan.plan)
             if entry is not None and entry.job is not None and entry.job.job == event.job:
                 started = frozenset(entry.job.under_way)
-                world = self.state.world(SKILLS)
+                world = self.state.world()
                 check_reconciled(entry, event, reconcile(entry, event, world, started), self.met)
         super().apply(event)
 

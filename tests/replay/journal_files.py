@@ -32,9 +32,9 @@ def events_in(name: str) -> list[Event]:
 
 def effects_of(journal: list[Event]) -> Iterator[str]:
     """What the core does with a journal: a line an effect, an empty line an event."""
-    state = State()
+    state = State(skills=SKILLS)
     for event in journal:
-        state, effects = step(state, event, SKILLS)
+        state, effects = step(state, event)
         for effect in effects:
             match effect:
                 case Publish(key, address, payload):

@@ -26,8 +26,8 @@ def test_the_same_events_have_the_same_effects(name: str) -> None:
 @pytest.mark.parametrize("name", JOURNALS)
 def test_a_crash_anywhere_comes_back_to_the_same_state(name: str) -> None:
     journal = events_in(name)
-    whole = replay(journal, SKILLS)
+    whole = replay(journal, State(skills=SKILLS))
     for cut in range(0, len(journal), 7):
-        before = replay(journal[:cut], SKILLS, State())
+        before = replay(journal[:cut], State(skills=SKILLS))
         again = [decode_event(encode_event(event)) for event in journal[cut:]]
-        assert replay(again, SKILLS, before) == whole
+        assert replay(again, before) == whole

@@ -63,7 +63,7 @@ class FleetModel:
         """When each attempt was started."""
         self.reports: list[Report] = []
         self._truth: dict[tuple[str, str], Value] = {}
-        self.receive(events.PlannerStarted, epoch=1, incarnation="one")
+        self.receive(events.PlannerStarted, epoch=1, incarnation="one", skills=dict(SKILLS))
         for place in PLACES:
             self.receive(events.PlacePut, place=place)
         for number in range(1, cups + 1):
@@ -85,7 +85,7 @@ class FleetModel:
     def apply(self, event: Event) -> None:
         """An event into the core, as it is."""
         before = self.state
-        self.state, effects = step(before, event, SKILLS)
+        self.state, effects = step(before, event)
         if self.state is before:
             assert effects == ()
             return
@@ -284,7 +284,7 @@ class FleetModel:
         self.answers.clear()
         state = State()
         for line in self.journal:
-            state, _ = step(state, decode_event(line), SKILLS)
+            state, _ = step(state, decode_event(line))
         assert state == self.state, "the journal replays to another state"
         self.state = state
         self.receive(events.PlannerStarted, epoch=state.epoch + 1, incarnation="again")

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from fleet.core.dispatch.ready_tasks import order_if_ready
-from fleet.core.model.skills import Skills
 from fleet.core.state import State
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import TaskState
 
 
-def break_deadlock(state: State, plans: Iterable[str], skills: Skills) -> State:
+def break_deadlock(state: State, plans: Iterable[str]) -> State:
     """Where nobody moves, one task gets its robots in spite of reservations; what that upsets is
     planned again. `plans` come in the order of their priority."""
     alive = [entry for entry in state.plans.values() if not entry.ended]
@@ -22,7 +21,7 @@ def break_deadlock(state: State, plans: Iterable[str], skills: Skills) -> State:
             continue
         for record in entry.current():
             if record.state is TaskState.WAITING:
-                after = order_if_ready(state, entry.plan.plan, record, skills, reservations=False)
+                after = order_if_ready(state, entry.plan.plan, record, reservations=False)
                 if after is not state:
                     return after
     return state

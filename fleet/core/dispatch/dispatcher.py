@@ -11,7 +11,6 @@ from fleet.core.dispatch.ready_tasks import by_priority, order_if_ready
 from fleet.core.dispatch.replan_triggers import new_robots, why_replan
 from fleet.core.handlers.goals import next_stage
 from fleet.core.handlers.requests import plan_waiting_goals
-from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import PlanEntry, ReplanScope
 from fleet.core.revision.replanning import start_replanning
 from fleet.core.state import State
@@ -21,7 +20,7 @@ from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import TaskState
 
 
-def advance(state: State, skills: Skills) -> State:
+def advance(state: State) -> State:
     """Take every plan as far as it goes without news: orders, replans, ends."""
     state = fail_tasks_of_lost_robots(state)
     if state.policy.auto_plan:
@@ -34,9 +33,9 @@ def advance(state: State, skills: Skills) -> State:
         elif entry.job is None and entry.replan is not None and not entry.ended:
             state = start_replanning(state, entry)
         elif entry.state is PlanState.RUNNING and entry.job is None:
-            state = _run(state, entry, skills)
-    moved = break_deadlock(state, plans, skills)
-    return state if moved is state else advance(moved, skills)
+            state = _run(state, entry)
+    moved = break_deadlock(state, plans)
+    return state if moved is state else advance(moved)
 
 
 def next_timer(state: State) -> float | None:
@@ -58,32 +57,32 @@ def _cancel(state: State, entry: PlanEntry) -> State:
     )
 
 
-def _run(state: State, entry: PlanEntry, skills: Skills) -> State:
-    state = _mark_reached(state, entry, skills)
+def _run(state: State, entry: PlanEntry) -> State:
+    state = _mark_reached(state, entry)
     entry = state.plans[entry.plan.plan]
-    if (reason := why_replan(state, entry, skills)) is not None:
-        return advance(set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason)), skills)
+    if (reason := why_replan(state, entry)) is not None:
+        return advance(set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason)))
     if (helpers := new_robots(state, entry)) is not None:
-        return advance(set_entry(state, helpers), skills)
+        return advance(set_entry(state, helpers))
     if (late := late_task(state, entry)) is not None:
         reason = f"{late.robot} is late with {late.task} ({late.skill})"
         entry = replace(entry, late=(*entry.late, late.task))
-        return advance(set_entry(state, entry.to_replan(ReplanScope.REALLOCATE, reason)), skills)
+        return advance(set_entry(state, entry.to_replan(ReplanScope.REALLOCATE, reason)))
     if all(record.state is TaskState.SUCCEEDED for record in entry.current()):
         return set_entry(state, replace(entry, state=PlanState.SUCCEEDED))
     if any(record.state in (TaskState.FAILED, TaskState.CANCELLED) for record in entry.current()):
         return give_up(state, entry, "a task of the plan was cancelled or failed")
     for record in list(entry.current()):
         if record.state is TaskState.WAITING:
-            state = order_if_ready(state, entry.plan.plan, record, skills)
+            state = order_if_ready(state, entry.plan.plan, record)
             if state.plans[entry.plan.plan].replan is not None:
-                return advance(state, skills)
+                return advance(state)
     return state
 
 
-def _mark_reached(state: State, entry: PlanEntry, skills: Skills) -> State:
+def _mark_reached(state: State, entry: PlanEntry) -> State:
     """A stage of a goal is reached when all its tasks are done and its conditions hold."""
-    world = state.world(skills)
+    world = state.world()
     unfinished = {
         record.goal for record in entry.current() if record.state is not TaskState.SUCCEEDED
     }

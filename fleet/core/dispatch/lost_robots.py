@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
+from fleet.core.plan_entry import PlanEntry, ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import set_entry
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
@@ -21,14 +21,13 @@ def fail_tasks_of_lost_robots(state: State) -> State:
         for entry in state.plans.values():
             if entry.ended or not _needs(entry, robot):
                 continue
-            records = {
-                name: replace(record, state=TaskState.FAILED, reason=reason)
-                if record.state in OUTSTANDING and robot in (record.robot, *record.args.values())
-                else record
-                for name, record in entry.records.items()
+            failed = {
+                record.task: replace(record, state=TaskState.FAILED, reason=reason)
+                for record in entry.outstanding()
+                if robot in (record.robot, *record.args.values())
             }
-            if records != entry.records or entry.replan is None:
-                entry = replace(entry, records=records)
+            if failed or entry.replan is None:
+                entry = replace(entry, records=entry.records.updated(failed))
                 state = set_entry(state, entry.to_replan(ReplanScope.REALLOCATE, reason))
     return state
 

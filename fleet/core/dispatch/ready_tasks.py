@@ -8,7 +8,7 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core.model.preconditions import action_of, unmet_before
-from fleet.core.model.skills import Action, Skills
+from fleet.core.model.skills import Action
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import conditions_of, give_up, open_goals, set_entry, set_record
@@ -26,9 +26,7 @@ def by_priority(state: State) -> list[str]:
     return sorted(state.plans, key=rank)
 
 
-def order_if_ready(
-    state: State, plan: str, record: TaskRecord, skills: Skills, reservations: bool = True
-) -> State:
+def order_if_ready(state: State, plan: str, record: TaskRecord, reservations: bool = True) -> State:
     """Order a waiting task if nothing holds it back; replan if the world is not as it must be.
 
     See `_is_free` for `reservations`.
@@ -41,15 +39,15 @@ def order_if_ready(
         if before in entry.records
     ):
         return state
-    action = action_of(record, skills)
+    action = action_of(record, state.skills)
     if action is None:
         reason = f"{record.task} cannot start: there is no skill {record.skill} any more"
         return give_up(state, entry, reason)
     if not all(_is_free(state, robot, plan, reservations) for robot in action.participants):
         return state
-    if _touches_unwanted_work(entry, action, skills):
+    if _touches_unwanted_work(state, entry, action):
         return state
-    if (unmet := unmet_before(action, state.world(skills))) is not None:
+    if (unmet := unmet_before(action, state.world())) is not None:
         reason = f"{record.task} ({record.skill}) cannot start: {unmet}"
         return set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason))
     ordered = replace(
@@ -57,31 +55,31 @@ def order_if_ready(
         state=TaskState.ORDERED,
         attempt=record.attempt + 1,
         ordered_s=state.time_s if record.ordered_s is None else record.ordered_s,
-        way_s=_way_s(state, action, skills),
+        way_s=_way_s(state, action),
     )
     return set_record(state, entry, ordered)
 
 
-def _touches_unwanted_work(entry: PlanEntry, action: Action, skills: Skills) -> bool:
+def _touches_unwanted_work(state: State, entry: PlanEntry, action: Action) -> bool:
     """Whether a task that is being cancelled, and has not confirmed it, is about the same facts."""
     variables = action.variables
     for task in entry.unwanted:
         record = entry.records[task]
         if record.state in OUTSTANDING:
-            other = action_of(record, skills)
+            other = action_of(record, state.skills)
             if other is None or variables & other.variables:
                 return True
     return False
 
 
-def _way_s(state: State, action: Action, skills: Skills) -> float | None:
+def _way_s(state: State, action: Action) -> float | None:
     """The way to the task at its robot's top speed, s; `None` if nobody knows from where."""
     if action.skill.travel_to is None:
         return 0.0
     here = state.fact(AT, action.actor)
     if here is None or here.value not in state.places:
         return None
-    return state.world(skills).way_s(action.actor, here.value, action.args[action.skill.travel_to])
+    return state.world().way_s(action.actor, here.value, action.args[action.skill.travel_to])
 
 
 def _is_free(state: State, robot: str, plan: str, reservations: bool) -> bool:

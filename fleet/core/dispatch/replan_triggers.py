@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from fleet.core.model.preconditions import action_of
-from fleet.core.model.skills import Action, Skills
+from fleet.core.model.skills import Action
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
 from fleet.core.state import State
 from keyexpr_schema.facts import AT
@@ -21,7 +21,7 @@ from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact
 
 
-def contradiction(entry: PlanEntry, fact: Fact, skills: Skills) -> str | None:
+def contradiction(state: State, entry: PlanEntry, fact: Fact) -> str | None:
     """Why a fact is against the plan: a task needs it otherwise, and nothing before it changes it.
 
     What a robot says of the work it is doing is part of that work.
@@ -30,7 +30,8 @@ def contradiction(entry: PlanEntry, fact: Fact, skills: Skills) -> str | None:
     unfinished = {
         record.task: (record, action)
         for record in entry.current()
-        if record.state not in ENDED_TASKS and (action := action_of(record, skills)) is not None
+        if record.state not in ENDED_TASKS
+        and (action := action_of(record, state.skills)) is not None
     }
     for record, action in unfinished.values():
         needed = [literal for literal in action.before if literal.variable == known]
@@ -60,9 +61,9 @@ def _before(task: str, unfinished: Mapping[str, tuple[TaskRecord, Action]]) -> s
     return befores
 
 
-def why_replan(state: State, entry: PlanEntry, skills: Skills) -> str | None:
+def why_replan(state: State, entry: PlanEntry) -> str | None:
     """What has come up that the plan does not provide for."""
-    world = state.world(skills)
+    world = state.world()
     for thing in entry.plan.seeks:
         where = world.value(AT, thing)
         if where is not None:

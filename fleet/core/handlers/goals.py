@@ -6,9 +6,8 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
-from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import ReplanScope
-from fleet.core.state import State, put, without
+from fleet.core.state import State
 from fleet.core.state_updates import believe, cancel, set_entry, set_goal, without_goal
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, read_goal
@@ -17,26 +16,26 @@ from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.world import Fact
 
 
-def goal_put(state: State, event: events.GoalPut, skills: Skills) -> State:
+def goal_put(state: State, event: events.GoalPut) -> State:
     """Keep the goal and say what it is understood to mean; a changed goal begins anew."""
     goal = event.goal
     if state.goals.get(goal.goal) == goal:
         return state
     known_ended = goal.goal not in state.goals and goal.goal in state.goal_states
-    state = replace(state, goals=put(state.goals, goal.goal, goal))
+    state = replace(state, goals=state.goals.set(goal.goal, goal))
     if known_ended:
         return state  # under an earlier planner
     return _take_goal(state, goal)
 
 
-def goal_deleted(state: State, event: events.GoalDeleted, skills: Skills) -> State:
+def goal_deleted(state: State, event: events.GoalDeleted) -> State:
     """Drop the goal; a plan that works on it is made again without it."""
     if event.goal not in state.goals:
         return state
     state = replace(
         state,
-        goals=without(state.goals, event.goal),
-        goal_states=without(state.goal_states, event.goal),
+        goals=state.goals.without(event.goal),
+        goal_states=state.goal_states.without(event.goal),
     )
     for entry in state.plans.values():
         if event.goal in entry.plan.goals and not entry.ended:
@@ -47,7 +46,7 @@ def goal_deleted(state: State, event: events.GoalDeleted, skills: Skills) -> Sta
     return state
 
 
-def goal_interpreted(state: State, event: events.GoalInterpreted, skills: Skills) -> State:
+def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
     """Take over what a language model read in a goal's sentence, or that it read nothing."""
     if event.goal not in state.interpreting:
         return state

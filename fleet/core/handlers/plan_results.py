@@ -8,10 +8,9 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.effects import status_of
-from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanReason
 from fleet.core.revision.reconcile import reconcile
-from fleet.core.state import State, put, without
+from fleet.core.state import State
 from fleet.core.state_updates import answer, give_up, mark_goals, set_entry, without_goal
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
@@ -19,7 +18,7 @@ from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
 
 
-def planning_succeeded(state: State, event: events.PlanningSucceeded, skills: Skills) -> State:
+def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     """Take over a finished plan, or show it where it was only asked to be seen."""
     if (preview := _preview_of(state, event.job)) is not None:
         return _show(state, preview, event)
@@ -35,7 +34,7 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded, skills: Sk
     for goal, reason in event.left_out.items():
         state = mark_goals(state, (goal,), GoalState.FAILED, entry.plan.plan, reason)
     event = replace(event, plan=_for_goals_of_now(state, entry, job, event))
-    revision = reconcile(entry, event, state.world(skills), frozenset(job.under_way))
+    revision = reconcile(entry, event, state.world(), frozenset(job.under_way))
     added = (goal for goal in entry.plan.goals if goal not in job.goals)
     to = entry.state
     if first:
@@ -47,7 +46,7 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded, skills: Sk
         plan=replace(revision.plan, goals=(*revision.plan.goals, *added)),
         outcome=event.outcome,
         state=to,
-        records=revision.records,
+        records=entry.records.updated(revision.records),
         unwanted=tuple(dict.fromkeys([*entry.unwanted, *revision.unwanted])),
         change=None if first else revision.change,
         job=None,
@@ -125,16 +124,16 @@ def _show(state: State, job: PlanningJob, event: events.PlanningSucceeded) -> St
     )
     return replace(
         state,
-        previews=without(state.previews, job.request),
-        answers=put(state.answers, job.request, reply),
+        previews=state.previews.without(job.request),
+        answers=state.answers.set(job.request, reply),
     )
 
 
-def planning_failed(state: State, event: events.PlanningFailed, skills: Skills) -> State:
+def planning_failed(state: State, event: events.PlanningFailed) -> State:
     """A job failed: a first plan is rejected, a running one goes on or is given up."""
     if (preview := _preview_of(state, event.job)) is not None:
         assert preview.request is not None
-        state = replace(state, previews=without(state.previews, preview.request))
+        state = replace(state, previews=state.previews.without(preview.request))
         return answer(state, preview.request, False, event.reason, violations=event.violations)
     entry = next(
         (b for b in state.plans.values() if b.job is not None and b.job.job == event.job), None

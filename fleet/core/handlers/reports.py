@@ -8,9 +8,9 @@ from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.model.durations import learn
 from fleet.core.model.preconditions import action_of, effects_hold, unmet_before
-from fleet.core.model.skills import Action, Skills
+from fleet.core.model.skills import Action
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
-from fleet.core.state import State, put
+from fleet.core.state import State
 from fleet.core.state_updates import (
     believe,
     believe_if_newer,
@@ -30,7 +30,7 @@ MAX_ATTEMPTS = 3
 """Orders given for one task to one robot; each order has the worker's own tries inside."""
 
 
-def report_received(state: State, event: events.ReportReceived, skills: Skills) -> State:
+def report_received(state: State, event: events.ReportReceived) -> State:
     """A report of an attempt that is not current only brings facts."""
     report = event.report
     for fact in report.facts:
@@ -51,13 +51,13 @@ def report_received(state: State, event: events.ReportReceived, skills: Skills) 
             record = replace(record, state=TaskState.RUNNING, started_s=report.started_s)
             return set_record(state, entry, record)
         case ReportState.SUCCEEDED:
-            return _succeeded(state, entry, record, report, skills)
+            return _succeeded(state, entry, record, report)
         case ReportState.CANCELLED:
             return set_record(state, entry, _ended(record, report, TaskState.CANCELLED))
         case ReportState.FAILED:
             return _failed(state, entry, record, report)
         case ReportState.INTERRUPTED:
-            return _interrupted(state, entry, record, report, skills)
+            return _interrupted(state, entry, record, report)
         case ReportState.REFUSED:
             if report.retryable and record.attempt < MAX_ATTEMPTS:
                 return set_record(state, entry, _again(record, report))
@@ -84,11 +84,9 @@ def _again(record: TaskRecord, report: Report) -> TaskRecord:
     )
 
 
-def _succeeded(
-    state: State, entry: PlanEntry, record: TaskRecord, report: Report, skills: Skills
-) -> State:
+def _succeeded(state: State, entry: PlanEntry, record: TaskRecord, report: Report) -> State:
     reported = {fact.key for fact in report.facts}
-    action = action_of(record, skills)
+    action = action_of(record, state.skills)
     state = _learned(state, record, report, action)
     for literal in action.after if action is not None else ():
         if literal.variable not in reported:
@@ -121,27 +119,25 @@ def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) 
     entry = entry.to_replan(ReplanScope.REPAIR, reason)
     if record.goal is not None and record.goal in entry.plan.goals:
         count = entry.failures.get(record.goal, 0) + 1
-        entry = replace(entry, failures=put(entry.failures, record.goal, count))
+        entry = replace(entry, failures=entry.failures.set(record.goal, count))
         if count >= MAX_FAILURES:
             sentence = f"given up after {count} failed tasks; the last: {reason}"
             if open_goals(state, entry) == [record.goal]:
-                entry = replace(entry, records=put(entry.records, record.task, record))
+                entry = replace(entry, records=entry.records.set(record.task, record))
                 return give_up(state, entry, sentence)
             state = mark_goals(state, (record.goal,), GoalState.FAILED, entry.plan.plan, sentence)
             entry = replace(entry, plan=without_goal(state, entry.plan, record.goal))
     return set_record(state, entry, record)
 
 
-def _interrupted(
-    state: State, entry: PlanEntry, record: TaskRecord, report: Report, skills: Skills
-) -> State:
+def _interrupted(state: State, entry: PlanEntry, record: TaskRecord, report: Report) -> State:
     """A worker came back in the middle of an attempt: the world decides what it is worth."""
     if entry.ended or record.task in entry.unwanted:
         return set_record(state, entry, _ended(record, report, TaskState.CANCELLED))
-    action = action_of(record, skills)
+    action = action_of(record, state.skills)
     if action is None:
         return _failed(state, entry, record, report)
-    world = state.world(skills)
+    world = state.world()
     if effects_hold(action, world):
         record = _ended(record, report, TaskState.SUCCEEDED)
         return set_record(state, entry, replace(record, reason="found done after an interruption"))

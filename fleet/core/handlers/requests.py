@@ -7,9 +7,8 @@ from collections.abc import Iterator
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanScope
-from fleet.core.state import State, put, without
+from fleet.core.state import State
 from fleet.core.state_updates import active_plan_of, answer, cancel, mark_goals, set_entry
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
@@ -17,7 +16,7 @@ from keyexpr_schema.payloads.plans import Plan, PlanState, Task
 from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest, ReplanRequest
 
 
-def plan_requested(state: State, event: events.PlanRequested, skills: Skills) -> State:
+def plan_requested(state: State, event: events.PlanRequested) -> State:
     """Start to plan for the goals asked for, or say why not."""
     return _start_planning(state, event.request)
 
@@ -66,7 +65,7 @@ def _start_planning(state: State, ask: PlanRequest, partial: bool = False) -> St
     job = PlanningJob.of(state.jobs + 1, plan, ask.planner)
     job = replace(job, request=ask.request, dry_run=ask.dry_run, partial=partial)
     if ask.dry_run:
-        return replace(state, jobs=job.job, previews=put(state.previews, ask.request, job))
+        return replace(state, jobs=job.job, previews=state.previews.set(ask.request, job))
     return _planning(state, plan, job)
 
 
@@ -112,7 +111,7 @@ def _new_plan_name(state: State) -> str:
     return f"plan-{number}"
 
 
-def plan_proposed(state: State, event: events.PlanProposed, skills: Skills) -> State:
+def plan_proposed(state: State, event: events.PlanProposed) -> State:
     """Take a plan that someone put into planning: it is checked and allocated like any other."""
     plan = event.plan
     if plan.plan in state.plans or plan.plan in state.past_plans:
@@ -121,7 +120,7 @@ def plan_proposed(state: State, event: events.PlanProposed, skills: Skills) -> S
     return _planning(state, plan, replace(job, proposal=plan))
 
 
-def replan_requested(state: State, event: events.ReplanRequested, skills: Skills) -> State:
+def replan_requested(state: State, event: events.ReplanRequested) -> State:
     """Plan again from what is known now."""
     ask = event.request
     if ask.request in state.answers:
@@ -152,7 +151,7 @@ def _no_plan(state: State, plan: str) -> str:
     return f"there is no plan {plan}; known are {', '.join(sorted(state.plans)) or 'none'}"
 
 
-def control_requested(state: State, event: events.ControlRequested, skills: Skills) -> State:
+def control_requested(state: State, event: events.ControlRequested) -> State:
     """Start, approve, cancel, delete or extend a plan, or say why not."""
     ask = event.request
     if ask.request in state.answers or any(
@@ -195,7 +194,7 @@ def _delete(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if not entry.ended and entry.state not in (PlanState.READY, PlanState.PROPOSED):
         return f"plan {ask.plan} is {entry.state.value}; cancel it before deleting it"
     state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None)
-    state = replace(state, plans=without(state.plans, ask.plan))
+    state = replace(state, plans=state.plans.without(ask.plan))
     return answer(state, ask.request, True, f"plan {ask.plan} is deleted")
 
 
@@ -221,7 +220,7 @@ def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State | st
         actor=f"x{number}",
         after=ask.after,
     )
-    pins = put(entry.plan.pins, task.actor, ask.robot) if ask.robot else entry.plan.pins
+    pins = {**entry.plan.pins, task.actor: ask.robot} if ask.robot else entry.plan.pins
     plan = replace(entry.plan, pins=pins)
     entry = replace(entry, plan=plan, amendment=task, amendment_request=ask.request)
     return set_entry(state, entry.to_replan(ReplanScope.REPAIR, f"task {task.task} is added"))

@@ -6,31 +6,30 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
-from fleet.core.model.skills import Skills
-from fleet.core.state import State, put, without
+from fleet.core.state import State
 from fleet.core.state_updates import believe
 from fleet.errors import NotUnderstood
 from fleet.language import statement_facts
 from keyexpr_schema.payloads.world import Fact, StatementStatus
 
 
-def statement_put(state: State, event: events.StatementPut, skills: Skills) -> State:
+def statement_put(state: State, event: events.StatementPut) -> State:
     """Keep the statement, and believe the facts that can be read out of it."""
     statement = event.statement
     if state.statements.get(statement.statement) == statement:
         return state
-    state = replace(state, statements=put(state.statements, statement.statement, statement))
+    state = replace(state, statements=state.statements.set(statement.statement, statement))
     return _read_statement(state, statement.statement)
 
 
-def statement_deleted(state: State, event: events.StatementDeleted, skills: Skills) -> State:
+def statement_deleted(state: State, event: events.StatementDeleted) -> State:
     """Drop the statement. Facts once read out of it stay: they may have been confirmed since."""
     if event.statement not in state.statements:
         return state
     return replace(
         state,
-        statements=without(state.statements, event.statement),
-        statement_states=without(state.statement_states, event.statement),
+        statements=state.statements.without(event.statement),
+        statement_states=state.statement_states.without(event.statement),
     )
 
 
@@ -57,4 +56,4 @@ def _read_statement(state: State, name: str) -> State:
 def _set_status(state: State, status: StatementStatus) -> State:
     if state.statement_states.get(status.statement) == status:
         return state
-    return replace(state, statement_states=put(state.statement_states, status.statement, status))
+    return replace(state, statement_states=state.statement_states.set(status.statement, status))

@@ -7,15 +7,14 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.dispatch.replan_triggers import contradiction
 from fleet.core.handlers import goals, statements
-from fleet.core.model.skills import Skills
 from fleet.core.plan_entry import ReplanScope
-from fleet.core.state import State, put, without
+from fleet.core.state import State
 from fleet.core.state_updates import believe, set_entry
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.payloads.plans import PlanState
 
 
-def fact_put(state: State, event: events.FactPut, skills: Skills) -> State:
+def fact_put(state: State, event: events.FactPut) -> State:
     """Believe the fact: its key holds the latest word. A plan that it contradicts is repaired."""
     fact = event.fact
     changed = believe(state, fact)
@@ -24,44 +23,44 @@ def fact_put(state: State, event: events.FactPut, skills: Skills) -> State:
     state = changed
     for entry in state.plans.values():
         if entry.state is PlanState.RUNNING and entry.replan is None:
-            reason = contradiction(entry, fact, skills)
+            reason = contradiction(state, entry, fact)
             if reason is not None:
                 state = set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason))
     return state
 
 
-def fact_deleted(state: State, event: events.FactDeleted, skills: Skills) -> State:
+def fact_deleted(state: State, event: events.FactDeleted) -> State:
     """No longer believe anything of that variable."""
     key = FactKey(event.relation, event.subject)
-    return replace(state, facts=without(state.facts, key)) if key in state.facts else state
+    return replace(state, facts=state.facts.without(key)) if key in state.facts else state
 
 
-def place_put(state: State, event: events.PlacePut, skills: Skills) -> State:
+def place_put(state: State, event: events.PlacePut) -> State:
     """A new place may make sentences understood."""
     if state.places.get(event.place.place) == event.place:
         return state
     return vocabulary_changed(
-        replace(state, places=put(state.places, event.place.place, event.place))
+        replace(state, places=state.places.set(event.place.place, event.place))
     )
 
 
-def place_deleted(state: State, event: events.PlaceDeleted, skills: Skills) -> State:
+def place_deleted(state: State, event: events.PlaceDeleted) -> State:
     """Sentences once understood stay so."""
-    return replace(state, places=without(state.places, event.place))
+    return replace(state, places=state.places.without(event.place))
 
 
-def object_put(state: State, event: events.ObjectPut, skills: Skills) -> State:
+def object_put(state: State, event: events.ObjectPut) -> State:
     """A new object may make sentences understood."""
     if state.objects.get(event.object.object) == event.object:
         return state
     return vocabulary_changed(
-        replace(state, objects=put(state.objects, event.object.object, event.object))
+        replace(state, objects=state.objects.set(event.object.object, event.object))
     )
 
 
-def object_deleted(state: State, event: events.ObjectDeleted, skills: Skills) -> State:
+def object_deleted(state: State, event: events.ObjectDeleted) -> State:
     """Sentences once understood stay so."""
-    return replace(state, objects=without(state.objects, event.object))
+    return replace(state, objects=state.objects.without(event.object))
 
 
 def vocabulary_changed(state: State) -> State:

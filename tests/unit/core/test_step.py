@@ -10,7 +10,6 @@ from keyexpr_schema.keyspace import PLACE, PLAN_STATUS
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import PlanState
 from tests.support.fleet_model import BOTH, fleet
-from tests.support.household import SKILLS
 
 
 def test_a_mission_from_goals_to_reached() -> None:
@@ -54,25 +53,23 @@ def test_a_planner_without_a_journal_does_nothing_a_second_time() -> None:
         goals=tuple(model.state.goal_states.values()),
         plans=("plan-1",),
     )  # fmt: skip
-    fresh, _ = step(fresh, remembered, SKILLS)
+    fresh, _ = step(fresh, remembered)
     for line in model.journal:
         event = events.decode_event(line)
         if isinstance(event, events.PlanRequested | events.GoalPut):
-            fresh, effects = step(fresh, event, SKILLS)
+            fresh, effects = step(fresh, event)
             assert not any(isinstance(effect, MakePlan) for effect in effects)
     proposed = events.PlanProposed(
         plan=model.state.plans["plan-1"].plan, time_s=0.0, wall_time_s=0.0
     )
-    fresh, effects = step(fresh, proposed, SKILLS)
+    fresh, effects = step(fresh, proposed)
     assert effects == ()
     assert fresh.goal_states["g1"].state is GoalState.REACHED
 
 
 def test_an_event_without_meaning_changes_nothing() -> None:
     model = fleet()
-    state, effects = step(
-        model.state, events.GoalDeleted(goal="x", time_s=1e9, wall_time_s=1e12), SKILLS
-    )
+    state, effects = step(model.state, events.GoalDeleted(goal="x", time_s=1e9, wall_time_s=1e12))
     assert state is model.state
     assert effects == ()
 

@@ -104,7 +104,7 @@ def test_reports_teach_and_the_next_plan_counts_with_it() -> None:
     known = model.state.durations["hsr"]
     assert known.skills["pick"].mean == pytest.approx((27.0 + 100.0) / 2)
     assert model.documents["durations/hsr"] == known
-    world = model.state.world(SKILLS)
+    world = model.state.world()
     pick = PICK.ground({"robot": "hsr", "object": "cup_2", "place": "kitchen"})
     assert world.duration_s(pick, "kitchen", "hsr") == known.skills["pick"].mean
     model.plan(bring(2, "hallway"))
@@ -124,7 +124,7 @@ def test_what_failed_or_was_interrupted_teaches_nothing() -> None:
 def test_a_planner_that_lost_its_journal_still_knows() -> None:
     known = Durations(model="hsr", skills={"pick": Estimate(mean=50.0, count=7, weight=8.0)})
     remembered = events.PriorStateLoaded(time_s=0.0, wall_time_s=0.0, durations=(known,))
-    state, effects = step(State(), remembered, SKILLS)
+    state, effects = step(State(), remembered)
     assert state.durations == {"hsr": known}
     assert [getattr(effect, "key", None) for effect in effects] == [DURATIONS]
 

@@ -69,12 +69,16 @@ def cup_fact(number: int) -> Fact:
     return _fact(f"cup_{number}", AT, _origin(number))
 
 
-def goal(number: int, sentence: bool = False) -> Goal:
-    """That cup `number` comes to the next room; by its condition, or as a `sentence` to be read."""
+def goal(number: int, sentence: bool = False, cups: int | None = None) -> Goal:
+    """That cup `number` comes to the next room; by its condition, or as a `sentence` to be read.
+
+    With fewer `cups` than goals, several goals are about one.
+    """
+    name, which = f"g{number}", number if cups is None else number % cups
     if sentence:
-        text = f"Bring cup {number + 1} to room {(number + 1) % ROOMS}"
-        return Goal(goal=f"g{number}", text=text, ordinal=number)
-    return Goal(goal=f"g{number}", text="", conditions=(_condition(number),), ordinal=number)
+        text = f"Bring cup {which + 1} to {_target(which).replace('_', ' ')}"
+        return Goal(goal=name, text=text, ordinal=number)
+    return Goal(goal=name, text="", conditions=(_condition(which),), ordinal=number)
 
 
 @dataclass(frozen=True)
@@ -134,7 +138,7 @@ class Errands:
             )
             for number in range(min(self.robots, len(self.numbers)))
         }
-        behind = {
+        behind: dict[str, tuple[str, ...]] = {
             self.task(place, 0): (self.task(place - self.robots, TASKS_A_GOAL - 1),)
             for place in range(self.robots, len(self.numbers))
         }

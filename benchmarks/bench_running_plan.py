@@ -25,7 +25,7 @@ from fleet.core.plan_entry import OUTSTANDING, PlanEntry
 from fleet.core.state import Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
-from fleet.service.planning_job import run_planning_job
+from fleet.service.planning.planning_job import run_planning_job
 from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import PlanChange
@@ -133,7 +133,7 @@ class Running:
         self.state, effects = step(self.state, kind(**at, **fields))
         for effect in effects:
             if isinstance(effect, MakePlan):
-                made = run_planning_job(effect.job, self.state, self.composition, at)
+                made = run_planning_job(effect.given, self.composition)
                 if not isinstance(made, PlanningSucceeded):
                     raise SystemExit(f"there is no plan: {made.reason}")
                 self.made = made

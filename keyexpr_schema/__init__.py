@@ -48,8 +48,9 @@ else:
                 "GOAL_SPEC GOAL_STATUS FACT STATEMENT STATEMENT_STATUS PLACE OBJECT ROBOT_SPEC "
                 "ROBOT_STATE ROBOT_ALIVE ORDER REPORT DURATIONS PLAN_SPEC PLAN_PROPOSAL "
                 "PLAN_STATUS TASK_RECORD PLAN_REQUEST REPLAN_REQUEST CONTROL_REQUEST ANSWER "
-                "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE STORE_JOURNAL SIM_MOTION SIM_SENSES "
-                "SIM_CLOCK SIM_FRAMES SIM_SCENE SIM_TRUTH SIM_CONTACTS KEYSPACE key_of"
+                "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE STORE_JOURNAL STORE_CHANGES "
+                "SIM_MOTION SIM_SENSES SIM_CLOCK SIM_FRAMES SIM_SCENE SIM_TRUTH SIM_CONTACTS "
+                "KEYSPACE key_of"
             ),
             "payloads.durations": "Durations DurationsAddress Estimate",
             "payloads.goals": "Condition ENDED_GOALS Goal GoalAddress GoalState GoalStatus",
@@ -67,7 +68,8 @@ else:
             ),
             "payloads.system": (
                 "JournalEntry PlannerAddress PlannerAliveAddress PlannerStatus StoreAddress "
-                "StoreJournal StoreQuery UndecodableAddress UndecodableValue"
+                "StoreChanges StoreChangesQuery StoreJournal StoreQuery StoredValue "
+                "UndecodableAddress UndecodableValue"
             ),
             "payloads.simulation": (
                 "Body ContactCount Frame Frames MotionCall QuaternionWxyz Scene Shape ShapeKind "

@@ -169,6 +169,12 @@ STORE_JOURNAL = Key(
     about="What changed in the key-space, in the order in which the store applied it.",
     reply=system.StoreJournal,
 )
+STORE_CHANGES = Key(
+    "store_changes", "store/changes", system.StoreAddress, system.StoreChangesQuery,
+    delivery=QUERY, writers=ANYONE, readers=STORE,
+    about="What the keys of some patterns hold now, page by page; later, what changed since.",
+    reply=system.StoreChanges,
+)
 
 # --- the simulated world -------------------------------------------------------------------------
 SIM_MOTION = Key(

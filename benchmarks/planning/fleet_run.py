@@ -21,7 +21,7 @@ from fleet.core.state import Policy, State
 from fleet.core.step import step
 from fleet.planners import LlmInterpreter
 from fleet.service.composition import Composition
-from fleet.service.planning_job import run_planning_job
+from fleet.service.planning.planning_job import run_planning_job
 from keyexpr_schema.facts import AT, ON
 from keyexpr_schema.keyspace import FACT, OBJECT, ORDER, PLACE, ROBOT_SPEC, ROBOT_STATE
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal
@@ -294,7 +294,7 @@ class FleetRun:
             self._fail(TimeoutError(f"not done after {MOST_REVISIONS} revisions"))
             return
         began_s = time.perf_counter()
-        made = run_planning_job(effect.job, self.state, self._composition, self._at())
+        made = run_planning_job(effect.given, self._composition)
         self.counts.planning_s += time.perf_counter() - began_s
         self.counts.revisions += 1
         if isinstance(made, events.PlanningSucceeded):
@@ -309,8 +309,9 @@ class FleetRun:
     def _interpret(self, effect: Interpret) -> None:
         assert self._interpreter is not None
         began_s = time.perf_counter()
-        read = self._interpreter.interpret(effect.text, self.state.vocabulary())
+        given = effect.given
+        read = self._interpreter.interpret(given.text, given.vocabulary, given.skills)
         self.counts.planning_s += time.perf_counter() - began_s
         answer: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
         answer |= self._at()
-        self._pending.append(events.GoalInterpreted(goal=effect.goal, **answer))
+        self._pending.append(events.GoalInterpreted(goal=given.goal, **answer))

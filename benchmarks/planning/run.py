@@ -111,7 +111,7 @@ def _with_model(config: LlmConfig, stack: ExitStack) -> tuple[Composition, LlmIn
     stack.callback(model.close)
     planner = LlmPlanner(model, parts.planners["symbolic"])
     model.warm()  # LiteLLM's start is no planning time
-    interpreter = LlmInterpreter(model, parts.skills)
+    interpreter = LlmInterpreter(model)
     return changed(parts, planners={**parts.planners, planner.name: planner}), interpreter
 
 

@@ -103,6 +103,8 @@ class Allocator(ABC):
     name: str
     reschedules = False
     """Whether it heeds the `previous_allocation` itself; for others, actors stay where they can."""
+    waiting_s: float = 0.0
+    """How long it may wait for others, such as a language model, beside the limit for planning."""
 
     def allocate(
         self, checked: CheckedPlan, context: AllocationContext | None = None

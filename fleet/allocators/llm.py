@@ -45,6 +45,7 @@ class LlmAllocator(Allocator):
     def __init__(self, model: LanguageModel, fallback: Allocator) -> None:
         self._model = model
         self._fallback = fallback
+        self.waiting_s = model.longest_s
 
     def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
         if not problem.able:

@@ -14,7 +14,13 @@ from typing import Any
 
 from msgspec.structs import asdict
 
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry, PlanningJob
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.planning_input import (
+    InterpretationInput,
+    PlanningInput,
+    interpretation_input,
+    planning_input,
+)
 from fleet.core.state import State
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
@@ -28,7 +34,10 @@ from keyexpr_schema.keyspace import (
     STATEMENT_STATUS,
     TASK_RECORD,
 )
+from keyexpr_schema.payloads.goals import OVER_GOALS, GoalAddress, GoalStatus
+from keyexpr_schema.payloads.history import Ended, GoalRecord, PlanRecord, RequestRecord
 from keyexpr_schema.payloads.plans import PlanAddress, PlanStatus
+from keyexpr_schema.payloads.requests import Answer, RequestAddress
 from keyexpr_schema.payloads.tasks import Order, OrderAddress, TaskAddress, TaskRecord
 from keyexpr_schema.payloads.world import FactAddress
 
@@ -62,23 +71,40 @@ class Retract:
 class MakePlan:
     """Do this planning job, and say how it ended as an event."""
 
-    job: PlanningJob
+    given: PlanningInput
 
 
 @dataclass(frozen=True)
 class Interpret:
     """Have a goal's sentence read by a language model, and say what it means as an event."""
 
-    goal: str
-    text: str
+    given: InterpretationInput
 
 
-Effect = Publish | Retract | MakePlan | Interpret
+@dataclass(frozen=True)
+class Archive:
+    """Keep this, which is over, before anything else is done."""
+
+    record: Ended
+
+
+@dataclass(frozen=True)
+class DropJob:
+    """Nobody waits any more for this planning job's answer; it may have been given."""
+
+    job: int
+
+
+Effect = Publish | Retract | MakePlan | Interpret | DropJob | Archive
 
 
 def effects_between(old: State, new: State) -> tuple[Effect, ...]:
-    """What to do so that keys and planning jobs follow the state from `old` to `new`."""
-    return (*_documents(old, new), *_own_facts(old, new), *_jobs(old, new))
+    """What to do so that keys and planning jobs follow the state from `old` to `new`.
+
+    What is over in `new` is of its view for the last time: the keys keep their last values. It is
+    archived, and what was over in `old` is none of this any more.
+    """
+    return (*_archived(new), *_documents(old, new), *_own_facts(old, new), *_jobs(old, new))
 
 
 def effects_of(state: State) -> tuple[Effect, ...]:
@@ -87,43 +113,99 @@ def effects_of(state: State) -> tuple[Effect, ...]:
     Facts are left out: other writers may have newer ones.
     """
     empty = State()
-    return (*_documents(empty, state), *_jobs(empty, state))
+    return (*_archived(state), *_documents(empty, state), *_jobs(empty, state))
+
+
+def documents_of(record: Ended) -> Iterator[Publish]:
+    """The last values of the keys of something that is over."""
+    match record:
+        case RequestRecord():
+            yield Publish(ANSWER, RequestAddress(record.answer.request), record.answer)
+        case GoalRecord():
+            if not record.deleted:
+                yield Publish(GOAL_STATUS, GoalAddress(record.spec.goal), record.status)
+        case PlanRecord():
+            plan = record.spec.plan
+            for goal in record.goals:
+                if goal.status.state in OVER_GOALS:
+                    yield from documents_of(goal)
+            if record.spec.tasks:
+                yield Publish(PLAN_SPEC, PlanAddress(plan), record.spec)
+            yield Publish(PLAN_STATUS, PlanAddress(plan), record.status)
+            for task in record.tasks:
+                yield Publish(TASK_RECORD, TaskAddress(plan, task.task), task)
+
+
+def _archived(state: State) -> Iterator[Archive]:
+    return (Archive(record) for record in state.over)
 
 
 def _documents(old: State, new: State) -> Iterator[Effect]:
-    views: tuple[tuple[Key[Any, Any], Mapping[str, Payload], Mapping[str, Payload]], ...] = (
-        (GOAL_STATUS, old.goal_states, new.goal_states),
-        (STATEMENT_STATUS, old.statement_states, new.statement_states),
-        (ANSWER, old.answers, new.answers),
-        (DURATIONS, old.durations, new.durations),
+    over = _Over.of(new)
+    views: tuple[
+        tuple[Key[Any, Any], Mapping[str, Payload], Mapping[str, Payload], Mapping[str, Payload]],
+        ...,
+    ] = (
+        (GOAL_STATUS, old.goal_states, new.goal_states, over.goals),
+        (STATEMENT_STATUS, old.statement_states, new.statement_states, {}),
+        (ANSWER, old.answers, new.answers, over.answers),
+        (DURATIONS, old.durations, new.durations, {}),
     )
-    for key, before, after in views:
-        if before is not after:
-            yield from _difference(key, key.address, before, after)
-    for plan in {**old.plans, **new.plans}:
+    for key, before, after, gone in views:
+        if before is not after or gone:
+            yield from _difference(key, key.address, before, _with(after, gone))
+    for plan in {**old.plans, **new.plans, **over.plans}:
         if old.plans.get(plan) is not new.plans.get(plan) or old.epoch != new.epoch:
-            yield from _plan_documents(plan, old, new)
+            yield from _plan_documents(plan, old, new, over.plans.get(plan))
 
 
-def _plan_documents(plan: str, old: State, new: State) -> Iterator[Effect]:
+def _with(some: Mapping[str, Payload], more: Mapping[str, Payload]) -> Mapping[str, Payload]:
+    return {**some, **more} if more else some
+
+
+@dataclass(frozen=True)
+class _Over:
+    """What is over in an event, by the names that its documents go by."""
+
+    goals: dict[str, GoalStatus]
+    answers: dict[str, Answer]
+    plans: dict[str, PlanRecord]
+
+    @classmethod
+    def of(cls, state: State) -> _Over:
+        plans = {r.spec.plan: r for r in state.over if isinstance(r, PlanRecord)}
+        goals = [r for r in state.over if isinstance(r, GoalRecord) and not r.deleted]
+        goals += [goal for plan in plans.values() for goal in plan.goals]
+        answers = [r.answer for r in state.over if isinstance(r, RequestRecord)]
+        return cls(
+            {goal.spec.goal: goal.status for goal in goals if goal.status.state in OVER_GOALS},
+            {answer.request: answer for answer in answers},
+            plans,
+        )
+
+
+def _plan_documents(plan: str, old: State, new: State, over: PlanRecord | None) -> Iterator[Effect]:
     before, after = old.plans.get(plan), new.plans.get(plan)
+    spec = after.plan if after else over.spec if over else None
+    status = status_of(after) if after else over.status if over else None
     yield from _difference(
         PLAN_SPEC,
         PlanAddress,
         {plan: before.plan} if before and before.plan.tasks else {},
-        {plan: after.plan} if after and after.plan.tasks else {},
+        {plan: spec} if spec and spec.tasks else {},
     )
     yield from _difference(
         PLAN_STATUS,
         PlanAddress,
         {plan: status_of(before)} if before else {},
-        {plan: status_of(after)} if after else {},
+        {plan: status} if status else {},
     )
+    records: Mapping[str, TaskRecord] = {task.task: task for task in over.tasks} if over else {}
     yield from _difference(
         TASK_RECORD,
         partial(TaskAddress, plan),
         before.records if before else {},
-        after.records if after else {},
+        after.records if after else records,
     )
     orders = _orders(before, old.epoch), _orders(after, new.epoch)
     yield from _difference(ORDER, lambda address: address, *orders)
@@ -190,21 +272,28 @@ def _order(record: TaskRecord, entry: PlanEntry, epoch: int) -> Order:
 
 
 def _own_facts(old: State, new: State) -> Iterator[Effect]:
-    if old.facts is new.facts:
+    if old.concluded is new.concluded:
         return
-    for key, fact in new.facts.items():
-        if fact is not old.facts.get(key) and fact.source.startswith(PLANNER_SOURCE):
+    for key, fact in new.concluded.items():
+        if fact is not old.concluded.get(key):
             yield Publish(FACT, FactAddress.of(key), fact)
 
 
 def _jobs(old: State, new: State) -> Iterator[Effect]:
+    for plan, before in old.plans.items():
+        after = new.plans.get(plan)
+        if before.job is not None and (after is None or after.job != before.job):
+            yield DropJob(before.job.job)
+    for request, job in old.previews.items():
+        if request not in new.previews:
+            yield DropJob(job.job)
     for plan, entry in new.plans.items():
-        before = old.plans.get(plan)
-        if entry.job is not None and (before is None or before.job != entry.job):
-            yield MakePlan(entry.job)
+        known = old.plans.get(plan)
+        if entry.job is not None and (known is None or known.job != entry.job):
+            yield MakePlan(planning_input(new, entry.job))
     for request, job in new.previews.items():
         if request not in old.previews:
-            yield MakePlan(job)
+            yield MakePlan(planning_input(new, job))
     for goal in new.interpreting:
         if goal not in old.interpreting and goal in new.goals:
-            yield Interpret(goal, new.goals[goal].text)
+            yield Interpret(interpretation_input(new, goal))

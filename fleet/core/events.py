@@ -169,7 +169,8 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
 
     `durations_s` and `extra_after` are by task, `sequence` lists each robot's actors in order.
     `repaired` says that the residual plan goes on, perhaps with goals planned anew beside it,
-    `left_out` which goals the plan does without, and why.
+    `left_out` which goals the plan does without since they cannot be reached, and why, `postponed`
+    those for which the time did not suffice.
     """
 
     job: int
@@ -184,6 +185,7 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
     notes: tuple[str, ...] = ()
     repaired: bool = msgspec.field(default=False, name="mended")
     left_out: dict[str, str] = {}
+    postponed: dict[str, str] = {}
 
     @property
     def outcome(self) -> PlanOutcome:
@@ -192,12 +194,16 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
 
 
 class PlanningFailed(Event, frozen=True, kw_only=True):
-    """A planning job ended without a plan."""
+    """A planning job ended without a plan.
+
+    `postponed`: nothing is known against one, only the time (or the process) did not suffice.
+    """
 
     job: int
     reason: str
     violations: tuple[Violation, ...] = ()
     planning_time_s: float = 0.0
+    postponed: bool = False
 
 
 class GoalInterpreted(Event, frozen=True, kw_only=True):

@@ -125,6 +125,9 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True):
     reason: str | None = None
     violations: tuple[Violation, ...] = ()
     changed_s: float = 0.0
+    begun_s: float | None = None
+    begun_wall_s: float | None = None
+    """When it was asked for, on the fleet's clock [s] and in Unix time [s]."""
 
     @property
     def ended(self) -> bool:

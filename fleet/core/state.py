@@ -13,6 +13,7 @@ from fleet.language.vocabulary import SkillPhrase
 from keyexpr_schema.facts import AT, HOLDING, ON, FactKey
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
+from keyexpr_schema.payloads.history import Ended
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
@@ -27,13 +28,15 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     `approval`: a person has to approve every new plan. `auto_plan`: goals that wait are planned
     without being asked for, into a running plan where there is one. `interpreter`: sentences that
     the grammar refuses go to a language model. `lost_after_s`: a robot whose worker is gone for
-    longer (wall time, s) counts as lost. `skill_phrases` are skills that goals can ask for by name.
+    longer (wall time, s) counts as lost. `planning_limit_s`: a plan has to be made within that many
+    seconds. `skill_phrases` are skills that goals can ask for by name.
     """
 
     approval: bool = False
     auto_plan: bool = False
     interpreter: bool = False
     lost_after_s: float = 30.0
+    planning_limit_s: float = 120.0
     skill_phrases: tuple[SkillPhrase, ...] = msgspec.field(default=(), name="deeds")
 
 
@@ -57,6 +60,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     objects: Table[str, Object] = Table()
     robots: Table[str, RobotSpec] = Table()
     facts: Table[FactKey, Fact] = Table()
+    concluded: Table[FactKey, Fact] = Table()
+    """What the planner itself concluded last of each variable, whatever is believed of it now."""
     durations: dict[str, Durations] = {}
     """Learned from reports, by type of robot."""
     connected: Table[str, tuple[str, ...]] = Table()
@@ -72,6 +77,11 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     interpreting: tuple[str, ...] = ()
     """Goals whose sentences a language model reads now."""
     policy: Policy = Policy()
+    over: tuple[Ended, ...] = ()
+    """What left the state in the latest event, because it is over."""
+    perhaps_over_plans: tuple[str, ...] = ()
+    perhaps_over_goals: tuple[str, ...] = ()
+    """What may leave it in the event that is being handled."""
 
     def vocabulary(self) -> Vocabulary:
         """The names that sentences can use."""

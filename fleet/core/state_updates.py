@@ -23,6 +23,14 @@ def believe(state: State, fact: Fact) -> State:
     return replace(state, facts=state.facts.set(fact.key, fact))
 
 
+def conclude(state: State, fact: Fact) -> State:
+    """Believe what the planner concludes itself, and so publishes."""
+    believed = believe(state, fact)
+    if believed is state:
+        return state
+    return replace(believed, concluded=state.concluded.set(fact.key, fact))
+
+
 def believe_if_newer(state: State, fact: Fact) -> State:
     """Believe a fact that came on another way than its key, unless a newer one is known."""
     known = state.fact(fact.relation, fact.subject)
@@ -31,7 +39,11 @@ def believe_if_newer(state: State, fact: Fact) -> State:
 
 def set_goal(state: State, status: GoalStatus) -> State:
     """Change what is published of a goal."""
-    return replace(state, goal_states=state.goal_states.set(status.goal, status))
+    status = replace(status, time_s=state.time_s, wall_time_s=state.wall_time_s)
+    state = replace(state, goal_states=state.goal_states.set(status.goal, status))
+    if status.state not in ENDED_GOALS:
+        return state
+    return replace(state, perhaps_over_goals=(*state.perhaps_over_goals, status.goal))
 
 
 def mark_goals(
@@ -50,9 +62,7 @@ def mark_goals(
             or (status.state is to and status.reason == reason and status.plan == plan)
         ):
             continue
-        state = set_goal(
-            state, replace(status, state=to, plan=plan, reason=reason, time_s=state.time_s)
-        )
+        state = set_goal(state, replace(status, state=to, plan=plan, reason=reason))
     return state
 
 
@@ -91,9 +101,11 @@ def without_goal(state: State, plan: Plan, goal: str) -> Plan:
 
 def set_entry(state: State, entry: PlanEntry) -> State:
     """Change what is kept of a plan."""
-    return replace(
-        state, plans=state.plans.set(entry.plan.plan, replace(entry, changed_s=state.time_s))
-    )
+    plan = entry.plan.plan
+    state = replace(state, plans=state.plans.set(plan, replace(entry, changed_s=state.time_s)))
+    if not entry.ended:
+        return state
+    return replace(state, perhaps_over_plans=(*state.perhaps_over_plans, plan))
 
 
 def set_record(state: State, entry: PlanEntry, record: TaskRecord) -> State:
@@ -120,8 +132,9 @@ def with_waiting_cancelled(entry: PlanEntry, reason: str) -> Table[str, TaskReco
     )
 
 
-def give_up(state: State, entry: PlanEntry, reason: str) -> State:
-    """End a plan as failed, and with it those of its goals that are not reached."""
+def give_up(state: State, entry: PlanEntry, reason: str, to: GoalState = GoalState.FAILED) -> State:
+    """End a plan as failed, and with it those of its goals that are not reached; or, with `to`,
+    have them wait for another."""
     entry = replace(
         entry,
         state=PlanState.FAILED,
@@ -132,7 +145,8 @@ def give_up(state: State, entry: PlanEntry, reason: str) -> State:
         job=None,
     )
     state = set_entry(state, entry)
-    return mark_goals(state, entry.plan.goals, GoalState.FAILED, entry.plan.plan, reason)
+    plan = entry.plan.plan if to is GoalState.FAILED else None
+    return mark_goals(state, entry.plan.goals, to, plan, reason)
 
 
 def answer(

@@ -16,12 +16,15 @@ from fleet.core.dispatch import dispatcher
 from fleet.core.effects import Effect, effects_between
 from fleet.core.events import Event
 from fleet.core.handlers import goals, plan_results, reports, requests, robots, statements, world
+from fleet.core.over import SINCE_LOGIC, everything_perhaps_over, let_go
 from fleet.core.state import State
 from fleet.core.table import Table
 from keyexpr_schema.payloads.goals import ENDED_GOALS
 
 
 def _planner_started(state: State, event: events.PlannerStarted) -> State:
+    if state.logic < SINCE_LOGIC <= event.logic:
+        state = everything_perhaps_over(state)
     return replace(
         state,
         epoch=event.epoch,
@@ -85,9 +88,10 @@ def step(state: State, event: Event) -> tuple[State, tuple[Effect, ...]]:
         state,
         time_s=max(state.time_s, event.time_s),
         wall_time_s=max(state.wall_time_s, event.wall_time_s),
+        over=(),
     )
     handled = _HANDLERS[type(event)](now, event)
-    settled = dispatcher.advance(handled)
+    settled = let_go(dispatcher.advance(handled))
     if settled is now:
         return state, ()
     return settled, effects_between(state, settled)

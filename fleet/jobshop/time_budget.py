@@ -38,6 +38,11 @@ class TimeBudget:
         self._began_s = clock()
 
     @property
+    def seconds(self) -> float:
+        """How long it is from its beginning to its end."""
+        return self._seconds
+
+    @property
     def spent(self) -> float:
         """The share that is used up: 1 or more when it is over."""
         if self._seconds <= 0.0:
@@ -59,6 +64,10 @@ class TimeBudget:
         part = TimeBudget(share * self._seconds, self._clock)
         part._began_s = self._began_s
         return part
+
+    def renewed(self) -> TimeBudget:
+        """As much time again, from now on."""
+        return TimeBudget(self._seconds, self._clock)
 
     def part(self, share: float, least_s: float = 0.0) -> TimeBudget:
         """From now on, `share` of what is left, and no less than `least_s` where so much is."""

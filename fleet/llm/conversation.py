@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from fleet.llm.budget import Budget
-from fleet.llm.client import ModelAnswer, ModelClient
+from fleet.llm.client import START_TIMEOUT_S, ModelAnswer, ModelClient
 from fleet.llm.configuration import LlmConfig, Structured
 from fleet.llm.prompts import load_prompts
 from fleet.llm.quoting import violations_text
@@ -66,6 +66,11 @@ class LanguageModel:
     def configured(self) -> bool:
         """Whether there is a model to ask."""
         return self.config.not_configured is None
+
+    @property
+    def longest_s(self) -> float:
+        """How long the calls for one plan take at most, s; none where no model is configured."""
+        return self.config.max_wall_s + START_TIMEOUT_S if self.configured else 0.0
 
     def warm(self) -> None:
         """Start what takes seconds to start, if a model is configured. Blocks until it runs."""

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+from math import inf
 
 from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.core.model.world import WorldModel
+from fleet.jobshop.time_budget import TimeBudget
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan, Violation
 
@@ -19,7 +21,7 @@ class PlanningProblem:
     """Goals with their conditions, and the world to reach them in.
 
     `first_task` is the number of the first new task, so that task names stay unique over
-    revisions of a plan.
+    revisions of a plan. A planner whose `budget` is over gives what it has found until then.
     """
 
     plan: str
@@ -31,14 +33,24 @@ class PlanningProblem:
     first_task: int = 1
     searched: frozenset[str] = frozenset()
     """Places in which this plan has looked around already."""
+    budget: TimeBudget = field(default_factory=lambda: TimeBudget(inf))
+
+    @property
+    def not_in_time(self) -> str:
+        """What is said of goals for which the `budget` did not suffice."""
+        return f"not planned within {self.budget.seconds:g} s"
 
 
 @dataclass(frozen=True)
 class NoPlan:
-    """Why there is no plan: a sentence, and violations where a plan was found wanting."""
+    """Why there is no plan: a sentence, and violations where a plan was found wanting.
+
+    `postponed`: there may be one, and only the time did not suffice to find it.
+    """
 
     reason: str
     violations: tuple[Violation, ...] = field(default=())
+    postponed: bool = False
 
 
 class Planner(ABC):
@@ -46,9 +58,14 @@ class Planner(ABC):
 
     name: str
     strategies: tuple[str, ...]
+    waiting_s: float = 0.0
+    """How long it may wait for others, such as a language model, beside the limit for planning."""
 
     def plan(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
-        """A valid plan, or why there is none."""
+        """A valid plan, or why there is none.
+
+        Goals for which the time did not suffice are not among those of the plan.
+        """
         if problem.strategy not in self.strategies:
             return NoPlan(
                 f"planner {self.name} has no strategy {problem.strategy}: "

@@ -14,17 +14,36 @@ from keyexpr_schema.payloads.plans import Plan
 class PartialPlan:
     """A plan, and the goals that it leaves out, each with the reason.
 
+    Goals in `left_out` cannot be reached, those `postponed` only took too long to plan for.
     `changed` is false for a residual plan that stays as it was.
     """
 
     checked: CheckedPlan
     left_out: Mapping[str, str] = field(default_factory=dict)
+    postponed: Mapping[str, str] = field(default_factory=dict)
     changed: bool = True
+
+    @classmethod
+    def of(
+        cls,
+        checked: CheckedPlan,
+        problem: PlanningProblem,
+        left_out: Mapping[str, str] | None = None,
+    ) -> PartialPlan:
+        """A planner's answer to `problem`; goals that it does without were postponed."""
+        planned = set(checked.plan.goals)
+        late = [goal.goal for goal in problem.goals if goal.goal not in planned]
+        return cls(checked, left_out or {}, dict.fromkeys(late, problem.not_in_time))
 
     @property
     def plan(self) -> Plan:
         """The plan without its check."""
         return self.checked.plan
+
+    @property
+    def incomplete(self) -> bool:
+        """Whether it does without some goals."""
+        return bool(self.left_out or self.postponed)
 
 
 def plan_reachable_goals(
@@ -40,15 +59,16 @@ def plan_reachable_goals(
     """
     made = planner.plan(problem)
     if isinstance(made, CheckedPlan):
-        return PartialPlan(made)
+        return PartialPlan.of(made, problem)
     left_out: dict[str, str] = {}
     for goal in problem.goals if len(problem.goals) > 1 else ():
-        if goal.goal not in reached:
+        if goal.goal not in reached and not problem.budget.over:
             alone = feasibility.plan(replace(problem, goals=(goal,)))
-            if isinstance(alone, NoPlan):
+            if isinstance(alone, NoPlan) and not alone.postponed:
                 left_out[goal.goal] = alone.reason
     rest = tuple(goal for goal in problem.goals if goal.goal not in left_out)
     if not left_out or all(goal.goal in reached for goal in rest):
         return made
-    again = planner.plan(replace(problem, goals=rest))
-    return again if isinstance(again, NoPlan) else PartialPlan(again, left_out)
+    remaining = replace(problem, goals=rest)
+    again = planner.plan(remaining)
+    return again if isinstance(again, NoPlan) else PartialPlan.of(again, remaining, left_out)

@@ -8,7 +8,7 @@ checker decides whether that is a plan.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Set
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import replace as changed
 
 from msgspec.structs import replace
@@ -49,14 +49,21 @@ def repair_plan(
         planner, feasibility, changed(problem, goals=anew, first_task=first)
     )
     repaired = _without_tasks_of(residual, broken)
-    if isinstance(part, NoPlan):
-        left_out = {goal.goal: part.reason for goal in anew}
-    else:
-        left_out = dict(part.left_out)
+    left_out: Mapping[str, str] = {}
+    postponed: Mapping[str, str] = {}
+    if not isinstance(part, NoPlan):
+        left_out, postponed = part.left_out, part.postponed
         repaired = _beside(repaired, part.plan)
-    repaired = _for_goals(repaired, [g for g in problem.goals if g.goal not in left_out])
+    elif part.postponed:
+        postponed = {goal.goal: part.reason for goal in anew}
+    else:
+        left_out = {goal.goal: part.reason for goal in anew}
+    missing = left_out.keys() | postponed.keys()
+    repaired = _for_goals(repaired, [g for g in problem.goals if g.goal not in missing])
     rechecked = check_plan(repaired, problem.world)
-    return PartialPlan(rechecked, left_out) if isinstance(rechecked, CheckedPlan) else None
+    if isinstance(rechecked, CheckedPlan):
+        return PartialPlan(rechecked, left_out, postponed)
+    return None
 
 
 def _without_tasks_of(plan: Plan, goals: Set[str]) -> Plan:

@@ -81,7 +81,7 @@ def compose(skill_files: tuple[Path, ...] = (), llm_file: Path | None = None) ->
     load_plug_ins(PLANNERS, lambda offered: _add(offered, Planner, planners))
     load_plug_ins(ALLOCATORS, lambda offered: _add(offered, Allocator, allocators))
     skills = load_all_skills(skill_files)
-    interpreter = LlmInterpreter(model, skills)
+    interpreter = LlmInterpreter(model)
     return Composition(skills, planners, allocators, model, interpreter, symbolic)
 
 

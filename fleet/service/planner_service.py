@@ -18,7 +18,7 @@ from fleet.core.dispatch.dispatcher import next_timer
 from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import At, Event
 from fleet.core.model.skills import phrases_of
-from fleet.core.plan_entry import PlanningJob
+from fleet.core.planning_input import InterpretationInput, PlanningInput
 from fleet.core.state import LOGIC, Policy, State
 from fleet.core.step import replay, step
 from fleet.errors import Superseded
@@ -27,7 +27,7 @@ from fleet.service.composition import Composition
 from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, event_of, missed_deletions
 from fleet.service.outbox import Outbox
-from fleet.service.planning_job import run_planning_job
+from fleet.service.planning.planning_job import run_interpretation, run_planning_job
 from keyexpr_schema.keyspace import (
     PLANNER_ALIVE,
     PLANNER_STATUS,
@@ -232,33 +232,31 @@ class PlannerService:
         self._outbox.send(e for e in effects if isinstance(e, Publish | Retract))
         for effect in effects:
             if isinstance(effect, MakePlan):
-                self._in_background(self._make_plan(effect.job))
+                self._in_background(self._make_plan(effect.given))
             elif isinstance(effect, Interpret):
-                self._in_background(self._interpret(effect))
+                self._in_background(self._interpret(effect.given))
 
     def _in_background(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.create_task(work)
         self._planning.add(task)
         task.add_done_callback(self._planning.discard)
 
-    async def _make_plan(self, job: PlanningJob) -> None:
-        at = self._at()
+    async def _make_plan(self, given: PlanningInput) -> None:
         try:
-            event: Event = await asyncio.to_thread(
-                run_planning_job, job, self._state, self._composition, at
-            )
+            event: Event = await asyncio.to_thread(run_planning_job, given, self._composition)
         except Exception as error:
-            log.exception("planning job %d", job.job)
+            log.exception("planning job %d", given.job.job)
             event = events.PlanningFailed(
-                job=job.job, reason=f"the planner failed: {error or type(error).__name__}", **at
+                job=given.job.job,
+                reason=f"the planner failed: {error or type(error).__name__}",
+                postponed=True,
+                **self._at(),
             )
-        self._inbox.put_nowait(event)
+        self._inbox.put_nowait(replace(event, **self._at()))
 
-    async def _interpret(self, effect: Interpret) -> None:
-        interpret = self._composition.interpreter.interpret
-        read = await asyncio.to_thread(interpret, effect.text, self._state.vocabulary())
-        meaning: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
-        self._inbox.put_nowait(events.GoalInterpreted(goal=effect.goal, **meaning, **self._at()))
+    async def _interpret(self, given: InterpretationInput) -> None:
+        event = await asyncio.to_thread(run_interpretation, given, self._composition)
+        self._inbox.put_nowait(replace(event, **self._at()))
 
 
 def _report_time_s(event: Event) -> float:

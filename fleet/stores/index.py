@@ -1,69 +1,194 @@
-"""The values of a store in memory, found by key or by key expression with wildcards."""
+"""The writes of a store in memory, found by key, by wildcards, and by the order of change."""
 
 from __future__ import annotations
 
 import re
-from bisect import bisect_left, insort
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from typing import Any
 
 from keyexpr_schema.transport.storage import Write
 
+_DEPTH = 4
+"""Chunks that lead to a bucket: the realm, and what tells one kind of key from another."""
+_WORTH_TIDYING = 1000
+MAX_BYTES = 1_000_000
+"""Of values in one answer: beyond, a query would hold all others up."""
+
+Numbered = tuple[int, Write]
+
 
 @lru_cache(maxsize=1024)
-def matcher(pattern: str) -> re.Pattern[str]:
-    """A regular expression for a Zenoh key expression: `*` one chunk, `**` any number of them.
+def matcher(*patterns: str) -> re.Pattern[str]:
+    """A regular expression for Zenoh key expressions: `*` one chunk, `**` any number of them.
 
     `$*` is any part of a chunk. As in Zenoh, wildcards do not match chunks that begin with `@`.
     https://github.com/eclipse-zenoh/roadmap/blob/main/rfcs/ALL/Key%20Expressions.md
     """
     some = r"(?!@)[^/]+"
-    parts = []
-    for chunk in pattern.split("/"):
-        if chunk == "**":
-            parts.append(rf"(?:/{some})*")
-        elif chunk == "*":
-            parts.append(f"/{some}")
-        else:
-            text = "[^/]*".join(re.escape(part) for part in chunk.split("$*"))
-            parts.append(f"/{'(?!@)' if chunk.startswith('$*') else ''}{text}")
-    return re.compile("".join(parts))
+    anything = rf"(?:/{some})*"
+    wholes = []
+    for pattern in patterns:
+        parts: list[str] = []
+        for chunk in pattern.split("/"):
+            if chunk == "**" and parts and parts[-1] == anything:
+                continue
+            if chunk == "**":
+                parts.append(anything)
+            elif chunk == "*":
+                parts.append(f"/{some}")
+            else:
+                text = "[^/]*".join(re.escape(part) for part in chunk.split("$*"))
+                parts.append(f"/{'(?!@)' if chunk.startswith('$*') else ''}{text}")
+        wholes.append("".join(parts))
+    return re.compile("|".join(wholes))
 
 
 class Index:
-    """Values by key, sorted so that a pattern looks only at keys that share its first chunks."""
+    """The newest write of every key, deletions included, in buckets by the first chunks.
 
-    def __init__(self) -> None:
-        self._values: dict[str, Write] = {}
+    A pattern looks only into the buckets that it can match, so that the orders of all robots are
+    found without a look at their reports. `last` is the number of the newest change.
+    """
+
+    def __init__(self, last: int = 0) -> None:
+        self._root: dict[str, Any] = {}
+        self._numbers: list[int] = []
         self._keys: list[str] = []
+        self._count = 0
+        self.last = last
 
-    def set(self, write: Write) -> None:
-        """Keep `write` as the value of its key."""
-        if write.keyexpr not in self._values:
-            insort(self._keys, write.keyexpr)
-        self._values[write.keyexpr] = write
+    def __len__(self) -> int:
+        return self._count
 
-    def remove(self, keyexpr: str) -> None:
-        """Forget the value of `keyexpr`, if it has one."""
-        if self._values.pop(keyexpr, None) is not None:
-            del self._keys[bisect_left(self._keys, keyexpr)]
+    @property
+    def remembered(self) -> int:
+        """Changes held in order, with those replaced since that were not tidied away yet."""
+        return len(self._numbers)
+
+    def get(self, keyexpr: str) -> Write | None:
+        """The newest write of a key: its value, or its tombstone."""
+        found = self._bucket(keyexpr).get(keyexpr)
+        return found[1] if found is not None else None
+
+    def set(self, number: int, write: Write) -> None:
+        """Keep `write`, the change of that number, as the newest of its key."""
+        keyexpr = write.keyexpr
+        node = self._root
+        for chunk in _path(keyexpr):
+            node = node.setdefault(chunk, {})
+        if keyexpr not in node:
+            self._count += 1
+        node[keyexpr] = (number, write)
+        self._numbers.append(number)
+        self._keys.append(keyexpr)
+        self.last = number
+        if len(self._numbers) > 2 * self._count + _WORTH_TIDYING:
+            self._tidy()
+
+    def forget(self, keyexpr: str) -> None:
+        """Know nothing of a key any more."""
+        nodes = [self._root]
+        for chunk in _path(keyexpr):
+            nodes.append(nodes[-1].get(chunk, {}))
+        if nodes[-1].pop(keyexpr, None) is None:
+            return
+        self._count -= 1
+        for node, chunk in zip(nodes[-2::-1], _path(keyexpr)[::-1], strict=True):
+            if node[chunk]:
+                break
+            del node[chunk]
 
     def matching(self, pattern: str) -> list[Write]:
         """The values of every key that `pattern` matches, in order of key."""
         if "*" not in pattern:
-            found = self._values.get(pattern)
-            return [found] if found is not None else []
-        literal = pattern[: pattern.index("*")]
-        literal = literal[: literal.rfind("/") + 1]
+            found = self.get(pattern)
+            return [found] if found is not None and not found.deleted else []
         fits = matcher(pattern).fullmatch
-        # `a/**` also matches `a`, which sorts before `a/`.
-        start = bisect_left(self._keys, literal[:-1])
-        result = []
-        for number in range(start, len(self._keys)):
-            keyexpr = self._keys[number]
-            if not keyexpr.startswith(literal) and keyexpr != literal[:-1]:
-                if keyexpr > literal:
-                    break
+        found_ = [
+            write
+            for bucket in self._buckets(pattern)
+            for keyexpr, (_, write) in bucket.items()
+            if not write.deleted and fits("/" + keyexpr)
+        ]
+        return sorted(found_, key=lambda write: write.keyexpr)
+
+    def since(
+        self, patterns: Sequence[str], after: int, limit: int, ignored: int
+    ) -> tuple[list[Numbered], bool]:
+        """The newest writes numbered above `after` of keys that one of `patterns` matches.
+
+        In order of number, deletions above `ignored` included; at most `limit` of them and not
+        much above `MAX_BYTES`, and whether that cut something off.
+        """
+        taken: list[Numbered] = []
+        size = 0
+        for number, write in self._newer(patterns, after):
+            if write.deleted and number <= ignored:
                 continue
-            if fits("/" + keyexpr):
-                result.append(self._values[keyexpr])
-        return result
+            if len(taken) >= limit or size > MAX_BYTES:
+                return taken, True
+            taken.append((number, write))
+            size += len(write.data) + len(write.keyexpr)
+        return taken, False
+
+    def _newer(self, patterns: Sequence[str], after: int) -> Iterator[Numbered]:
+        """Goes through the changes or through the buckets, whichever are fewer."""
+        fits = matcher(*patterns).fullmatch
+        start = bisect_right(self._numbers, after)
+        buckets = {id(b): b for pattern in patterns for b in self._buckets(pattern)}.values()
+        if len(self._numbers) - start <= 2 * sum(map(len, buckets)):
+            for at in range(start, len(self._numbers)):
+                keyexpr = self._keys[at]
+                found = self._bucket(keyexpr).get(keyexpr)
+                if found is not None and found[0] == self._numbers[at] and fits("/" + keyexpr):
+                    yield found
+            return
+        yield from sorted(
+            (
+                found
+                for bucket in buckets
+                for keyexpr, found in bucket.items()
+                if found[0] > after and fits("/" + keyexpr)
+            ),
+            key=lambda found: found[0],
+        )
+
+    def _bucket(self, keyexpr: str) -> dict[str, Numbered]:
+        node = self._root
+        for chunk in _path(keyexpr):
+            node = node.get(chunk, _NOTHING)
+        return node
+
+    def _buckets(self, pattern: str) -> list[dict[str, Numbered]]:
+        chunks = pattern.split("/")
+        nodes = [self._root]
+        for depth in range(_DEPTH):
+            chunk = chunks[depth] if depth < len(chunks) else ""
+            if chunk == "**":
+                chunks[depth + 1 :] = ["**"] * _DEPTH  # anything may follow
+            if "*" in chunk:
+                nodes = [child for node in nodes for child in node.values()]
+            else:
+                nodes = [node[chunk] for node in nodes if chunk in node]
+        return nodes
+
+    def _tidy(self) -> None:
+        """Drop what later changes of the same keys have replaced."""
+        kept = [
+            (number, keyexpr)
+            for number, keyexpr in zip(self._numbers, self._keys, strict=True)
+            if (self._bucket(keyexpr).get(keyexpr) or (0,))[0] == number
+        ]
+        self._numbers = [number for number, _ in kept]
+        self._keys = [keyexpr for _, keyexpr in kept]
+
+
+_NOTHING: dict[str, Any] = {}
+
+
+def _path(keyexpr: str) -> list[str]:
+    """The first chunks of a key, filled up; every key has the same number of them."""
+    chunks = keyexpr.split("/", _DEPTH)[:_DEPTH]
+    return chunks + [""] * (_DEPTH - len(chunks))

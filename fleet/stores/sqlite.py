@@ -2,40 +2,21 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import sqlite3
 import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from sys import intern
 from typing import Literal, Self
 
-from fleet.errors import StoreError, StoreInUse
+from fleet.errors import StoreError
 from fleet.stores.index import Index
-from keyexpr_schema.transport.storage import AppliedWrite, Write
+from fleet.stores.state_file import STAMP_BYTES, identity_of, open_file, take_lock
+from keyexpr_schema.transport.storage import AppliedWrite, Changes, Write, is_journaled
 
-FORMAT = 1
-_STAMP_BYTES = 24
 _PRUNE_EVERY = 1000
-_TABLES = f"""
-CREATE TABLE IF NOT EXISTS latest (
-    keyexpr TEXT PRIMARY KEY,
-    stamp BLOB NOT NULL,
-    deleted INTEGER NOT NULL,
-    encoding TEXT NOT NULL,
-    data BLOB NOT NULL
-) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS journal (
-    number INTEGER PRIMARY KEY AUTOINCREMENT,
-    wall_time_s REAL NOT NULL,
-    keyexpr TEXT NOT NULL,
-    deleted INTEGER NOT NULL,
-    stamp BLOB NOT NULL,
-    data BLOB NOT NULL
-);
-PRAGMA user_version = {FORMAT};
-"""
 
 
 class SqliteStore:
@@ -61,14 +42,14 @@ class SqliteStore:
         self._wall_time_s = wall_time_s
         self._journal_limit = journal_limit
         self._lock = threading.Lock()
-        self._index = Index()
-        self._stamps: dict[str, int] = {}
         self._since_prune = 0
-        self._guard = _take_lock(data_dir)
+        self._forgotten = 0
+        self._guard = take_lock(data_dir)
         path = data_dir / "state.sqlite"
         try:
-            self._db = _open(path, synchronous)
-            self._load()
+            self._db = open_file(path, synchronous)
+            self._identity = identity_of(self._db, path)
+            self._index = self._load()
             self._last = self._db.execute(
                 "SELECT coalesce(max(number), 0) FROM journal"
             ).fetchone()[0]
@@ -82,76 +63,78 @@ class SqliteStore:
             os.close(self._guard)
             raise
 
-    def _load(self) -> None:
-        rows = self._db.execute("SELECT keyexpr, stamp, deleted, encoding, data FROM latest")
-        for keyexpr, stamp, deleted, encoding, data in rows:
-            number = int.from_bytes(stamp, "big")
-            self._stamps[keyexpr] = number
-            if not deleted:
-                self._index.set(Write(keyexpr, number, False, encoding, data))
+    def _load(self) -> Index:
+        rows = self._db.execute(
+            "SELECT number, keyexpr, stamp, deleted, encoding, data FROM latest"
+        ).fetchall()
+        rows.sort()
+        index = Index()
+        for number, keyexpr, stamp, deleted, encoding, data in rows:
+            write = Write(
+                keyexpr, int.from_bytes(stamp, "big"), bool(deleted), intern(encoding), data
+            )
+            index.set(number, write)
+        return index
 
     def apply(self, batch: Sequence[Write]) -> int:
         for write in batch:
             if write.stamp <= 0:
                 raise StoreError(f"a write to {write.keyexpr!r} carries no timestamp")
-        wall_time_s = self._wall_time_s()
+        now_s = self._wall_time_s()
         with self._lock:
-            fresh, changes = self._decide(batch)
+            changes = self._decide(batch)
             if not changes:
                 return 0
+            newest = {w.keyexpr: number for number, w in enumerate(changes, self._index.last + 1)}
+            fresh = [
+                (number, write)
+                for number, write in enumerate(changes, self._index.last + 1)
+                if newest[write.keyexpr] == number
+            ]
+            journaled = [write for write in changes if is_journaled(write.keyexpr)]
             try:
                 with self._db:
                     self._db.executemany(
-                        "INSERT OR REPLACE INTO latest VALUES (?, ?, ?, ?, ?)",
+                        "INSERT OR REPLACE INTO latest VALUES (?, ?, ?, ?, ?, ?, ?)",
                         [
-                            (w.keyexpr, _blob(w.stamp), w.deleted, w.encoding, w.data)
-                            for w in fresh.values()
+                            (w.keyexpr, _blob(w.stamp), w.deleted, w.encoding, w.data, n, now_s)
+                            for n, w in fresh
                         ],
                     )
                     self._db.executemany(
                         "INSERT INTO journal (wall_time_s, keyexpr, deleted, stamp, data) "
                         "VALUES (?, ?, ?, ?, ?)",
-                        [
-                            (wall_time_s, w.keyexpr, w.deleted, _blob(w.stamp), w.data)
-                            for w in changes
-                        ],
+                        [(now_s, w.keyexpr, w.deleted, _blob(w.stamp), w.data) for w in journaled],
                     )
-                    self._prune(len(changes))
+                    self._prune(len(journaled))
             except sqlite3.Error as error:
                 raise StoreError(f"the store could not write: {error}") from error
             # Only now: what a reader sees must be durable.
-            self._last += len(changes)
-            for write in fresh.values():
-                self._stamps[write.keyexpr] = write.stamp
-                if write.deleted:
-                    self._index.remove(write.keyexpr)
-                else:
-                    self._index.set(write)
+            self._last += len(journaled)
+            for number, write in fresh:
+                self._index.set(number, write)
             return len(changes)
 
-    def _decide(self, batch: Sequence[Write]) -> tuple[dict[str, Write], list[Write]]:
-        """The writes of `batch` that win: the last of each key, and all in their order."""
+    def _decide(self, batch: Sequence[Write]) -> list[Write]:
+        """The writes of `batch` that win, in their order."""
         fresh: dict[str, Write] = {}
         changes: list[Write] = []
         for write in batch:
-            for one in self._concrete(write, fresh):
-                known = fresh.get(one.keyexpr)
-                stamp = known.stamp if known is not None else self._stamps.get(one.keyexpr, 0)
-                if one.stamp > stamp:
+            for one in (write,) if "*" not in write.keyexpr else self._concrete(write, fresh):
+                known = fresh.get(one.keyexpr) or self._index.get(one.keyexpr)
+                if known is None or one.stamp > known.stamp:
                     fresh[one.keyexpr] = one
                     changes.append(one)
-        return fresh, changes
+        return changes
 
     def _concrete(self, write: Write, fresh: dict[str, Write]) -> list[Write]:
-        if "*" not in write.keyexpr:
-            return [write]
         keys = {found.keyexpr for found in self._index.matching(write.keyexpr)}
         pending = Index()
         for one in fresh.values():
             if one.deleted:
                 keys.discard(one.keyexpr)
             else:
-                pending.set(one)
+                pending.set(1, one)
         keys.update(found.keyexpr for found in pending.matching(write.keyexpr))
         return [
             Write(key, write.stamp, write.deleted, write.encoding, write.data)
@@ -170,6 +153,28 @@ class SqliteStore:
     def select(self, pattern: str) -> list[Write]:
         with self._lock:
             return self._index.matching(pattern)
+
+    def changes(self, patterns: Sequence[str], position: str, limit: int) -> Changes:
+        with self._lock:
+            last = self._index.last
+            began, after = self._place(position)
+            # Deletions up to `began` are none for who began then with nothing; of those after it
+            # none may be forgotten.
+            whole = not 0 <= after <= last or max(began, after) < self._forgotten
+            if whole:
+                began, after = last, 0
+            found, more = self._index.since(patterns, after, max(1, limit), began)
+            reached = found[-1][0] if more else last
+        writes = [write for _, write in found]
+        return Changes(writes, f"{self._identity}/{began}/{reached}", whole, more)
+
+    def _place(self, position: str) -> tuple[int, int]:
+        """When the asker began to list, and up to which change it knows all; -1 if of no use."""
+        identity, _, numbers = position.partition("/")
+        began, _, after = numbers.partition("/")
+        if identity == self._identity and began.isdecimal() and after.isdecimal():
+            return int(began), int(after)
+        return -1, -1
 
     def journal(self, prefix: str, after: int, limit: int) -> tuple[list[AppliedWrite], int]:
         with self._lock:
@@ -201,42 +206,4 @@ class SqliteStore:
 
 
 def _blob(stamp: int) -> bytes:
-    return stamp.to_bytes(_STAMP_BYTES, "big")
-
-
-def _take_lock(data_dir: Path) -> int:
-    try:
-        data_dir.mkdir(parents=True, exist_ok=True)
-        guard = os.open(data_dir / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-    except OSError as error:
-        raise StoreError(
-            f"the store directory {data_dir} cannot be used: {error.strerror}"
-        ) from None
-    try:
-        # The kernel drops the lock with the process, however it ends.
-        fcntl.flock(guard, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(guard)
-        raise StoreInUse(
-            f"another router uses the store in {data_dir}: stop it, or give this one another "
-            "directory with --data"
-        ) from None
-    return guard
-
-
-def _open(path: Path, synchronous: str) -> sqlite3.Connection:
-    db = sqlite3.connect(path, check_same_thread=False, timeout=5.0)
-    try:
-        version = db.execute("PRAGMA user_version").fetchone()[0]
-        if version > FORMAT:
-            raise StoreError(
-                f"the store {path} has format {version}, but this program knows formats up to "
-                f"{FORMAT}: update it"
-            )
-        db.execute("PRAGMA journal_mode = WAL")
-        db.execute(f"PRAGMA synchronous = {synchronous}")
-        db.executescript(_TABLES)
-    except BaseException:
-        db.close()
-        raise
-    return db
+    return stamp.to_bytes(STAMP_BYTES, "big")

@@ -70,6 +70,9 @@ class GoalState(str, Enum):
 
 ENDED_GOALS = frozenset({GoalState.REACHED, GoalState.FAILED, GoalState.REJECTED})
 """States that a goal does not leave."""
+OVER_GOALS = ENDED_GOALS - {GoalState.REJECTED}
+"""Of these, the ones in which nothing will happen to it any more: one that is rejected is read
+again when there are other names, until somebody deletes it."""
 
 
 class GoalStatus(Payload, frozen=True, kw_only=True):
@@ -79,6 +82,9 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     `conditions` are those of the stage that it is at, `stage` counts from 0. `note` is a sentence
     about words of the goal that are no part of what must hold: remarks that ask for nothing, and
     what it takes for granted against what is believed.
+
+    Times: when the planner first heard of the goal as it is, and since when it stands so, each on
+    the fleet's clock [s] and (`wall`) in Unix time [s].
     """
 
     goal: Id
@@ -89,4 +95,7 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     plan: Id | None = None
     reason: str | None = None
     note: str | None = None
+    given_s: float | None = None
+    given_wall_s: float | None = None
     time_s: float = 0.0
+    wall_time_s: float | None = None

@@ -70,3 +70,42 @@ class StoreJournal(Payload, frozen=True, kw_only=True):
 
     entries: tuple[JournalEntry, ...]
     last: int
+
+
+class StoreChangesQuery(Payload, frozen=True, kw_only=True):
+    """Asks the store for what changed since `position`, which an earlier answer gave.
+
+    Of keys that one of `patterns` matches (`*`, `**`), at most `limit` of them. `position` empty:
+    from the beginning, which lists what is there now.
+    """
+
+    patterns: tuple[str, ...]
+    position: str = ""
+    limit: int = 1000
+
+
+class StoredValue(Payload, frozen=True, kw_only=True):
+    """What the store holds at one key; `value` missing: it was deleted.
+
+    `base64`: `value` is written in it, because the bytes are not UTF-8.
+    """
+
+    keyexpr: str
+    timestamp: str
+    encoding: str = ""
+    value: str | None = None
+    base64: bool = False
+
+
+class StoreChanges(Payload, frozen=True, kw_only=True):
+    """The newest value of each key that changed, in the order of change.
+
+    `whole`: the position that was asked for says nothing of this store (it was emptied, replaced,
+    or has forgotten deletions since), so this begins with nothing: what is in no page from here on
+    is gone. `more`: ask again, from the `position` given here.
+    """
+
+    values: tuple[StoredValue, ...]
+    position: str
+    whole: bool
+    more: bool

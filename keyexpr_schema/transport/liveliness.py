@@ -15,9 +15,9 @@ from typing import Any, Generic
 
 from keyexpr_schema.errors import ForeignKey
 from keyexpr_schema.key import A, Key
+from keyexpr_schema.transport.change_stream import ChangeStream
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.samples import Sample
-from keyexpr_schema.transport.watch import ChangeStream
 
 REUNION_S = 2.0
 """After the own link came back: how long the others have. They retry every 0.5 s."""

@@ -14,14 +14,13 @@ import logging
 import threading
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
-from functools import lru_cache
+from typing import Any
 
 import zenoh
 from zenoh import handlers
 
-from keyexpr_schema.errors import CannotListen, ForeignKey, SchemaError
-from keyexpr_schema.keyspace import STORE_JOURNAL, key_of
-from keyexpr_schema.payloads.system import JournalEntry, StoreAddress, StoreJournal
+from keyexpr_schema.errors import CannotListen, SchemaError
+from keyexpr_schema.key import Key
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.samples import (
     Encoded,
@@ -31,24 +30,12 @@ from keyexpr_schema.transport.samples import (
     text_of_stamp,
     timestamp_of_stamp,
 )
-from keyexpr_schema.transport.storage import Store, Write
+from keyexpr_schema.transport.storage import Store, Write, is_stored
+from keyexpr_schema.transport.store_questions import StoreQuestions
 from keyexpr_schema.transport.trace import Trace
 
 _log = logging.getLogger(__name__)
 CHANNEL = 10_000
-_MAX_JOURNAL_REPLY = 10_000
-
-
-@lru_cache(maxsize=65_536)
-def is_stored(keyexpr: str) -> bool:
-    """Whether a key expression, realm included, is one that the store keeps."""
-    _, _, rest = keyexpr.partition("/")
-    if "*" in rest:
-        return True  # applies to existing keys, which are all of ours
-    try:
-        return key_of(rest).stored
-    except ForeignKey:
-        return False
 
 
 class _Storage:
@@ -57,12 +44,15 @@ class _Storage:
     def __init__(self, session: zenoh.Session, store: Store) -> None:
         self._session = session
         self._store = store
+        self._questions = StoreQuestions(store)
         self._applying = threading.Lock()
         self._subscriber = session.declare_subscriber("**", handlers.FifoChannel(CHANNEL))
         # Not complete: a complete queryable on `**` would take queries away from those that
         # serve a key.
         self._queryable = session.declare_queryable("**", handlers.FifoChannel(CHANNEL))
-        Trace("store").note("serve", STORE_JOURNAL, STORE_JOURNAL.build(StoreAddress()))
+        trace = Trace("store")
+        for keyexpr, key in self._questions.keys.items():
+            trace.note("serve", key, keyexpr)
         self._threads = [
             threading.Thread(target=self._write_for_ever, name="store-write"),
             threading.Thread(target=self._reply_for_ever, name="store-answer"),
@@ -139,8 +129,9 @@ class _Storage:
     def _reply(self, query: zenoh.Query) -> None:
         keyexpr = str(query.key_expr)
         realm, _, rest = keyexpr.partition("/")
-        if rest == STORE_JOURNAL.build(StoreAddress()):
-            self._reply_journal(query, keyexpr, realm)
+        if (key := self._questions.keys.get(rest)) is not None:
+            self._apply()
+            self._answer(query, realm, key)
             return
         if "*" not in keyexpr and not is_stored(keyexpr):
             return
@@ -154,33 +145,16 @@ class _Storage:
                 attachment=text_of_stamp(write.stamp),
             )
 
-    def _reply_journal(self, query: zenoh.Query, keyexpr: str, realm: str) -> None:
+    def _answer(self, query: zenoh.Query, realm: str, key: Key[Any, Any]) -> None:
+        keyexpr = str(query.key_expr)
         try:
             data = query.payload.to_bytes() if query.payload is not None else b"{}"
-            encoding = str(query.encoding or "")
-            asked = decode_value(STORE_JOURNAL, Encoded(keyexpr, data, encoding))
+            asked = decode_value(key, Encoded(keyexpr, data, str(query.encoding or "")))
         except SchemaError as error:
             query.reply_err(str(error).encode())
             return
-        limit = max(0, min(asked.limit, _MAX_JOURNAL_REPLY))
-        found, last = self._store.journal(realm, asked.after, limit)
-        entries = tuple(
-            JournalEntry(
-                number=one.number,
-                wall_time_s=one.wall_time_s,
-                keyexpr=one.keyexpr.removeprefix(realm + "/"),
-                deleted=one.deleted,
-                timestamp=text_of_stamp(one.stamp),
-                value=None if one.deleted else one.data.decode(errors="replace"),
-            )
-            for one in found
-        )
-        reply = StoreJournal(entries=entries, last=last)
-        query.reply(
-            keyexpr,
-            STORE_JOURNAL.encode(reply),  # type: ignore[arg-type]
-            encoding=reply_encoding_of(STORE_JOURNAL),
-        )
+        answer = key.encode(self._questions.answer(realm, key, asked))
+        query.reply(keyexpr, answer, encoding=reply_encoding_of(key))
 
 
 @asynccontextmanager

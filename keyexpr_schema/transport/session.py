@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass
 from typing import Any
 
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload, Unreachable
 from keyexpr_schema.ids import check_id
-from keyexpr_schema.key import A, Delivery, Key, P, Payload
+from keyexpr_schema.key import A, Address, Delivery, Key, P, Payload
 from keyexpr_schema.transport.connecting import open_link
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
@@ -18,10 +18,11 @@ from keyexpr_schema.transport.samples import Sample, decode_value, encoding_of
 from keyexpr_schema.transport.store_client import StoreClient
 from keyexpr_schema.transport.trace import Trace
 from keyexpr_schema.transport.undecodable import UndecodableReports
-from keyexpr_schema.transport.watch import Change, Watch
+from keyexpr_schema.transport.watch import Change, Narrowed, Watch
 
 __all__ = [
     "Change",
+    "Narrowed",
     "Session",
     "SessionConfig",
     "TokenChange",
@@ -184,17 +185,29 @@ class Session:
         self._undecodable.report(keyexpr, data, reason)
 
     def watch(
-        self, *selections: Key[Any, Any] | tuple[Key[Any, Any], dict[str, str | int]]
+        self,
+        *selections: Key[Any, Any] | tuple[Key[Any, Any], dict[str, str | int]] | Narrowed,
+        known: Iterable[tuple[Key[Any, Any], Address]] = (),
+        on_trouble: Callable[[str | None], None] | None = None,
     ) -> AbstractAsyncContextManager[Watch]:
-        """Watch keys, or `(key, {field: value})`: first all that is stored, then what changes."""
-        patterns = []
+        """Watch keys, or `(key, {field: value})`: first all that is stored, then what changes.
+
+        `known` are keys that had a value when it was looked last: those that have none any more
+        are shown as deleted. `on_trouble` hears why what is stored cannot be read, and None when
+        it can be again.
+        """
+        patterns: list[tuple[Key[Any, Any], str, Narrowed | None]] = []
         for selection in selections:
-            key, fixed = selection if isinstance(selection, tuple) else (selection, {})
+            narrowed = selection if isinstance(selection, Narrowed) else None
+            named = selection.key if isinstance(selection, Narrowed) else selection
+            key, fixed = named if isinstance(named, tuple) else (named, {})
             if key.delivery in (Delivery.TOKEN, Delivery.QUERY):
                 raise TypeError(f"{key.name} is a {key.delivery.value}: it cannot be watched")
-            patterns.append((key, key.pattern(**fixed)))
-            self._trace.note("watch", *patterns[-1])
-        return Watch(self.link, self._store, self._undecodable, patterns).running()
+            patterns.append((key, key.pattern(**fixed), narrowed))
+            self._trace.note("watch", key, key.pattern(**fixed))
+        return Watch(
+            self.link, self._store, self._undecodable, patterns, known, on_trouble
+        ).running()
 
     # --- tokens ----------------------------------------------------------------------------------
 

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol
 
+import msgspec
 
-@dataclass(frozen=True, slots=True)
-class Write:
+from keyexpr_schema.errors import ForeignKey
+from keyexpr_schema.key import Delivery, Key
+from keyexpr_schema.keyspace import key_of
+
+UNJOURNALED = "sim/"
+"""What a simulation puts is not in a journal: it would be most of it, and none of it is news."""
+
+
+class Write(msgspec.Struct, frozen=True, gc=False):
     """A put or a deletion of one key (realm included), or with wildcards of those that exist.
 
     `stamp` orders writes; see `samples.stamp_of_text`.
@@ -33,13 +42,28 @@ class AppliedWrite:
     data: bytes
 
 
+@dataclass(frozen=True, slots=True)
+class Changes:
+    """The newest write of every key that changed since a position, in the order of change.
+
+    `position`: where they end; to be given back as it is. `whole`: they begin with an empty store,
+    because the position says nothing of this one; what is in none of them up to the end is gone.
+    `more`: not all of them yet.
+    """
+
+    writes: list[Write]
+    position: str
+    whole: bool
+    more: bool
+
+
 class Store(Protocol):
     """A durable map from key expression to latest value, and a journal of what changed when.
 
     The meaning is that of zenohd's storage manager: the write with the latest timestamp wins,
-    whatever the order of arrival; a deletion is a write and leaves a tombstone; a write with a
-    wildcard applies to the keys that exist. Thread-safe. Reads show what is durable and nothing
-    else: a value that was read survives the end of the process at any moment.
+    whatever the order of arrival; a deletion is a write and leaves a tombstone for a while; a write
+    with a wildcard applies to the keys that exist. Thread-safe. Reads show what is durable and
+    nothing else: a value that was read survives the end of the process at any moment.
     """
 
     def apply(self, batch: Sequence[Write], /) -> int:
@@ -48,8 +72,43 @@ class Store(Protocol):
     def select(self, pattern: str, /) -> list[Write]:
         """The values of every key that `pattern` (`*`, `**` and `$*` allowed) matches, by key."""
 
+    def changes(self, patterns: Sequence[str], position: str, limit: int, /) -> Changes:
+        """At most `limit` changes since `position` of keys that one of `patterns` matches.
+
+        `position` "": from the beginning, which lists what is there now.
+        """
+
     def journal(self, prefix: str, after: int, limit: int, /) -> tuple[list[AppliedWrite], int]:
         """At most `limit` changes numbered above `after` of keys under `prefix/`, oldest first.
 
         Also the number of the newest entry there is, of any key.
         """
+
+
+@lru_cache(maxsize=65_536)
+def is_stored(keyexpr: str) -> bool:
+    """Whether a key expression, realm included, is one that the store keeps."""
+    if "*" in keyexpr.partition("/")[2]:
+        return True  # applies to existing keys, which are all of ours
+    key = _key_of(keyexpr)
+    return key is not None and key.stored
+
+
+@lru_cache(maxsize=65_536)
+def is_journaled(keyexpr: str) -> bool:
+    """Whether changes of this key, realm included, are in the journal.
+
+    Not those of a simulation, and not those of which only the latest matters (the state that each
+    robot puts every second would push all else out).
+    """
+    key = _key_of(keyexpr)
+    return key is None or (
+        key.delivery is Delivery.STORED and not key.template.startswith(UNJOURNALED)
+    )
+
+
+def _key_of(keyexpr: str) -> Key[object, object] | None:  # type: ignore[type-var]
+    try:
+        return key_of(keyexpr.partition("/")[2])
+    except ForeignKey:
+        return None

@@ -11,18 +11,39 @@ What holds on any Zenoh storage, the embedded one or zenohd's:
 from __future__ import annotations
 
 import asyncio
+from base64 import b64decode
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from keyexpr_schema.errors import Unconfirmed, Unreachable
-from keyexpr_schema.key import Key
-from keyexpr_schema.keyspace import STORE_JOURNAL
-from keyexpr_schema.payloads.system import StoreAddress, StoreQuery
-from keyexpr_schema.transport.link import Link
-from keyexpr_schema.transport.samples import Sample, encoding_of, stamp_of_text
+from keyexpr_schema.key import Key, P
+from keyexpr_schema.keyspace import STORE_CHANGES, STORE_JOURNAL
+from keyexpr_schema.payloads.system import (
+    StoreAddress,
+    StoreChanges,
+    StoreChangesQuery,
+    StoredValue,
+    StoreQuery,
+)
+from keyexpr_schema.transport.link import Link, Replies
+from keyexpr_schema.transport.samples import Sample, decode_reply, encoding_of, stamp_of_text
 from keyexpr_schema.transport.trace import Trace
 
 SETTLE_S = 0.5
+PAGE = 1000
+"""Values asked for at once: some milliseconds of the store's time, in which all others wait."""
 _RESEND_S = 0.25
+
+
+@dataclass(frozen=True)
+class Page:
+    """Some of what changed at a store, deletions included; see `payloads.system.StoreChanges`."""
+
+    samples: tuple[Sample, ...]
+    position: str
+    whole: bool
+    more: bool
 
 
 class StoreClient:
@@ -86,10 +107,15 @@ class StoreClient:
     async def list(self, pattern: str, timeout_s: float) -> tuple[Sample, ...]:
         """The newest stored value of every key that `pattern` matches, undecoded.
 
+        `timeout_s` holds for each page of a long listing, not for the whole of it.
+
         Raises:
             Unreachable: no router and store could be asked within `timeout_s`.
         """
         try:
+            await self._link.router.wait_up(timeout_s)
+            if "*" in pattern and (paged := await self._paged(pattern, timeout_s)) is not None:
+                return paged
             async with asyncio.timeout(timeout_s):
                 return await self._settled(pattern, timeout_s)
         except TimeoutError:
@@ -98,6 +124,46 @@ class StoreClient:
             raise Unreachable(
                 f"the store did not answer for {pattern!r} within {timeout_s:g} s"
             ) from None
+
+    async def _paged(self, pattern: str, timeout_s: float) -> tuple[Sample, ...] | None:
+        """The values, page by page; None: whoever stores them does not know pages."""
+        found: dict[str, Sample] = {}
+        position = ""
+        while (page := await self.changes((pattern,), position, timeout_s)) is not None:
+            if page.whole:
+                found.clear()
+            for sample in page.samples:
+                if sample.deleted:
+                    found.pop(sample.keyexpr, None)
+                else:
+                    found[sample.keyexpr] = sample
+            position = page.position
+            if not page.more:
+                return tuple(found.values())
+        return None
+
+    async def changes(
+        self, patterns: Sequence[str], position: str, timeout_s: float, limit: int = PAGE
+    ) -> Page | None:
+        """What changed of the keys that `patterns` match since `position` ("": the beginning).
+
+        None: no store answered that can tell, be it that there is none now (this link may be new),
+        or that it is a zenohd storage.
+
+        Raises:
+            Unreachable: there is one, but it failed or took longer than `timeout_s`.
+        """
+        asked = StoreChangesQuery(patterns=tuple(patterns), position=position, limit=limit)
+        replies = await self._ask(STORE_CHANGES, asked, timeout_s)
+        if replies.errors:
+            raise Unreachable(f"the store cannot list what it has: {replies.errors[0]}")
+        if replies.timed_out and not replies.values:
+            raise Unreachable(f"the store did not answer within {timeout_s:g} s")
+        if not replies.values:
+            return None
+        answer: StoreChanges = decode_reply(STORE_CHANGES, replies.values[0])  # type: ignore[assignment]
+        samples = tuple(map(_sample_of, answer.values))
+        return Page(samples, answer.position, answer.whole, answer.more)
 
     async def _settled(self, pattern: str, timeout_s: float) -> tuple[Sample, ...]:
         router = self._link.router
@@ -121,13 +187,22 @@ class StoreClient:
 
     async def answers(self, timeout_s: float) -> bool:
         """Whether a store that keeps a journal answers now; a zenohd storage never does."""
-        keyexpr = STORE_JOURNAL.build(StoreAddress())
-        self._trace.note("query", STORE_JOURNAL, keyexpr)
-        replies = await self._link.query(
-            keyexpr,
-            timeout_s,
-            STORE_JOURNAL.encode(StoreQuery(limit=0)),
-            encoding_of(STORE_JOURNAL),
-            first=True,
+        return bool((await self._ask(STORE_JOURNAL, StoreQuery(limit=0), timeout_s)).values)
+
+    async def _ask(self, key: Key[StoreAddress, P], asked: P, timeout_s: float) -> Replies:
+        keyexpr = key.build(StoreAddress())
+        self._trace.note("query", key, keyexpr)
+        return await self._link.query(
+            keyexpr, timeout_s, key.encode(asked), encoding_of(key), first=True
         )
-        return bool(replies.values)
+
+
+def _sample_of(value: StoredValue) -> Sample:
+    data = value.value or ""
+    return Sample(
+        value.keyexpr,
+        b64decode(data) if value.base64 else data.encode(),
+        value.encoding,
+        stamp_of_text(value.timestamp),
+        value.value is None,
+    )

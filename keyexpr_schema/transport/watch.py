@@ -1,166 +1,53 @@
 """Level-triggered watching of keys: what is stored, then what changes, then what was missed.
 
-The rule for deletions. A deletion that passes on the link is believed. One that was missed shows
-only as a key that a listing lacks, and empty is not absent: after a reconnection Zenoh answers
-with less than there is, and a store that is away answers with nothing. So a key is taken for
-deleted when two listings in a row lack it, both taken in one generation of the link, and in the
-second one the store proved to be there (it listed something else, or it answered for its journal).
+Our store keeps its changes in order. Once everything was listed, page by page, a watch asks every
+now and then, and after each reconnection, what has changed since: one question, and an empty answer
+when nothing has. It lists everything again only where the store cannot say (it is another one, or
+has forgotten deletions). What is in no page is gone.
+
+A storage that cannot say at all (zenohd's) is listed again and again, the more seldom the longer a
+listing takes, and there deletions are a matter of their own. One that passes on the link is
+believed. One that was missed shows only as a key that a listing lacks, and empty is not absent:
+after a reconnection Zenoh answers with less than there is, and a storage that is away answers with
+nothing. So a key is taken for deleted when two listings in a row lack it, both taken in one
+generation of the link, and the second one was not empty.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections import OrderedDict
-from collections.abc import AsyncIterator, Coroutine
-from contextlib import AsyncExitStack, asynccontextmanager, suppress
-from dataclasses import dataclass
-from typing import Any, Generic, Self, TypeVar
+import logging
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager
+from typing import Any
 
-from keyexpr_schema.errors import ForeignKey, UndecodablePayload, Unreachable
-from keyexpr_schema.key import A, Delivery, Key, P
+from keyexpr_schema.errors import Unreachable
+from keyexpr_schema.key import Address, Delivery, Key
+from keyexpr_schema.transport.change_stream import ChangeStream
 from keyexpr_schema.transport.link import Link
-from keyexpr_schema.transport.samples import Sample, decode_value, text_of_stamp
-from keyexpr_schema.transport.store_client import StoreClient
+from keyexpr_schema.transport.selection import Change, Narrowed, Selection
+from keyexpr_schema.transport.store_client import SETTLE_S, StoreClient
 from keyexpr_schema.transport.undecodable import UndecodableReports
 
-T = TypeVar("T")
+__all__ = ["RELIST_S", "Change", "Narrowed", "Watch"]
+
 RELIST_S = 5.0
-"""Period of re-listing while nothing seems wrong."""
+"""Period of asking for what was missed while nothing seems wrong."""
+LISTING_SHARE = 0.02
+"""Of its time, what a watch may spend on listing a storage that cannot say what has changed."""
+ANSWER_S = 3.0
+"""How long the store may take for one answer; a long listing has many."""
 _RETRY_S = 0.2
 
-
-@dataclass(frozen=True)
-class Change(Generic[A, P]):
-    """A new value of one key; `value` None: deleted. `timestamp` is Zenoh's, as text."""
-
-    key: Key[A, P]
-    address: A
-    value: P | None
-    timestamp: str
-
-
-class _Selection:
-    """One watched pattern and what is known of the keys in it."""
-
-    def __init__(self, watch: Watch, key: Key[Any, Any], pattern: str) -> None:
-        self.watch, self.key, self.pattern = watch, key, pattern
-        self.stamps: dict[str, int] = {}
-        self.live: set[str] = set()
-        self.missing: set[str] = set()
-        self.missing_generation = 0
-
-    def offer(self, sample: Sample) -> None:
-        """Pass on what is newer than what is known of its key."""
-        stamp = sample.stamp
-        known = self.stamps.get(sample.keyexpr)
-        if "*" in sample.keyexpr:
-            # A wildcard put or delete: it concerns the keys that exist, which a listing shows.
-            self.watch.relist()
-            return
-        try:
-            address = self.key.parse(sample.keyexpr)
-        except ForeignKey as error:
-            # The pattern matches it and the store may keep it, but nobody can have an id in it.
-            self.watch.undecodable.report(sample.keyexpr, sample.data, str(error))
-            return
-        if known is not None and stamp <= known and stamp:
-            return
-        if stamp:
-            self.stamps[sample.keyexpr] = stamp
-        self.missing.discard(sample.keyexpr)
-        (self.live.discard if sample.deleted else self.live.add)(sample.keyexpr)
-        try:
-            value = None if sample.deleted else decode_value(self.key, sample)
-        except UndecodablePayload as error:
-            self.watch.undecodable.report(sample.keyexpr, sample.data, str(error))
-            return
-        self.watch.deliver(sample.keyexpr, Change(self.key, address, value, text_of_stamp(stamp)))
-
-    async def relist(self) -> bool:
-        """List once; whether it has to be done again soon (something known was not in it)."""
-        router = self.watch.link.router
-        generation = router.generation
-        known = set(self.live)
-        samples = await self.watch.store.list(self.pattern, 3.0)
-        for sample in samples:
-            self.offer(sample)
-        missing = (known & self.live) - {sample.keyexpr for sample in samples}
-        if router.generation != generation or not router.up:
-            return True
-        again = self.missing & missing if self.missing_generation == generation else set()
-        self.missing, self.missing_generation = missing - again, generation
-        if again and not (samples or await self.watch.store.answers(1.0)):
-            self.missing = missing
-            return False  # cannot be told apart from a store that is away: keep what is known
-        for keyexpr in sorted(again & self.live):
-            self.live.discard(keyexpr)
-            address = self.key.parse(keyexpr)
-            stamp = text_of_stamp(self.stamps.get(keyexpr, 0))
-            self.watch.deliver(keyexpr, Change(self.key, address, None, stamp))
-        return bool(self.missing)
-
-
-class ChangeStream(Generic[T]):
-    """An async iterator that is filled in the background."""
-
-    def __init__(self) -> None:
-        self._ready: OrderedDict[object, T] = OrderedDict()
-        self._filled = asyncio.Event()
-        self._synced = asyncio.Event()
-        self._wake = asyncio.Event()
-        self._failure: BaseException | None = None
-
-    def __aiter__(self) -> Self:
-        return self
-
-    async def __anext__(self) -> T:
-        while not self._ready:
-            if self._failure is not None:
-                raise self._failure
-            self._filled.clear()
-            await self._filled.wait()
-        return self._ready.popitem(last=False)[1]
-
-    async def synced(self) -> None:
-        """Wait until everything that was there at the start was handed to the iterator once."""
-        await self._synced.wait()
-
-    def _add(self, change: T, instead_of: str | None = None) -> None:
-        """Queue `change`, in place of one that waits under the same name."""
-        slot = object() if instead_of is None else instead_of
-        self._ready.pop(slot, None)
-        self._ready[slot] = change
-        self._filled.set()
-
-    @asynccontextmanager
-    async def _in_background(self, work: Coroutine[Any, Any, None]) -> AsyncIterator[Self]:
-        task = asyncio.create_task(work)
-        task.add_done_callback(self._end)
-        try:
-            yield self
-        finally:
-            task.cancel()
-            await asyncio.gather(task, return_exceptions=True)
-
-    def _end(self, task: asyncio.Task[None]) -> None:
-        """A fault in the background must reach the reader, who would wait for ever."""
-        if not task.cancelled():
-            self._failure = task.exception()
-            self._filled.set()
-            self._synced.set()
-
-    async def _woken(self, timeout_s: float | None) -> None:
-        """Return when woken up, or after `timeout_s`."""
-        with suppress(TimeoutError):
-            async with asyncio.timeout(timeout_s):
-                await self._wake.wait()
+log = logging.getLogger(__name__)
 
 
 class Watch(ChangeStream[Change[Any, Any]]):
     """An async iterator of `Change`; made by `Session.watch`.
 
     Values of `STREAM` and `LATEST` keys that were not taken yet are replaced by newer ones of the
-    same key; of other keys every change that was seen is delivered.
+    same key; of other keys every change that was seen is delivered. `on_trouble` hears why the
+    stored values cannot be read, once for each spell, and None when they can be again.
     """
 
     def __init__(
@@ -168,47 +55,168 @@ class Watch(ChangeStream[Change[Any, Any]]):
         link: Link,
         store: StoreClient,
         undecodable: UndecodableReports,
-        selections: list[tuple[Key[Any, Any], str]],
+        selections: Sequence[tuple[Key[Any, Any], str, Narrowed | None]],
+        known: Iterable[tuple[Key[Any, Any], Address]] = (),
+        on_trouble: Callable[[str | None], None] | None = None,
     ) -> None:
         super().__init__()
-        self.link, self.store, self.undecodable = link, store, undecodable
-        self._selections = [_Selection(self, key, pattern) for key, pattern in selections]
+        self._link, self._store = link, store
+        self._selections = [
+            Selection(*selection, undecodable, self._deliver, self.relist)
+            for selection in selections
+        ]
+        self._stored = [each for each in self._selections if each.key.stored]
+        for key, address in known:
+            for selection in self._selections:
+                if selection.key is key:
+                    selection.expect(key.build(address))
+        self._position = ""
+        """Up to where the changes of the store are known; empty: everything has to be listed."""
+        self._on_trouble = on_trouble
+        self._trouble: str | None = None
         self.listings = 0
         """How often all that is stored was listed."""
+        self.updates = 0
+        """How often what is known was brought up to date, by a listing or otherwise."""
 
     def relist(self) -> None:
-        """List soon."""
+        """Ask soon for what was missed."""
         self._wake.set()
 
-    def deliver(self, keyexpr: str, change: Change[Any, Any]) -> None:
-        """Queue `change` for the iterator."""
+    def exists(self, key: Key[Any, Any], address: Address) -> bool:
+        """Whether the key has a value, as far as is known; it may be one that cannot be read."""
+        keyexpr = key.build(address)
+        return any(each.key is key and keyexpr in each for each in self._selections)
+
+    @property
+    def remembered(self) -> int:
+        """How many keys are remembered."""
+        return sum(len(each) for each in self._selections)
+
+    def _deliver(self, keyexpr: str, change: Change[Any, Any]) -> None:
         latest = change.key.delivery in (Delivery.STREAM, Delivery.LATEST)
         self._add(change, keyexpr if latest else None)
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[Watch]:
-        """Subscribe, then list and keep listing, until the block ends."""
+        """Subscribe, then list and keep up to date, until the block ends."""
         async with AsyncExitStack() as stack:
             for selection in self._selections:
                 await stack.enter_async_context(
-                    self.link.subscribed(selection.pattern, selection.offer)
+                    self._link.subscribed(selection.pattern, selection.offer)
                 )
-            stack.enter_context(self.link.router.listening(self.relist))
-            yield await stack.enter_async_context(self._in_background(self._list_for_ever()))
+            stack.enter_context(self._link.router.listening(self.relist))
+            yield await stack.enter_async_context(self._in_background(self._keep_up_to_date()))
 
-    async def _list_for_ever(self) -> None:
-        stored = [selection for selection in self._selections if selection.key.stored]
-        if not stored:
+    async def _keep_up_to_date(self) -> None:
+        if not self._stored:
             self._synced.set()
             return
+        loop = asyncio.get_running_loop()
+        failures = 0
         while True:
             self._wake.clear()
-            again = False
+            begun_s = loop.time()
             try:
-                for selection in stored:
-                    again |= await selection.relist()
-                self.listings += 1
-                self._synced.set()
-            except Unreachable:
-                again = True
-            await self._woken(_RETRY_S if again else RELIST_S)
+                pause_s = _RETRY_S
+                if await self._update():
+                    took_s = 0.0 if self._position else loop.time() - begun_s
+                    pause_s = max(RELIST_S, took_s / LISTING_SHARE)
+                    self._synced.set()
+                self.updates += 1
+                failures = 0
+                self._tell(None)
+            except Unreachable as error:
+                failures += 1
+                pause_s = min(RELIST_S, _RETRY_S * 2**failures)
+                self._tell(str(error))
+            for selection in self._selections:
+                selection.forget()
+            await self._woken(pause_s)
+
+    def _tell(self, trouble: str | None) -> None:
+        """Say that the store cannot be read, or can be again; once, and not while no router is
+        there, which the link says itself."""
+        if trouble is not None and not self._link.router.up:
+            return
+        if (trouble is None) != (self._trouble is None):
+            if trouble is None:
+                log.info("what is stored can be read again")
+            else:
+                log.warning("what is stored cannot be read, tries again: %s", trouble)
+            if self._on_trouble is not None:
+                self._on_trouble(trouble)
+        self._trouble = trouble
+
+    async def _update(self) -> bool:
+        """Take in what was missed; whether that is all, or a look has to follow soon."""
+        if (self._position and await self._take_changes()) or await self._list():
+            return True
+        if self._link.router.age_s < SETTLE_S:
+            return False  # the store may be there, and not be known to this link yet
+        complete = True
+        for selection in self._stored:
+            complete &= await self._list_storage(selection)
+        self.listings += 1
+        return complete
+
+    async def _take_changes(self) -> bool:
+        """Take in what changed since the last time; False where the store cannot say."""
+        patterns = [selection.pattern for selection in self._stored]
+        while True:
+            page = await self._store.changes(patterns, self._position, ANSWER_S)
+            if page is None or page.whole:
+                return False
+            for sample in page.samples:
+                for selection in self._stored:
+                    selection.changed(sample)
+            self._position = page.position
+            if not page.more:
+                return True
+
+    async def _list(self) -> bool:
+        """Take in all that is stored, page by page; False: no store can tell it in that way."""
+        for selection in self._stored:
+            selection.forget()
+        known = [(selection, selection.known()) for selection in self._stored]
+        patterns = [pattern for selection in self._stored for pattern in selection.patterns()]
+        listed: set[str] = set()
+        position = ""
+        while (page := await self._store.changes(patterns, position, ANSWER_S)) is not None:
+            if page.whole:
+                listed.clear()
+            for sample in page.samples:
+                (listed.discard if sample.deleted else listed.add)(sample.keyexpr)
+                for selection in self._stored:
+                    selection.changed(sample)
+            position = page.position
+            if not page.more:
+                break
+        else:
+            return False
+        for selection, before in known:
+            selection.delete(selection.missing(before, listed))
+        self._position = position
+        self.listings += 1
+        return True
+
+    async def _list_storage(self, selection: Selection) -> bool:
+        """List what a storage has; False if something known was not in it and has to be looked for
+        again."""
+        router = self._link.router
+        generation = router.generation
+        selection.forget()
+        known = selection.known()
+        listed: set[str] = set()
+        for pattern in list(selection.patterns()):
+            for sample in await self._store.list(pattern, ANSWER_S):
+                selection.offer(sample)
+                listed.add(sample.keyexpr)
+        if router.generation != generation or not router.up:
+            return False
+        missing = selection.missing(known, listed)
+        again = selection.missing_twice(missing, generation)
+        # An empty listing looks like one of a storage that is away.
+        if again and (listed or await self._store.answers(1.0)):
+            selection.delete(again)
+        return missing == again

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from fleet.core import events
 from fleet.core.events import Event
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, PlanningJob, ReplanScope
+from fleet.core.planning_input import PlanningInput
 from fleet.core.revision.reconcile import Revision, reconcile
 from fleet.core.revision.residual_plan import residual_plan
 from keyexpr_schema.facts import HOLDING, NOTHING
@@ -31,9 +32,10 @@ UNFINISHED = {TaskState.WAITING, *OUTSTANDING}
 class Watched(FleetModel):
     """A fleet whose plans' revisions are looked at."""
 
-    def run(self, job: PlanningJob) -> Answer:
+    def run(self, given: PlanningInput) -> Answer:
+        job = given.job
         entry = self.state.plans.get(job.plan)
-        answer = super().run(job)
+        answer = super().run(given)
         if entry is not None and job.residual is not None:
             gone = {r for r in entry.outcome.allocation.values() if not self.state.ready(r)}
             check_residual(entry, job.residual, gone, self.met)

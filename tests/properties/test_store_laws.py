@@ -103,3 +103,30 @@ def test_stamps_keep_every_bit_and_a_rebuilt_timestamp_is_never_newer(one, other
     assert one - (20 << 128) <= rebuilt <= one
     a, b = timestamp_of_stamp(one), timestamp_of_stamp(other)
     assert (a < b) == (stamp_of_text(str(a)) < stamp_of_text(str(b)))
+
+
+@reaches("deleted", "paged", "forgot nothing")
+@given(WRITES, st.lists(st.integers(0, 3), min_size=1, max_size=8), st.integers(1, 3))
+@settings(max_examples=60, deadline=None)
+def test_who_follows_the_changes_page_by_page_knows_what_the_store_holds(
+    reached, writes, sizes, limit
+):
+    """Whatever is written between two pages."""
+    known: dict[str, bytes] = {}
+    position, rest = "", list(writes)
+    with tempfile.TemporaryDirectory() as directory, SqliteStore(Path(directory)) as store:
+        for size in [*sizes, len(rest), 0, 0, 0, 0, 0, 0, 0, 0, 0]:
+            store.apply(rest[:size])
+            rest = rest[size:]
+            page = store.changes(["north/world/facts/*/at"], position, limit)
+            assert page.whole == (not position)
+            position = page.position
+            reached["paged"] += page.more
+            for write in page.writes:
+                if write.deleted:
+                    reached["deleted"] += known.pop(write.keyexpr, None) is not None
+                else:
+                    known[write.keyexpr] = write.data
+        reached["forgot nothing"] += bool(known)
+        assert not page.more
+        assert known == {write.keyexpr: write.data for write in store.select("**")}

@@ -46,10 +46,10 @@ def effects_of(journal: list[Event]) -> Iterator[str]:
                     yield f"put {key.build(address)} {' '.join(shown)}"
                 case Retract(key, address):
                     yield f"delete {key.build(address)}"
-                case MakePlan(job):
-                    yield f"plan {job.plan} revision {job.revision}"
-                case Interpret(goal, _):
-                    yield f"interpret {goal}"
+                case MakePlan(given):
+                    yield f"plan {given.job.plan} revision {given.job.revision}"
+                case Interpret(given):
+                    yield f"interpret {given.goal}"
         yield ""
 
 

@@ -13,11 +13,12 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.core import events
 from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry, PlanningJob
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.planning_input import PlanningInput
 from fleet.core.state import Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
-from fleet.service.planning_job import run_planning_job
+from fleet.service.planning.planning_job import run_planning_job
 from keyexpr_schema.facts import Value
 from keyexpr_schema.keyspace import ORDER
 from keyexpr_schema.payloads.goals import Goal, GoalState
@@ -109,16 +110,15 @@ class FleetModel:
                 self.documents.pop(effect.key.build(effect.address), None)
         for effect in effects:
             if isinstance(effect, MakePlan):
-                answer = self.run(effect.job)
+                answer = self.run(effect.given)
                 if self.late:
                     self.answers.append(answer)
                 else:
                     self.apply(answer)
 
-    def run(self, job: PlanningJob) -> Answer:
-        """What a planning job comes to, from the state as it is now."""
-        at = {"time_s": self.time_s, "wall_time_s": self.wall_s}
-        return run_planning_job(job, self.state, COMPOSITION, at)
+    def run(self, given: PlanningInput) -> Answer:
+        """What a planning job comes to."""
+        return run_planning_job(given, COMPOSITION)
 
     def answer(self, pick: int = 0) -> None:
         """One of the planning jobs under way is answered."""
@@ -181,7 +181,8 @@ class FleetModel:
         for goal in goals:
             self.receive(events.GoalPut, goal=goal)
         number = sum(b"PlanRequested" in line for line in self.journal)
-        self.receive(events.PlanRequested, request=PlanRequest(request=f"r{number}", **more))
+        request = PlanRequest(**{"request": f"r{number}", **more})
+        self.receive(events.PlanRequested, request=request)
 
     # --- what robots do --------------------------------------------------------------------------
 

@@ -32,18 +32,6 @@ def next_lateness(state: State) -> float | None:
     return min(times, default=None)
 
 
-def behind_s(state: State, robot: str) -> float:
-    """How much longer than predicted a robot's present task is expected to take, s.
-
-    A task that is late is expected to take as long again as it has taken so far.
-    """
-    for entry in state.plans.values():
-        for record in entry.outstanding():
-            if record.robot == robot and record.started_s is not None:
-                return max(0.0, state.time_s - record.started_s - record.duration_s)
-    return 0.0
-
-
 def _when_late(entry: PlanEntry) -> list[tuple[float, TaskRecord]]:
     """When tasks that run count as late, on the fleet's clock [s]: those that were not reacted to,
     of robots that have more to do."""

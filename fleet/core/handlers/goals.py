@@ -6,9 +6,10 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
+from fleet.core.over import goal_taken_back
 from fleet.core.plan_entry import ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import believe, cancel, set_entry, set_goal, without_goal
+from fleet.core.state_updates import cancel, conclude, set_entry, set_goal, without_goal
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, read_goal
 from keyexpr_schema.facts import AT, NOTHING, SEARCHED, Value
@@ -32,11 +33,7 @@ def goal_deleted(state: State, event: events.GoalDeleted) -> State:
     """Drop the goal; a plan that works on it is made again without it."""
     if event.goal not in state.goals:
         return state
-    state = replace(
-        state,
-        goals=state.goals.without(event.goal),
-        goal_states=state.goal_states.without(event.goal),
-    )
+    state = goal_taken_back(state, event.goal)
     for entry in state.plans.values():
         if event.goal in entry.plan.goals and not entry.ended:
             rest = without_goal(state, entry.plan, event.goal)
@@ -75,9 +72,9 @@ def understand_again(state: State) -> State:
     """Read goals' sentences again, now that there are other names."""
     for goal in state.goals.values():
         status = state.goal_states[goal.goal]
-        read = _understand(state, goal)
+        read = _understand(state, goal, status)
         if status.state is GoalState.REJECTED and read.reason != status.reason:
-            state = _take_goal(state, goal)
+            state = _take_goal(state, goal, status)
         elif status.state is GoalState.WAITING and read.stages and read.stages != status.stages:
             state = set_goal(state, read)  # "some robot" now has more to choose from
     return state
@@ -96,13 +93,13 @@ def next_stage(state: State, goal: str) -> State:
         and about.isdisjoint(condition.subjects)
         and not state.robots.keys() & set(condition.subjects)
     )
-    status = replace(status, stage=number, conditions=(*wanted, *kept), time_s=state.time_s)
+    status = replace(status, stage=number, conditions=(*wanted, *kept))
     return _begin_stage(set_goal(state, status), goal)
 
 
-def _take_goal(state: State, goal: Goal) -> State:
+def _take_goal(state: State, goal: Goal, known: GoalStatus | None = None) -> State:
     """Say what a goal means; a sentence that the grammar refuses may go to a language model."""
-    status = _understand(state, goal)
+    status = _understand(state, goal, known)
     state = set_goal(state, status)
     if status.state is GoalState.WAITING:
         state = _presume(state, goal.goal, _reading(state, goal))
@@ -118,11 +115,18 @@ def _begin_stage(state: State, goal: str) -> State:
         for subject in condition.subjects:
             fact = state.fact(condition.relation, subject)
             if condition.relation == SEARCHED and fact is not None and fact.value is True:
-                state = believe(state, replace(fact, value=False, source=PLANNER_SOURCE))
+                state = conclude(state, replace(fact, value=False, source=PLANNER_SOURCE))
     return state
 
 
-def _understand(state: State, goal: Goal) -> GoalStatus:
+def _understand(state: State, goal: Goal, known: GoalStatus | None) -> GoalStatus:
+    """How a goal stands, read now; `known` is how it stood, if it is not a new one."""
+    status = GoalStatus(
+        goal=goal.goal,
+        state=GoalState.WAITING,
+        given_s=state.time_s if known is None else known.given_s,
+        given_wall_s=state.wall_time_s if known is None else known.given_wall_s,
+    )
     try:
         reading = _reading(state, goal)
         stages = reading.stages
@@ -130,17 +134,8 @@ def _understand(state: State, goal: Goal) -> GoalStatus:
             for name in (*condition.subjects, condition.value):
                 _check_name(state, name)
     except NotUnderstood as error:
-        return GoalStatus(
-            goal=goal.goal, state=GoalState.REJECTED, reason=str(error), time_s=state.time_s
-        )
-    return GoalStatus(
-        goal=goal.goal,
-        state=GoalState.WAITING,
-        conditions=stages[0],
-        stages=stages,
-        note=_note(state, reading),
-        time_s=state.time_s,
-    )
+        return replace(status, state=GoalState.REJECTED, reason=str(error))
+    return replace(status, conditions=stages[0], stages=stages, note=_note(state, reading))
 
 
 def _reading(state: State, goal: Goal) -> Reading:
@@ -165,7 +160,7 @@ def _presume(state: State, goal: str, reading: Reading) -> State:
         fact = state.fact(*literal.variable)
         if fact is None or fact.value is None:
             source = f"{PLANNER_SOURCE}:{goal}"
-            state = believe(state, Fact.of(literal, source, state.time_s))
+            state = conclude(state, Fact.of(literal, source, state.time_s))
     return state
 
 

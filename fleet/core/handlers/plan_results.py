@@ -33,6 +33,8 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
         return set_entry(state, replace(entry, job=None, replan=newer, team=team))
     for goal, reason in event.left_out.items():
         state = mark_goals(state, (goal,), GoalState.FAILED, entry.plan.plan, reason)
+    for goal, reason in event.postponed.items():
+        state = mark_goals(state, (goal,), GoalState.WAITING, None, reason)
     event = replace(event, plan=_for_goals_of_now(state, entry, job, event))
     revision = reconcile(entry, event, state.world(), frozenset(job.under_way))
     added = (goal for goal in entry.plan.goals if goal not in job.goals)
@@ -83,6 +85,7 @@ def _as_it_was(entry: PlanEntry, job: PlanningJob, event: events.PlanningSucceed
         event.repaired
         and job.reallocation
         and not event.left_out
+        and not event.postponed
         and event.allocation.items() <= job.previous_allocation.items()
         and all(record.state not in (TaskState.FAILED, TaskState.CANCELLED) for record in current)
         and len(event.plan.tasks) == sum(record.state not in ENDED_TASKS for record in current)
@@ -100,7 +103,8 @@ def _made_sentence(event: events.PlanningSucceeded) -> str:
     sentences = [f"plan {plan.plan} has {tasks} for {goals}"]
     if plan.making.fallback:
         sentences.append(plan.making.fallback)
-    sentences += [f"goal {goal} is left out: {reason}" for goal, reason in event.left_out.items()]
+    missing = {**event.left_out, **event.postponed}
+    sentences += [f"goal {goal} is left out: {reason}" for goal, reason in missing.items()]
     return "; ".join(sentences)
 
 
@@ -158,4 +162,5 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
         state = set_entry(state, entry)
         state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None, event.reason)
         return answer(state, request, False, event.reason, entry.plan.plan, event.violations)
-    return give_up(state, entry, event.reason)
+    to = GoalState.WAITING if event.postponed else GoalState.FAILED
+    return give_up(state, entry, event.reason, to)

@@ -12,8 +12,8 @@ from fleet.core.model.skills import Action
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import (
-    believe,
     believe_if_newer,
+    conclude,
     give_up,
     mark_goals,
     open_goals,
@@ -91,7 +91,7 @@ def _succeeded(state: State, entry: PlanEntry, record: TaskRecord, report: Repor
     for literal in action.after if action is not None else ():
         if literal.variable not in reported:
             time_s = report.ended_s or state.time_s
-            state = believe(state, Fact.of(literal, PLANNER_SOURCE, time_s))
+            state = conclude(state, Fact.of(literal, PLANNER_SOURCE, time_s))
     return set_record(state, entry, _ended(record, report, TaskState.SUCCEEDED))
 
 

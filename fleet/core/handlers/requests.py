@@ -34,12 +34,12 @@ def plan_waiting_goals(state: State) -> State:
             entry = replace(entry, plan=replace(entry.plan, goals=goals))
             reason = f"{', '.join(waiting)} came up"
             return set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason))
-    request = PlanRequest(request=f"auto-{state.jobs + 1}", goals=waiting)
-    return _start_planning(state, request, partial=True)
+    plan = Plan(plan=_new_plan_name(state), goals=waiting, conditions=(), tasks=())
+    job = PlanningJob.of(state.jobs + 1, plan, "symbolic")
+    return _planning(state, plan, replace(job, partial=True))
 
 
-def _start_planning(state: State, ask: PlanRequest, partial: bool = False) -> State:
-    """`partial`: goals that cannot be reached are left out, and not the whole plan refused."""
+def _start_planning(state: State, ask: PlanRequest) -> State:
     if (
         ask.request in state.answers
         or ask.request in state.previews
@@ -63,7 +63,7 @@ def _start_planning(state: State, ask: PlanRequest, partial: bool = False) -> St
         autostart=ask.start,
     )
     job = PlanningJob.of(state.jobs + 1, plan, ask.planner)
-    job = replace(job, request=ask.request, dry_run=ask.dry_run, partial=partial)
+    job = replace(job, request=ask.request, dry_run=ask.dry_run)
     if ask.dry_run:
         return replace(state, jobs=job.job, previews=state.previews.set(ask.request, job))
     return _planning(state, plan, job)
@@ -71,7 +71,13 @@ def _start_planning(state: State, ask: PlanRequest, partial: bool = False) -> St
 
 def _planning(state: State, plan: Plan, job: PlanningJob) -> State:
     entry = PlanEntry(
-        plan=plan, state=PlanState.PLANNING, planner=job.planner, start=plan.autostart, job=job
+        plan=plan,
+        state=PlanState.PLANNING,
+        planner=job.planner,
+        start=plan.autostart,
+        job=job,
+        begun_s=state.time_s,
+        begun_wall_s=state.wall_time_s,
     )
     return set_entry(replace(state, jobs=job.job), entry)
 

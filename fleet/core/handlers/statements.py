@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.state import State
-from fleet.core.state_updates import believe
+from fleet.core.state_updates import conclude
 from fleet.errors import NotUnderstood
 from fleet.language import statement_facts
 from keyexpr_schema.payloads.world import Fact, StatementStatus
@@ -49,7 +49,7 @@ def _read_statement(state: State, name: str) -> State:
     source = f"{PLANNER_SOURCE}:{name}"
     facts = tuple(Fact.of(literal, source, state.time_s) for literal in read)
     for fact in facts:
-        state = believe(state, fact)
+        state = conclude(state, fact)
     return _set_status(state, StatementStatus(statement=name, facts=facts))
 
 

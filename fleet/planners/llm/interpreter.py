@@ -22,6 +22,7 @@ DERIVED = {LOCATED: "it is known where the object is", HELD: "a hand holds the o
 Stages = tuple[tuple[Condition, ...], ...]
 _Signature = set[tuple[str, str | bool]]
 """What a relation takes: pairs of the subject's type, and the value's type or the value."""
+_Signatures = Mapping[str, _Signature]
 
 
 class ConditionAnswer(StructuredAnswer, frozen=True):
@@ -43,73 +44,83 @@ class GoalAnswer(StructuredAnswer, frozen=True):
 class LlmInterpreter:
     """Turns a sentence into stages of conditions; asks within the budget of one plan."""
 
-    def __init__(self, model: LanguageModel, skills: Mapping[str, SkillModel]) -> None:
-        """`skills` say which relations there are."""
+    def __init__(self, model: LanguageModel) -> None:
         self._model = model
-        self._signatures = _signatures(skills)
 
-    def interpret(self, sentence: str, vocabulary: Vocabulary) -> Stages | str:
+    @property
+    def waiting_s(self) -> float:
+        """How long an answer takes at most, s."""
+        return self._model.longest_s
+
+    def interpret(
+        self, sentence: str, vocabulary: Vocabulary, skills: Mapping[str, SkillModel]
+    ) -> Stages | str:
         """What must hold, stage by stage, or a sentence that says why that is not known.
 
-        Every name in the result exists, and fits its relation. Blocks, and never raises.
+        `skills` say which relations there are. Every name in the result exists, and fits its
+        relation. Blocks, and never raises.
         """
+        signatures = _signatures(skills)
         stages: Stages | str | GivenUp = self._model.ask(
             system="interpret-system",
             question="interpret",
             correction="interpret-repair",
             values={
-                "relations": "\n".join(f"- {_form(*each)}" for each in self._signatures.items()),
+                "relations": "\n".join(f"- {_form(*each)}" for each in signatures.items()),
                 "problem": vocabulary_text(sentence, vocabulary),
                 "form": _FORM,
             },
             schema=schema_of(GoalAnswer),
-            read=lambda text: self._read(text, vocabulary),
+            read=lambda text: _read(text, vocabulary, signatures),
         )
         return stages.reason if isinstance(stages, GivenUp) else stages
 
-    def _read(self, text: str, vocabulary: Vocabulary) -> Stages | str | Rejected:
-        answer = read_answer(text, GoalAnswer)
-        if isinstance(answer, str):
-            return Rejected.because("malformed", answer)
-        if not answer.stages:
-            reason = cleaned(answer.reason).strip()
-            return f"the language model says: {reason or 'this is no goal that can be expressed'}"
-        rows = [row for stage in answer.stages for row in stage]
-        if len(rows) > MAX_CONDITIONS or not all(answer.stages):
-            sentence = f"every stage needs a condition, and all together at most {MAX_CONDITIONS}"
-            return Rejected.because("malformed", sentence)
-        violations = [v for row in rows for v in self._type_errors(row, vocabulary)]
-        for number, stage in enumerate(answer.stages, 1):
-            violations += _contradictions(number, stage)
-        if violations:
-            return Rejected(tuple(violations))
-        return tuple(tuple(_condition(row) for row in stage) for stage in answer.stages)
 
-    def _type_errors(self, row: ConditionAnswer, vocabulary: Vocabulary) -> list[Violation]:
-        signature = self._signatures.get(row.relation)
-        if signature is None:
-            known = ", ".join(self._signatures)
-            sentence = f"there is no relation {row.relation}; there are {known}"
-            return [Violation(code="unknown-name", sentence=sentence)]
-        found: list[Violation] = []
-        for subject in dict.fromkeys((row.subject, *row.any_of)):
-            if (kind := _type_of(subject, vocabulary)) is None:
-                names = (
-                    ", ".join([*vocabulary.objects, *vocabulary.places, *vocabulary.robots])
-                    or "none"
-                )
-                sentence = f"{subject} is not a known name; known are {names}"
-                found.append(Violation(code="unknown-name", sentence=sentence))
-            elif not any(
-                kind == subject_type and _fits(row.value, value_type, vocabulary)
-                for subject_type, value_type in signature
-            ):
-                sentence = (
-                    f"{row.relation}({subject}) = {row.value} does not fit: {subject} is a {kind}, "
-                    f"and the relation is {_form(row.relation, signature)}"
-                )
-                found.append(Violation(code="wrong-type", sentence=sentence))
-        return found
+def _read(text: str, vocabulary: Vocabulary, signatures: _Signatures) -> Stages | str | Rejected:
+    answer = read_answer(text, GoalAnswer)
+    if isinstance(answer, str):
+        return Rejected.because("malformed", answer)
+    if not answer.stages:
+        reason = cleaned(answer.reason).strip()
+        return f"the language model says: {reason or 'this is no goal that can be expressed'}"
+    rows = [row for stage in answer.stages for row in stage]
+    if len(rows) > MAX_CONDITIONS or not all(answer.stages):
+        sentence = f"every stage needs a condition, and all together at most {MAX_CONDITIONS}"
+        return Rejected.because("malformed", sentence)
+    violations = [v for row in rows for v in _type_errors(row, vocabulary, signatures)]
+    for number, stage in enumerate(answer.stages, 1):
+        violations += _contradictions(number, stage)
+    if violations:
+        return Rejected(tuple(violations))
+    return tuple(tuple(_condition(row) for row in stage) for stage in answer.stages)
+
+
+def _type_errors(
+    row: ConditionAnswer, vocabulary: Vocabulary, signatures: _Signatures
+) -> list[Violation]:
+    signature = signatures.get(row.relation)
+    if signature is None:
+        known = ", ".join(signatures)
+        sentence = f"there is no relation {row.relation}; there are {known}"
+        return [Violation(code="unknown-name", sentence=sentence)]
+    found: list[Violation] = []
+    for subject in dict.fromkeys((row.subject, *row.any_of)):
+        if (kind := _type_of(subject, vocabulary)) is None:
+            names = (
+                ", ".join([*vocabulary.objects, *vocabulary.places, *vocabulary.robots]) or "none"
+            )
+            sentence = f"{subject} is not a known name; known are {names}"
+            found.append(Violation(code="unknown-name", sentence=sentence))
+        elif not any(
+            kind == subject_type and _fits(row.value, value_type, vocabulary)
+            for subject_type, value_type in signature
+        ):
+            sentence = (
+                f"{row.relation}({subject}) = {row.value} does not fit: {subject} is a {kind}, "
+                f"and the relation is {_form(row.relation, signature)}"
+            )
+            found.append(Violation(code="wrong-type", sentence=sentence))
+    return found
 
 
 def _fits(value: str | bool, wanted: str | bool, vocabulary: Vocabulary) -> bool:

@@ -45,6 +45,7 @@ class LlmPlanner(Planner):
     def __init__(self, model: LanguageModel, fallback: Planner) -> None:
         self._model = model
         self._fallback = fallback
+        self.waiting_s = model.longest_s
 
     def _solve(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
         if reason := self._model.config.not_configured:
@@ -125,11 +126,13 @@ class LlmPlanner(Planner):
         log.warning("planning by language model failed: %s", failed.reason)
         strategies = self._fallback.strategies
         strategy = problem.strategy if problem.strategy in strategies else strategies[0]
-        made = self._fallback.plan(replace(problem, strategy=strategy))
+        budget_left = problem.budget.renewed()  # waiting for the model is no planning
+        made = self._fallback.plan(replace(problem, strategy=strategy, budget=budget_left))
         if isinstance(made, NoPlan):
             return NoPlan(
                 f"{made.reason} (planner {self._fallback.name}; before that, {failed.reason})",
                 made.violations or failed.violations,
+                made.postponed,
             )
         making = budget.making(self._fallback.name, failed.reason)
         # The strategy stays what was asked for: a new revision asks the model again.

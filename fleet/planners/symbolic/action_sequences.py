@@ -9,6 +9,7 @@ from functools import cache
 from msgspec.structs import replace
 
 from fleet.core.model.world import WorldModel, condition_holds
+from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import ActionSequence
 from fleet.planners.symbolic.search import (
@@ -77,10 +78,14 @@ def subgoals_in_order(problem: PlanningProblem, facts: Mapping[FactKey, Value]) 
 
 
 def alternatives_for(
-    subgoal: Subgoal, facts: Facts, world: WorldModel, settled: frozenset[str] = frozenset()
+    subgoal: Subgoal,
+    facts: Facts,
+    world: WorldModel,
+    budget: TimeBudget,
+    settled: frozenset[str] = frozenset(),
 ) -> tuple[tuple[ActionSequence, ...], Facts] | None:
     """Different sequences for a subgoal, the cheapest first, and the facts after that one; `None`
-    where there is none.
+    where there is none, or none was found within the `budget`.
 
     Where a robot stands is left open at the start, so that every actor begins with the way to its
     work, whatever its robot does before; `settled` robots are taken to be where `facts` say.
@@ -88,7 +93,7 @@ def alternatives_for(
     found = [
         (result, condition)
         for condition in subgoal.subjects()
-        for result in _different_solutions(condition, facts, world, settled)
+        for result in _different_solutions(condition, facts, world, settled, budget)
     ]
     if not found:
         return None
@@ -112,7 +117,11 @@ def _unloading_s(found: Solution, condition: Condition, world: WorldModel) -> fl
 
 
 def _different_solutions(
-    condition: Condition, facts: Facts, world: WorldModel, settled: frozenset[str]
+    condition: Condition,
+    facts: Facts,
+    world: WorldModel,
+    settled: frozenset[str],
+    budget: TimeBudget,
 ) -> list[Solution]:
     """The cheapest sequence, and others made different by charging for what was used before."""
     subject = condition.subject
@@ -126,13 +135,13 @@ def _different_solutions(
         if isinstance(value := facts.get(FactKey(HOLDING, robot)), str) and value != NOTHING
     }
     objects = sorted(held | ({subject} & world.objects.keys()))
-    results = _cheapest_few(condition, robots, objects, start, facts, world)
+    results = _cheapest_few(condition, robots, objects, start, facts, world, budget)
     if results or not _needs_a_tool(condition, world):
         return results
     # Something else may be needed for it, such as a tool.
     known = [thing for thing in world.objects if facts.get(FactKey(AT, thing)) is not None]
     wider = sorted({*objects, *known[:MAX_OBJECTS]})
-    return _cheapest_few(condition, robots, wider, start, facts, world)
+    return _cheapest_few(condition, robots, wider, start, facts, world, budget)
 
 
 def _needs_a_tool(condition: Condition, world: WorldModel) -> bool:
@@ -152,6 +161,7 @@ def _cheapest_few(
     start: Facts,
     facts: Facts,
     world: WorldModel,
+    budget: TimeBudget,
 ) -> list[Solution]:
     grounded = ground_actions(world, robots, objects, condition)
     actions = relaxed_reachable(grounded, start, condition, world)
@@ -171,7 +181,7 @@ def _cheapest_few(
 
     solutions: list[Solution] = []
     for _ in range(ALTERNATIVES):
-        found = uniform_cost_search(actions, start, condition, world, cost_s)
+        found = uniform_cost_search(actions, start, condition, world, cost_s, budget)
         if found is None:
             break
         used = [numbers[id(action)] for action in found.actions]
@@ -197,10 +207,13 @@ def _representatives(named: Set[Value], subject: str, facts: Facts, world: World
     return sorted(kinds.values())
 
 
-def exploration_for(subgoals: Sequence[Subgoal], problem: PlanningProblem) -> Exploration | None:
+def exploration_for(
+    subgoals: Sequence[Subgoal], problem: PlanningProblem, budget: TimeBudget
+) -> Exploration | None:
     """Looking around in every place where nobody has looked yet, for all that the subgoals lack.
 
-    `None` where nothing is left to look for, or nobody can look.
+    `None` where nothing is left to look for, or nobody can look. Places that the `budget` does not
+    suffice for are left to a later revision.
     """
     world = problem.world
     seeks = tuple(
@@ -221,7 +234,7 @@ def exploration_for(subgoals: Sequence[Subgoal], problem: PlanningProblem) -> Ex
             continue
         facts[FactKey(SEARCHED, place)] = False
         condition = Condition(relation=SEARCHED, subject=place, value=True)
-        found = alternatives_for(Subgoal(subgoals[0].goal, condition), facts, world)
+        found = alternatives_for(Subgoal(subgoals[0].goal, condition), facts, world, budget)
         if found is not None:
             sequences.append(found[0][0])
             conditions.append(condition)

@@ -13,7 +13,7 @@ all robots that can, in parallel. What is found leads to the next revision.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, field, replace
 from itertools import cycle, product
 from math import inf, prod
@@ -21,6 +21,7 @@ from math import inf, prod
 from fleet.core.actors import carried_at_end, least_loaded
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.model.world import WorldModel
+from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, Planner, PlanningProblem
 from fleet.planners.deordering import ActionSequence, deordered
 from fleet.planners.symbolic.action_sequences import (
@@ -41,6 +42,9 @@ MAX_COMBINATIONS = 64
 MAX_RESTORATIONS = 2
 """How often what the sequences for later subgoals undid is reached again, where no plan does."""
 
+SEARCH_SHARE = 0.6
+"""Of the time for planning, how much the search for sequences has; choosing takes the rest."""
+
 Choice = Sequence[ActionSequence]
 Cost = tuple[float, float]
 """The makespan [s], with a charge for what is left in baskets, and the work of all robots [s]."""
@@ -54,24 +58,37 @@ class SymbolicPlanner(Planner):
 
     def _solve(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
         world = problem.world
-        reached = _Reached(problem, dict(world.facts))
+        searching = problem.budget.until(SEARCH_SHARE)
+        reached = _Reached(problem, dict(world.facts), searching)
         unlocated: list[Subgoal] = []
+        late: set[str] = set()
         for subgoal in subgoals_in_order(problem, world.facts):
-            if reached.add(subgoal):
+            if not searching.over and reached.add(subgoal):
                 continue
-            if not _needs_locating(subgoal, reached.facts, world):
+            if searching.over:
+                late.add(subgoal.goal)
+            elif _needs_locating(subgoal, reached.facts, world):
+                unlocated.append(subgoal)
+            else:
                 return NoPlan(_no_way(subgoal, world))
-            unlocated.append(subgoal)
-        explored = exploration_for(unlocated, problem) if unlocated else None
+        if late:
+            return _in_time(problem, reached.options, unlocated, late)
+        explored = exploration_for(unlocated, problem, searching) if unlocated else None
         if unlocated and explored is None:
+            if searching.over:
+                return NoPlan(problem.not_in_time, postponed=True)
             return NoPlan(_not_found(unlocated[0], problem))
         made = _choose(problem, reached.options, explored)
         for _ in range(MAX_RESTORATIONS):
+            if problem.budget.over:
+                break
             undone = [s for s in subgoals_in_order(problem, reached.facts) if s not in unlocated]
             if isinstance(made, CheckedPlan) or not (undone and all(map(reached.add, undone))):
                 break
             restored = _choose(problem, reached.options, explored)
             made = restored if isinstance(restored, CheckedPlan) else made
+        if isinstance(made, NoPlan) and problem.budget.over:
+            return replace(made, postponed=True)  # not all choices were looked at
         return made
 
 
@@ -84,13 +101,14 @@ class _Reached:
 
     problem: PlanningProblem
     facts: Facts
+    budget: TimeBudget
     options: list[Choice] = field(default_factory=list)
     settled: set[str] = field(default_factory=set)
 
     def add(self, subgoal: Subgoal) -> bool:
         """Find sequences that reach one more subgoal; whether there are any."""
         settled = frozenset(self.settled)
-        found = alternatives_for(subgoal, self.facts, self.problem.world, settled)
+        found = alternatives_for(subgoal, self.facts, self.problem.world, self.budget, settled)
         if found is None:
             return False
         sequences, self.facts = found
@@ -99,6 +117,24 @@ class _Reached:
             for action in sequences[0].actions:
                 self.settled.update(action.participants)
         return True
+
+
+def _in_time(
+    problem: PlanningProblem,
+    options: Sequence[Choice],
+    unlocated: Sequence[Subgoal],
+    late: Set[str],
+) -> CheckedPlan | NoPlan:
+    """A plan for those goals for which everything was found before the time was over."""
+    late = late | {subgoal.goal for subgoal in unlocated}
+    goals = tuple(goal for goal in problem.goals if goal.goal not in late)
+    found = [sequences for sequences in options if sequences[0].goal not in late]
+    none = NoPlan(problem.not_in_time, postponed=True)
+    if not found:
+        return none
+    made = _choose(replace(problem, goals=goals), found, None)
+    # What was found for a goal may need what was found for one that is late.
+    return made if isinstance(made, CheckedPlan) else none
 
 
 def _needs_locating(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
@@ -161,7 +197,7 @@ def _choose(
         for goal in dict.fromkeys(alternatives[0].goal for alternatives in options):
             mine = [alternatives for alternatives in options if alternatives[0].goal == goal]
             alone = _best(problem, mine, None)
-            if isinstance(alone, NoPlan):
+            if isinstance(alone, NoPlan) or problem.budget.over:
                 break
             choice += [(sequence,) for sequence in alone.choice]
         else:
@@ -177,6 +213,8 @@ def _best(
 ) -> _Candidate | NoPlan:
     """The cheapest candidate: of few combinations the cheapest of all; else from the cheapest
     sequence of each, one is changed at a time for as long as that helps.
+
+    When the time is over it is the cheapest of those looked at until then, at least one.
     """
     best: _Candidate | None = None
     failure: NoPlan | None = None
@@ -196,8 +234,16 @@ def _best(
         return _candidate(problem, choice, explored)
 
     if prod(map(len, options)) <= MAX_COMBINATIONS:
-        for found in sorted(map(candidate, product(*options)), key=_promise):
-            better(found)
+        candidates: list[_Candidate | NoPlan] = []
+        for choice in product(*options):
+            candidates.append(candidate(choice))
+            if problem.budget.over:
+                break
+        any_valid = False
+        for found in sorted(candidates, key=_promise):
+            if any_valid and problem.budget.over:
+                break
+            any_valid |= better(found)
     else:
         current = [alternatives[0] for alternatives in options]
         better(candidate(current))
@@ -208,6 +254,8 @@ def _best(
             unchanged += 1
             for sequence in alternatives:
                 changed = [*current[:number], sequence, *current[number + 1 :]]
+                if problem.budget.over:
+                    break
                 if changed != current and better(candidate(changed)):
                     current, unchanged = changed, 1
     return best or failure or NoPlan("no combination of action sequences passes the checker")

@@ -13,6 +13,7 @@ from itertools import count, product
 from fleet.core.model.preconditions import applicable
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, condition_holds, known_value
+from fleet.jobshop.time_budget import TimeBudget
 from keyexpr_schema.facts import AT, HELD, HOLDING, LOCATED, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 
@@ -181,8 +182,10 @@ def uniform_cost_search(
     goal: Condition,
     world: WorldModel,
     cost_s: Callable[[int, Mapping[FactKey, Value]], float],
+    budget: TimeBudget,
 ) -> Solution | None:
-    """The cheapest sequence of `actions` from `start` to a state in which `goal` holds.
+    """The cheapest sequence of `actions` from `start` to a state in which `goal` holds; `None`
+    where there is none, or none was found before the `budget` was over.
 
     `cost_s` is of an action, by its number, in a state.
     """
@@ -212,7 +215,7 @@ def uniform_cost_search(
     best: dict[tuple[Value, ...], float] = {first: 0.0}
     came: dict[tuple[Value, ...], tuple[tuple[Value, ...], Action]] = {}
     closed: set[tuple[Value, ...]] = set()
-    while queue and len(closed) < MAX_EXPANSIONS:
+    while queue and len(closed) < MAX_EXPANSIONS and not budget.over:
         spent, _, state = heappop(queue)
         if state in closed:
             continue

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import pytest
+
 from fleet.core import events
 from fleet.core.effects import MakePlan, Publish
 from fleet.core.state import State
 from fleet.core.step import step
-from keyexpr_schema.keyspace import PLACE, PLAN_STATUS
+from keyexpr_schema.keyspace import FACT, PLACE, PLAN_STATUS
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import PlanState
+from keyexpr_schema.payloads.tasks import ReportState
+from keyexpr_schema.payloads.world import Fact
 from tests.support.fleet_model import BOTH, fleet
+from tests.support.household import bring
 
 
 def test_a_mission_from_goals_to_reached() -> None:
@@ -81,3 +86,23 @@ def test_only_documents_of_the_planner_are_published() -> None:
     kinds = {effect.key.name for effect in model.effects if isinstance(effect, Publish)}
     assert PLAN_STATUS.name in kinds
     assert PLACE.name not in kinds
+
+
+@pytest.mark.parametrize("name", ["planner", "planner_bot", "planner:s1"])
+def test_what_somebody_says_whose_name_begins_like_the_planners_is_not_the_planners(
+    name: str,
+) -> None:
+    model = fleet()
+    said = Fact(subject="cup_1", relation="at", value="hallway", source=name, time_s=9.0)
+    model.receive(events.FactPut, fact=said)
+    assert model.state.fact("at", "cup_1") == said
+    assert not [e for e in model.effects if isinstance(e, Publish) and e.key is FACT]
+
+
+def test_what_the_planner_concludes_it_publishes() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    (order,) = model.orders()
+    model.report(order, ReportState.SUCCEEDED, ended_s=9.0)  # and no word of what is so now
+    (fact,) = [e.payload for e in model.effects if isinstance(e, Publish) and e.key is FACT]
+    assert (fact.relation, fact.subject, fact.value) == ("at", "hsr", "kitchen")

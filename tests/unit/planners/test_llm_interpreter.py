@@ -34,8 +34,8 @@ def interpret(
         config = LlmConfig(
             **{"model": "openai/scripted", "api_base": server.api_base, "retries": 0, **fields}
         )
-        return LlmInterpreter(LanguageModel(config, model_client), SKILLS).interpret(
-            text, WORDS
+        return LlmInterpreter(LanguageModel(config, model_client)).interpret(
+            text, WORDS, SKILLS
         ), server
 
 
@@ -122,5 +122,5 @@ def test_the_sentence_stays_inside_its_fence(model_client: ModelClient) -> None:
 
 
 def test_without_a_model_nothing_is_asked() -> None:
-    interpreter = LlmInterpreter(LanguageModel(LlmConfig()), SKILLS)
-    assert "no language model is configured" in str(interpreter.interpret("tidy up", WORDS))
+    interpreter = LlmInterpreter(LanguageModel(LlmConfig()))
+    assert "no language model is configured" in str(interpreter.interpret("tidy up", WORDS, SKILLS))

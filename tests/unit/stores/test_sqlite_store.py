@@ -43,7 +43,7 @@ def test_a_store_of_a_later_format_is_left_alone(tmp_path):
     db = sqlite3.connect(tmp_path / "state.sqlite")
     db.execute("PRAGMA user_version = 99")
     db.close()
-    with pytest.raises(StoreError, match="has format 99, but this program knows formats up to 1"):
+    with pytest.raises(StoreError, match="has format 99, but this program knows formats up to 2"):
         SqliteStore(tmp_path)
 
 

@@ -50,13 +50,13 @@ async def test_bad_values_are_reported_once_and_stop_nothing(router, session_con
             [change] = await take(rejects, 1)
             assert "is not a fact key" in change.value.reason
         for _ in range(3):  # what two listings lack counts as deleted; this key never was one
-            listed = watch.listings
+            before = watch.updates
             watch.relist()
-            await until(partial(listed_since, watch, listed))
+            await until(partial(listed_since, watch, before))
         await session.confirm(FACT, AT, fact(3))
         assert (await take(watch, 1))[0].value == fact(3)
         assert len(await session.list(UNDECODABLE)) == 2
 
 
-async def listed_since(watch: Watch, listed: int) -> bool:
-    return watch.listings > listed
+async def listed_since(watch: Watch, before: int) -> bool:
+    return watch.updates > before

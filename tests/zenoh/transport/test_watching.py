@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from functools import partial
 from typing import Any
 
+import msgspec
 import pytest
 import zenoh
 
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.keyspace import FACT, GOAL_SPEC, SIM_CLOCK, SIM_SENSES
+from keyexpr_schema.keyspace import FACT, GOAL_SPEC, REPORT, SIM_CLOCK, SIM_SENSES, STORE_CHANGES
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.simulation import SimAddress, SimClock, SimRobotAddress
+from keyexpr_schema.payloads.system import StoreAddress, StoreChanges, StoreChangesQuery
+from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState
 from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.connecting import zenoh_config
-from keyexpr_schema.transport.session import open_session
+from keyexpr_schema.transport.session import Narrowed, Session, Watch, open_session
 from keyexpr_schema.transport.storage import Write
 from tests.support.polling import until
+from tests.support.router_process import RouterProcess
 from tests.support.session_values import (
     AT,
     fact,
@@ -125,3 +132,174 @@ async def test_a_slow_reader_gets_only_the_latest_of_a_stream(session_config):
         await take(afterwards, 1)
         [newest] = await take(watch, 1)
         assert newest.value.time_s == 50.0
+
+
+class Questions:
+    """Counts what a session asks from here on, and the values that came back."""
+
+    def __init__(self, session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.asked: list[str] = []
+        self.values = 0
+        self._query = session.link.query
+        monkeypatch.setattr(session.link, "query", self.query)
+
+    async def query(self, keyexpr: str, *args: Any, **more: Any) -> Any:
+        replies = await self._query(keyexpr, *args, **more)
+        self.asked.append(keyexpr)
+        changes = STORE_CHANGES.build(StoreAddress())
+        for sample in replies.values:
+            page = (
+                msgspec.json.decode(sample.data, type=StoreChanges) if keyexpr == changes else None
+            )
+            self.values += len(page.values) if page is not None else 1
+        return replies
+
+
+async def updated(watch: Watch) -> None:
+    """Have a watch ask what it missed, and wait until it has."""
+    before = watch.updates
+    watch.relist()
+    await until(partial(since, watch, before), "an update of the watch")
+
+
+def since(watch: Watch, before: int) -> bool:
+    return watch.updates > before
+
+
+@pytest.mark.parametrize("stored", [1, 300])
+async def test_an_idle_watch_asks_one_question_and_hears_nothing(
+    session_config: Any, monkeypatch: pytest.MonkeyPatch, stored: int
+) -> None:
+    async with open_session(session_config()) as session:
+        for number in range(stored):
+            await session.confirm(GOAL_SPEC, GoalAddress(f"g{number}"), goal(f"g{number}"))
+        async with session.watch(GOAL_SPEC, FACT, REPORT) as watch:
+            await watch.synced()
+            questions = Questions(session, monkeypatch)
+            await updated(watch)
+            assert questions.asked == [STORE_CHANGES.build(StoreAddress())]
+            assert questions.values == 0
+
+
+async def test_after_a_reconnection_only_what_changed_is_read(
+    router: RouterProcess, session_config: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with open_session(session_config()) as reader, reader.watch(GOAL_SPEC) as watch:
+        async with open_session(session_config()) as writer:
+            for number in range(50):
+                await writer.confirm(GOAL_SPEC, GoalAddress(f"g{number}"), goal(f"g{number}"))
+        await take(watch, 50)
+        await updated(watch)
+        router.stop()
+        await until(lambda: not_connected(reader))
+        _delete_in_store(router.data_dir, "robotfleet/" + GOAL_SPEC.build(GoalAddress("g7")))
+        questions = Questions(reader, monkeypatch)
+        router.restart()
+        [change] = await take(watch, 1, 20)
+        assert (change.address, change.value) == (GoalAddress("g7"), None)
+        assert questions.values == 1
+        assert watch.listings == 1
+
+
+def report(plan: str, attempt: int = 1) -> Report:
+    return Report(
+        robot="r1", plan=plan, revision=1, task="t1", attempt=attempt, epoch=1, incarnation="i1",
+        state=ReportState.SUCCEEDED,
+    )  # fmt: skip
+
+
+async def test_a_narrowed_watch_lists_what_matters_and_hears_of_everything(
+    session_config: Any,
+) -> None:
+    open_plans = {"open"}
+    async with open_session(session_config()) as session:
+        for plan in ("open", "over", "long-over"):
+            await session.confirm(REPORT, ReportAddress.of(report(plan)), report(plan))
+        narrowed = Narrowed(REPORT, "plan", lambda: open_plans)
+        async with session.watch(narrowed) as watch:
+            [listed] = await take(watch, 1)
+            await watch.synced()
+            assert listed.value == report("open")
+            await session.confirm(REPORT, ReportAddress.of(report("over", 2)), report("over", 2))
+            assert (await take(watch, 1))[0].value == report("over", 2)
+            assert watch.remembered == 2
+            await updated(watch)
+            assert watch.remembered == 1, "what nobody asks for is not kept in memory"
+            open_plans.clear()
+            await updated(watch)
+            assert watch.remembered == 0
+
+
+async def test_what_was_known_before_and_is_gone_is_shown_as_deleted(session_config: Any) -> None:
+    known = [(GOAL_SPEC, GoalAddress(name)) for name in ("g1", "g2")]
+    async with open_session(session_config()) as session:
+        await session.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"))
+        async with session.watch(GOAL_SPEC, FACT, known=known) as watch:
+            await watch.synced()
+            shown = {change.address.goal: change.value for change in await take(watch, 2)}
+            assert shown == {"g1": goal("g1"), "g2": None}
+
+
+@asynccontextmanager
+async def bare_router(endpoint: str) -> AsyncIterator[None]:
+    """A router that stores nothing."""
+    config = zenoh_config("router", listen=[endpoint])
+    with await asyncio.to_thread(zenoh.open, config):
+        yield
+
+
+async def test_what_was_known_before_is_not_gone_where_no_store_answers(
+    router: RouterProcess, session_config: Any
+) -> None:
+    router.kill()
+    known = [(GOAL_SPEC, GoalAddress("g1"))]
+    async with (
+        bare_router(router.endpoint),
+        open_session(session_config()) as session,
+        session.watch(GOAL_SPEC, known=known) as watch,
+    ):
+        await watch.synced()
+        await updated(watch)
+        assert watch.exists(GOAL_SPEC, GoalAddress("g1"))
+        await session.link.send(
+            GOAL_SPEC.build(GoalAddress("g2")),
+            GOAL_SPEC.encode(goal("g2")),
+            "",
+            session.link.new_timestamp(),
+        )
+        [change] = await take(watch, 1)
+        assert change.value == goal("g2")
+
+
+async def test_a_store_that_cannot_be_read_is_told_once_and_read_when_it_can_be(
+    router: RouterProcess, session_config: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A store that fails at first, at the end of a real link."""
+    router.kill()
+    asked: list[StoreChangesQuery] = []
+    well = asyncio.Event()
+
+    async def answer(_: StoreAddress, query: StoreChangesQuery) -> StoreChanges:
+        asked.append(query)
+        if not well.is_set():
+            raise OSError("the disk is on fire")
+        return StoreChanges(values=(), position="one/1/1", whole=not query.position, more=False)
+
+    told: list[str | None] = []
+    async with (
+        bare_router(router.endpoint),
+        open_session(session_config()) as store,
+        store.serve(STORE_CHANGES, answer),
+        open_session(session_config()) as session,
+        session.watch(GOAL_SPEC, on_trouble=told.append) as watch,
+    ):
+        await until(lambda: len(asked) >= 3, "three questions")
+        assert len(told) == 1
+        assert "the disk is on fire" in str(told[0])
+        assert watch.listings == 0
+        well.set()
+        await watch.synced()
+        await until(lambda: len(told) == 2, "the end of the trouble")
+        assert told[1] is None
+    warnings = [r.getMessage() for r in caplog.records if r.levelname == "WARNING"]
+    assert len([line for line in warnings if "cannot be read" in line]) == 1

@@ -119,3 +119,13 @@ def test_a_dry_run_shows_the_plan_and_leaves_nothing_behind() -> None:
     assert model.state.plans == {}
     assert model.state.previews == {}
     assert model.goal_state("g1") is GoalState.WAITING
+
+
+def test_a_person_may_call_a_request_what_she_likes() -> None:
+    model = fleet()
+    for number in range(1, 10):
+        model.plan(goals=("nothing",), request=f"auto-{number}")
+    model.receive(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(auto_plan=True))
+    model.receive(events.GoalPut, goal=bring(1, "hallway"))
+    model.finish()
+    assert model.goal_state("g1") is GoalState.REACHED

@@ -1,0 +1,175 @@
+"""What goes to a planning process: everything that a job depends on, as one value.
+
+Made by the core when a job begins, from the state at that moment. So an answer does not depend on
+what happens meanwhile or on where the job runs, and a job that failed can be looked at later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace as changed
+
+import msgspec
+from msgspec.structs import replace
+
+from fleet.core.model.skills import SkillModel, Skills
+from fleet.core.model.world import WorldModel
+from fleet.core.plan_entry import PlanningJob
+from fleet.core.state import State
+from fleet.language import Vocabulary
+from keyexpr_schema.facts import SEARCHED, Literal
+from keyexpr_schema.payloads.durations import Durations
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.robots import RobotSpec
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.world import Object, Place
+
+
+class WorkUnderWay(msgspec.Struct, frozen=True):
+    """A task that a robot has an order for, as part of which actor."""
+
+    skill: str
+    args: dict[str, str]
+    actor: str
+    robot: str
+
+
+class PlanningInput(msgspec.Struct, frozen=True, kw_only=True, tag="plan"):
+    """A planning job with the world it is planned in.
+
+    `goals` have as their conditions what they still want; of those `reached`, that is what holds of
+    them now. `busy_s` says for how long robots are taken [s from now], `under_way` what they do of
+    the plan itself. `searched` are places in which this plan has looked around. The answer has to
+    be there `limit_s` after the job began; by half of that, planners give what they have.
+    """
+
+    job: PlanningJob
+    time_s: float
+    wall_time_s: float
+    limit_s: float
+    skills: dict[str, SkillModel]
+    places: tuple[Place, ...]
+    objects: tuple[Object, ...]
+    robots: tuple[RobotSpec, ...]
+    available: tuple[str, ...]
+    facts: tuple[Literal, ...]
+    durations: tuple[Durations, ...]
+    goals: tuple[Goal, ...]
+    reached: tuple[str, ...] = ()
+    searched: tuple[str, ...] = ()
+    busy_s: dict[str, float] = {}
+    under_way: tuple[WorkUnderWay, ...] = ()
+
+    def world(self) -> WorldModel:
+        """The world that the plan is made in."""
+        return WorldModel(
+            skills=self.skills,
+            places={place.place: place for place in self.places},
+            objects={thing.object: thing for thing in self.objects},
+            robots={spec.robot: spec for spec in self.robots},
+            available=frozenset(self.available),
+            facts=dict(self.facts),
+            durations={known.model: known for known in self.durations},
+        )
+
+
+class InterpretationInput(msgspec.Struct, frozen=True, kw_only=True, tag="interpret"):
+    """A goal's sentence for a language model, with the names and relations it can use."""
+
+    time_s: float
+    wall_time_s: float
+    goal: str
+    text: str
+    vocabulary: Vocabulary
+    skills: dict[str, SkillModel]
+
+
+def planning_input(state: State, job: PlanningJob) -> PlanningInput:
+    """The job with everything of the state that it depends on; looks at the whole world once."""
+    world = state.world()
+    goals = [state.goals[goal] for goal in job.goals if goal in state.goals]
+    reached = [g.goal for g in goals if state.goal_states[g.goal].state is GoalState.REACHED]
+    entry = state.plans.get(job.plan)
+    records = entry.records if entry is not None else {}
+    return PlanningInput(
+        job=job,
+        time_s=state.time_s,
+        wall_time_s=state.wall_time_s,
+        limit_s=state.policy.planning_limit_s,
+        skills=state.skills,
+        places=tuple(world.places.values()),
+        objects=tuple(world.objects.values()),
+        robots=tuple(world.robots.values()),
+        available=world.team,
+        facts=tuple(Literal(variable, value) for variable, value in world.facts.items()),
+        durations=tuple(world.durations.values()),
+        goals=tuple(
+            replace(goal, conditions=_wanted(state.goal_states[goal.goal], world)) for goal in goals
+        ),
+        reached=tuple(reached),
+        searched=_searched(records.values(), state.skills),
+        busy_s=_busy_s(state, job.plan),
+        under_way=tuple(
+            WorkUnderWay(record.skill, record.args, record.actor, record.robot)
+            for name in job.under_way
+            if (record := records.get(name)) is not None and record.robot is not None
+        ),
+    )
+
+
+def interpretation_input(state: State, goal: str) -> InterpretationInput:
+    """A goal's sentence with what a language model needs to know to read it."""
+    words = state.vocabulary()
+    return InterpretationInput(
+        time_s=state.time_s,
+        wall_time_s=state.wall_time_s,
+        goal=goal,
+        text=state.goals[goal].text,
+        vocabulary=changed(
+            words,
+            places=dict(words.places),
+            objects=dict(words.objects),
+            robots=dict(words.robots),
+        ),
+        skills=state.skills,
+    )
+
+
+def _wanted(status: GoalStatus, world: WorldModel) -> tuple[Condition, ...]:
+    """What a goal still wants: all that it says, or, once reached, that what holds is kept."""
+    if status.state is GoalState.REACHED:
+        return tuple(condition for condition in status.conditions if world.holds(condition))
+    return status.conditions
+
+
+def _searched(records: Iterable[TaskRecord], skills: Skills) -> tuple[str, ...]:
+    """Places that a finished task of the plan has searched."""
+    return tuple(
+        dict.fromkeys(
+            literal.variable.subject
+            for record in records
+            if record.state is TaskState.SUCCEEDED and record.skill in skills
+            for literal in skills[record.skill].ground(record.args).after
+            if literal.variable.relation == SEARCHED
+        )
+    )
+
+
+def _busy_s(state: State, plan: str) -> dict[str, float]:
+    """How long robots are taken, s: by what they do late, and by work of other plans than `plan`,
+    whose own is in the new plan once more. A task that is late is expected to take as long again
+    as it has taken so far."""
+    late_s: dict[str, float] = {}
+    taken_s: dict[str, float] = {}
+    for name, entry in state.plans.items():
+        for record in entry.outstanding():
+            if record.robot is None:
+                continue
+            begun_s = state.time_s if record.started_s is None else record.started_s
+            left_s = begun_s + record.duration_s - state.time_s
+            if record.started_s is not None:
+                late_s.setdefault(record.robot, max(0.0, -left_s))
+            if name != plan:
+                taken_s.setdefault(record.robot, max(0.0, left_s))
+    busy_s = {robot: late_s.get(robot, 0.0) + taken_s.get(robot, 0.0) for robot in state.robots}
+    return {robot: wait_s for robot, wait_s in busy_s.items() if wait_s > 0.0}

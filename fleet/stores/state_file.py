@@ -1,0 +1,130 @@
+"""The SQLite file of a store: its lock, its tables, and how files of older formats are taken over.
+
+Formats: 1 had no numbers of change and no `about`; 2 has.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import sqlite3
+import time
+import uuid
+from pathlib import Path
+
+from fleet.errors import StoreError, StoreInUse
+
+FORMAT = 2
+STAMP_BYTES = 24
+_BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
+_LATEST = """
+CREATE TABLE IF NOT EXISTS latest (
+    keyexpr TEXT PRIMARY KEY,
+    stamp BLOB NOT NULL,
+    deleted INTEGER NOT NULL,
+    encoding TEXT NOT NULL,
+    data BLOB NOT NULL,
+    number INTEGER NOT NULL,
+    wall_time_s REAL NOT NULL
+) WITHOUT ROWID;
+"""
+_TABLES = f"""
+{_LATEST}
+CREATE TABLE IF NOT EXISTS journal (
+    number INTEGER PRIMARY KEY AUTOINCREMENT,
+    wall_time_s REAL NOT NULL,
+    keyexpr TEXT NOT NULL,
+    deleted INTEGER NOT NULL,
+    stamp BLOB NOT NULL,
+    data BLOB NOT NULL
+);
+CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+PRAGMA user_version = {FORMAT};
+"""
+
+
+def take_lock(data_dir: Path) -> int:
+    """A file descriptor that keeps other processes out of `data_dir` until it is closed.
+
+    Raises:
+        StoreInUse: another process has it.
+        StoreError: the directory cannot be used.
+    """
+    try:
+        data_dir.mkdir(parents=True, exist_ok=True)
+        guard = os.open(data_dir / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    except OSError as error:
+        raise StoreError(
+            f"the store directory {data_dir} cannot be used: {error.strerror}"
+        ) from None
+    try:
+        # The kernel drops the lock with the process, however it ends.
+        fcntl.flock(guard, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(guard)
+        raise StoreInUse(
+            f"another router uses the store in {data_dir}: stop it, or give this one another "
+            "directory with --data"
+        ) from None
+    return guard
+
+
+def open_file(path: Path, synchronous: str) -> sqlite3.Connection:
+    """The database, with the tables of this format.
+
+    Raises:
+        StoreError: it is of a later format.
+        sqlite3.Error: it cannot be used.
+    """
+    db = sqlite3.connect(path, check_same_thread=False, timeout=5.0)
+    try:
+        version = db.execute("PRAGMA user_version").fetchone()[0]
+        if version > FORMAT:
+            raise StoreError(
+                f"the store {path} has format {version}, but this program knows formats up to "
+                f"{FORMAT}: update it"
+            )
+        db.execute("PRAGMA journal_mode = WAL")
+        db.execute(f"PRAGMA synchronous = {synchronous}")
+        if version == 1:
+            _number_the_latest(db)
+        db.executescript(_TABLES)
+    except BaseException:
+        db.close()
+        raise
+    return db
+
+
+def _number_the_latest(db: sqlite3.Connection) -> None:
+    db.executescript(
+        f"""
+        BEGIN IMMEDIATE;
+        ALTER TABLE latest RENAME TO latest_1;
+        {_LATEST}
+        INSERT INTO latest SELECT keyexpr, stamp, deleted, encoding, data,
+            row_number() OVER (ORDER BY stamp), {time.time()} FROM latest_1;
+        DROP TABLE latest_1;
+        PRAGMA user_version = {FORMAT};
+        COMMIT;
+        """
+    )
+
+
+def identity_of(db: sqlite3.Connection, path: Path) -> str:
+    """A name of the store that is new where changes that somebody saw may be missing.
+
+    That is where the file was replaced or copied, and where the power may have gone: the last
+    writes before that are not on the disk (see `SqliteStore`), and their numbers are used again.
+    """
+    file = path.stat()
+    boot = _BOOT_ID.read_text().strip() if _BOOT_ID.exists() else uuid.uuid4().hex
+    place = f"{boot}/{file.st_dev}/{file.st_ino}"
+    about = dict(db.execute("SELECT name, value FROM about").fetchall())
+    if about.get("place") != place:
+        about["identity"] = uuid.uuid4().hex[:16]
+        with db:
+            db.executemany(
+                "INSERT OR REPLACE INTO about VALUES (?, ?)",
+                [("place", place), ("identity", about["identity"])],
+            )
+    return str(about["identity"])

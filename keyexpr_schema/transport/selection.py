@@ -1,0 +1,168 @@
+"""One watched pattern, and what is known of the keys in it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+from typing import Any, Generic
+
+import zenoh
+
+from keyexpr_schema.errors import ForeignKey, UndecodablePayload
+from keyexpr_schema.key import A, Key, P
+from keyexpr_schema.transport.samples import Sample, decode_value, text_of_stamp
+from keyexpr_schema.transport.undecodable import UndecodableReports
+
+TOMBSTONE_S = 60.0
+"""For so long the stamp of a deletion is kept: an older put that comes late must not undo it."""
+
+
+@dataclass(frozen=True)
+class Change(Generic[A, P]):
+    """A new value of one key; `value` None: deleted. `timestamp` is Zenoh's, as text."""
+
+    key: Key[A, P]
+    address: A
+    value: P | None
+    timestamp: str
+
+
+@dataclass(frozen=True)
+class Narrowed:
+    """A watched key of which only those addresses are listed whose `field` is one of `values()`.
+
+    What changes is delivered of all of them. For keys that pile up, where whoever watches knows
+    which of those that are there already can still matter.
+    """
+
+    key: Key[Any, Any]
+    field: str
+    values: Callable[[], Collection[str]]
+
+
+class Selection:
+    """What is known of the keys that match `pattern`; hands new values to `deliver`.
+
+    It remembers the keys that exist, as far as they are listed, and those deleted a while ago.
+    """
+
+    def __init__(
+        self,
+        key: Key[Any, Any],
+        pattern: str,
+        narrowed: Narrowed | None,
+        undecodable: UndecodableReports,
+        deliver: Callable[[str, Change[Any, Any]], None],
+        relist: Callable[[], None],
+    ) -> None:
+        self.key, self.pattern = key, pattern
+        self._matches = zenoh.KeyExpr(pattern)
+        self._narrowed, self._undecodable = narrowed, undecodable
+        self._deliver, self._relist = deliver, relist
+        self._stamps: dict[str, int] = {}
+        """Of the keys that have a value, readable or not."""
+        self._gone: dict[str, tuple[int, float]] = {}
+        """Stamp of a key's deletion, and until when (by the loop's clock) it is kept."""
+        self._doubted: set[str] = set()
+        self._doubted_generation = 0
+
+    def __contains__(self, keyexpr: str) -> bool:
+        return keyexpr in self._stamps
+
+    def __len__(self) -> int:
+        """How many keys are remembered, those that were deleted included."""
+        return len(self._stamps) + len(self._gone)
+
+    def expect(self, keyexpr: str) -> None:
+        """Take a key to have a value that is older than any; what a listing lacks is deleted."""
+        if self._matches.includes(keyexpr):
+            self._stamps.setdefault(keyexpr, 0)
+
+    def offer(self, sample: Sample) -> None:
+        """Pass on what is newer than what is known of its key."""
+        keyexpr, stamp = sample.keyexpr, sample.stamp
+        if "*" in keyexpr:
+            # A wildcard put or delete: it concerns the keys that exist, which the store knows.
+            self._relist()
+            return
+        known = self._stamps.get(keyexpr)
+        if known is None and (gone := self._gone.get(keyexpr)) is not None:
+            known = gone[0]
+        if known is not None and stamp <= known and stamp:
+            return
+        try:
+            address = self.key.parse(keyexpr)
+        except ForeignKey as error:
+            # The pattern matches it and the store may keep it, but nobody can have an id in it.
+            self._undecodable.report(keyexpr, sample.data, str(error))
+            return
+        self._remember(keyexpr, stamp or known or 0, sample.deleted)
+        try:
+            value = None if sample.deleted else decode_value(self.key, sample)
+        except UndecodablePayload as error:
+            self._undecodable.report(keyexpr, sample.data, str(error))
+            return
+        self._deliver(keyexpr, Change(self.key, address, value, text_of_stamp(stamp)))
+
+    def _remember(self, keyexpr: str, stamp: int, deleted: bool) -> None:
+        self._doubted.discard(keyexpr)
+        if deleted:
+            self._stamps.pop(keyexpr, None)
+            self._gone[keyexpr] = stamp, asyncio.get_running_loop().time() + TOMBSTONE_S
+        else:
+            self._gone.pop(keyexpr, None)
+            self._stamps[keyexpr] = stamp
+
+    def changed(self, sample: Sample) -> None:
+        """Take in what the store says of a key that changed, if it is one of these; nobody waits
+        for the end of a key that was never known."""
+        news = not sample.deleted or sample.keyexpr in self._stamps
+        if news and self._matches.includes(sample.keyexpr):
+            self.offer(sample)
+
+    def patterns(self) -> Iterator[str]:
+        """What has to be listed now."""
+        if self._narrowed is None:
+            yield self.pattern
+            return
+        for value in self._narrowed.values():
+            yield self.key.pattern(**{self._narrowed.field: value})
+
+    def forget(self) -> None:
+        """Let go of what nobody asks for any more: old deletions, and keys no longer listed."""
+        now_s = asyncio.get_running_loop().time()
+        for keyexpr in [k for k, (_, until_s) in self._gone.items() if until_s <= now_s]:
+            del self._gone[keyexpr]
+        if self._narrowed is not None:
+            field, values = self._narrowed.field, set(self._narrowed.values())
+            for keyexpr in [
+                k for k in self._stamps if getattr(self.key.parse(k), field) not in values
+            ]:
+                del self._stamps[keyexpr]
+
+    def known(self) -> dict[str, int]:
+        """The keys that are known to have a value, and its stamp."""
+        return dict(self._stamps)
+
+    def missing(self, known: dict[str, int], listed: set[str]) -> set[str]:
+        """Of what was `known` before a listing, and was not heard of since, what it lacks."""
+        return {
+            keyexpr
+            for keyexpr, stamp in known.items()
+            if keyexpr not in listed and self._stamps.get(keyexpr) == stamp
+        }
+
+    def missing_twice(self, missing: set[str], generation: int) -> set[str]:
+        """What was missing in the last listing, too, both times in one generation of the link."""
+        again = self._doubted & missing if self._doubted_generation == generation else set()
+        self._doubted, self._doubted_generation = missing, generation
+        return again
+
+    def delete(self, keyexprs: set[str]) -> None:
+        """Take keys for deleted whose deletion nobody saw; a listing that has them brings them
+        back."""
+        self._doubted -= keyexprs
+        for keyexpr in sorted(keyexprs & self._stamps.keys()):
+            stamp = text_of_stamp(self._stamps.pop(keyexpr))
+            self._deliver(keyexpr, Change(self.key, self.key.parse(keyexpr), None, stamp))

@@ -86,7 +86,7 @@ class CoreRun:
             self.succeeded[event.report.plan] += event.report.state is ReportState.SUCCEEDED
         for effect in effects:
             if isinstance(effect, MakePlan):
-                self.jobs.append(effect.job.job)
+                self.jobs.append(effect.given.job.job)
             elif isinstance(effect, Publish):
                 self._heard(effect)
         return effects

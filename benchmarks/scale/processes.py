@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -20,9 +20,12 @@ _PAGE_MB = os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
 class Child:
-    """A process that says on stdout when it is ready; its errors go to `folder/name.log`."""
+    """A process that is ready when it has said lines that begin like each of `ready` on stdout.
 
-    def __init__(self, name: str, folder: Path, ready: str, *command: str) -> None:
+    Its errors go to `folder/name.log`.
+    """
+
+    def __init__(self, name: str, folder: Path, ready: Sequence[str], *command: str) -> None:
         self.name, self._ready = name, ready
         self.log = folder / f"{name}.log"
         self._command = command
@@ -41,10 +44,12 @@ class Child:
                 start_new_session=True,
             )
         assert self._process.stdout is not None
+        missing = set(self._ready)
         try:
             async with asyncio.timeout(limit_s):
                 async for line in self._process.stdout:
-                    if line.decode().startswith(self._ready):
+                    missing -= {words for words in missing if line.decode().startswith(words)}
+                    if not missing:
                         self._reading = asyncio.create_task(_drain(self._process.stdout))
                         return time.perf_counter() - began_s
         except TimeoutError:
@@ -156,14 +161,14 @@ class Processes:
         self.folder = folder
         self.endpoint = with_port("tcp/127.0.0.1:0")
         self.router = Child(
-            "router", folder, "router listening",
+            "router", folder, ("router listening",),
             "-m", "fleet.service.router_process", self.endpoint, str(folder / "router"),
         )  # fmt: skip
         self.planner = self.robotctl(
-            "planner", "planner ready", "planner", "--data", str(folder / "planner")
+            "planner", ("planner ready",), "planner", "--data", str(folder / "planner")
         )
 
-    def robotctl(self, name: str, ready: str, *arguments: str) -> Child:
+    def robotctl(self, name: str, ready: Sequence[str], *arguments: str) -> Child:
         """A process by `robotctl`, of this router and realm."""
         place = ("--router", self.endpoint, "--realm", REALM)
         return Child(name, self.folder, ready, "-m", "cli.main", *arguments, *place)

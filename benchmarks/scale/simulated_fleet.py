@@ -18,7 +18,7 @@ import msgspec
 from benchmarks.scale.errands import DURATION_S
 from benchmarks.scale.keys_run import CONFIRM_S, at_once
 from benchmarks.scale.processes import REALM, Child, Processes
-from keyexpr_schema.facts import AT
+from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, ROBOT_SPEC
 from keyexpr_schema.payloads.goals import Condition
@@ -145,7 +145,7 @@ def rounds(name: str, robots: int, laps: int) -> Plan:
 
 @asynccontextmanager
 async def simulated(
-    fleet: Processes, robots: int, backend: str, speed: str = "max"
+    fleet: Processes, robots: int, backend: str, worker_processes: int = 1
 ) -> AsyncIterator[SimulatedFleet]:
     """The world and the workers of so many robots, at the router of `fleet`."""
     world, mission = building(robots)
@@ -154,30 +154,43 @@ async def simulated(
     file = fleet.folder / "grid.yaml"
     loaded = load_mission(file)
     sim = fleet.robotctl(
-        "sim", "world grid running", "sim", str(file), "--backend", backend, "--speed", speed
+        "sim", ("world grid running",), "sim", str(file), "--backend", backend, "--speed", "max"
     )
-    workers = workers_of(fleet, tuple(robot.spec.robot for robot in loaded.robots))
+    names = tuple(robot.spec.robot for robot in loaded.robots)
+    workers = workers_of(fleet, names, worker_processes)
     config = SessionConfig((fleet.endpoint,), realm=REALM, component="benchmark")
     try:
         async with open_session(config) as operator:
             await _put(operator, loaded)
             await sim.start(START_S)
             await asyncio.gather(*(worker.start(START_S) for worker in workers))
+            await _until_known(operator, names)
             yield SimulatedFleet(loaded, sim, workers, operator)
     finally:
         await asyncio.gather(*(worker.stop() for worker in workers))
         await sim.stop()
 
 
-def workers_of(fleet: Processes, robots: tuple[str, ...]) -> tuple[Child, ...]:
-    """A process for each robot."""
+def workers_of(fleet: Processes, robots: tuple[str, ...], processes: int) -> tuple[Child, ...]:
+    """So many processes, among which the robots are shared out."""
+    shares = [robots[number::processes] for number in range(processes)]
     return tuple(
         fleet.robotctl(
-            f"worker-{robot}", f"worker {robot} ready",
-            "worker", robot, "--data", str(fleet.folder / f"worker-{robot}"),
+            f"workers-{number}", [f"worker {robot} ready" for robot in share],
+            "worker", *share, "--data", str(fleet.folder / f"workers-{number}"),
         )
-        for robot in robots
+        for number, share in enumerate(shares)
     )  # fmt: skip
+
+
+async def _until_known(operator: Session, robots: tuple[str, ...]) -> None:
+    """Until every worker has said where its robot is and what it holds: now it can be planned."""
+    missing = {FactKey(relation, robot) for relation in (AT, HOLDING) for robot in robots}
+    async with asyncio.timeout(START_S), operator.watch(FACT) as facts:
+        async for change in facts:
+            missing.discard(change.address.key)
+            if not missing:
+                return
 
 
 async def _put(operator: Session, mission: Mission) -> None:

@@ -17,12 +17,18 @@ from benchmarks.scale.stored_past import store_reports
 REPORTS = 120_000
 READY_S = 60.0
 WATCHED_S = 30.0
+SETTLE_S = 10.0
+"""What is loaded after a start is no idling."""
+ROBOTS = (1, 50)
 
 
 def measure(quick: bool) -> list[dict[str, Any]]:
     """A row for each process."""
     reports, seconds = (1000, 6.0) if quick else (REPORTS, WATCHED_S)
-    return [*asyncio.run(_stored(reports, seconds)), *asyncio.run(_workers(seconds))]
+    rows = asyncio.run(_stored(reports, seconds))
+    for robots in ROBOTS[: 1 if quick else None]:
+        rows += asyncio.run(_workers(robots, seconds))
+    return rows
 
 
 async def _stored(reports: int, seconds: float) -> list[dict[str, Any]]:
@@ -30,7 +36,7 @@ async def _stored(reports: int, seconds: float) -> list[dict[str, Any]]:
         store_reports(Path(folder) / "router", reports)
         async with processes(Path(folder), planner=False) as fleet:
             ready_s = await fleet.planner.start(READY_S)
-            await asyncio.sleep(10.0)  # what it loads after its start is no idling
+            await asyncio.sleep(SETTLE_S)
             shares = await share_of_core(fleet.planner, fleet.router, seconds=seconds)
             return [
                 _row(child, share, reports=reports, ready_s=ready_s)
@@ -38,14 +44,18 @@ async def _stored(reports: int, seconds: float) -> list[dict[str, Any]]:
             ]
 
 
-async def _workers(seconds: float) -> list[dict[str, Any]]:
+async def _workers(robots: int, seconds: float) -> list[dict[str, Any]]:
+    """Robots that stand in a world that stands still; their workers are one process."""
     with tempfile.TemporaryDirectory() as folder:
-        async with processes(Path(folder)) as fleet, simulated(fleet, 1, "kinematic") as made:
-            await asyncio.sleep(5.0)
-            children = (made.workers[0], made.sim, fleet.planner, fleet.router)
+        async with (
+            processes(Path(folder)) as fleet,
+            simulated(fleet, robots, "kinematic") as made,
+        ):
+            await asyncio.sleep(SETTLE_S)
+            children = (*made.workers, made.sim, fleet.planner, fleet.router)
             shares = await share_of_core(*children, seconds=seconds)
             return [
-                _row(child, share, fleet="one robot, kinematic")
+                _row(child, share, robots=robots)
                 for child, share in zip(children, shares, strict=True)
             ]
 

@@ -20,7 +20,7 @@ from keyexpr_schema.payloads.plans import PlanAddress
 from keyexpr_schema.payloads.tasks import TaskState
 from keyexpr_schema.transport.session import Session
 
-ROBOTS = (50,)
+ROBOTS = (10, 50)
 LAPS = 8
 WATCHED_S = 60.0
 BEGIN_S = 120.0
@@ -57,11 +57,10 @@ async def _run(robots: int, seconds: float) -> dict[str, Any]:
                 "took_s": took_s,
                 "running_at_the_end": running,
                 "succeeded": await _in_state(made.operator, TaskState.SUCCEEDED),
-                **{
-                    f"{name}_share": (child.cpu_s() - before[name]) / took_s
-                    for name, child in children.items()
+                "cpu_s": {
+                    **{name: child.cpu_s() - before[name] for name, child in children.items()},
+                    "workers": sum(w.cpu_s() for w in made.workers) - workers_had_s,
                 },
-                "workers_share": (sum(w.cpu_s() for w in made.workers) - workers_had_s) / took_s,
             }
 
 

@@ -11,6 +11,8 @@ from pathlib import Path
 
 from fleet.core.state import Policy
 from fleet.errors import FleetError
+from fleet.history.archive import Archive
+from fleet.history.retention import Retention
 from fleet.service.composition import Composition, compose
 from fleet.service.event_journal import EventJournal
 from fleet.service.planner_service import PlannerService
@@ -25,10 +27,12 @@ def run(
     skill_files: tuple[Path, ...] = (),
     llm_file: Path | None = None,
     policy: Policy | None = None,
+    retention: Retention | None = None,
 ) -> None:
     """Be the central planner of a realm until SIGTERM or SIGINT; prints a line once it is ready.
 
-    The event journal lies in `data_dir`. It waits for a router as long as there is none.
+    The event journal and the archive of what is over lie in `data_dir`; `retention` says how long
+    that keeps its keys. It waits for a router as long as there is none.
     `skill_files` and `llm_file` are those of `compose`.
 
     Raises:
@@ -39,7 +43,7 @@ def run(
     )
     try:
         composition = compose(skill_files, llm_file)
-        asyncio.run(_run(endpoints, realm, data_dir, composition, policy))
+        asyncio.run(_run(endpoints, realm, data_dir, composition, policy, retention))
     except (FleetError, SchemaError) as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201
         raise SystemExit(1) from None
@@ -51,16 +55,17 @@ async def _run(
     data_dir: Path,
     composition: Composition,
     policy: Policy | None,
+    retention: Retention | None,
 ) -> None:
     config = SessionConfig(
         endpoints=endpoints, realm=realm, component="planner", connect_timeout_s=None
     )
     loop = asyncio.get_running_loop()
-    with EventJournal(data_dir) as journal:
+    with EventJournal(data_dir) as journal, Archive(data_dir) as archive:
         async with open_session(config) as session:
             ready = asyncio.Event()
             service = asyncio.create_task(
-                PlannerService(session, journal, composition, policy).run(ready)
+                PlannerService(session, journal, composition, archive, policy, retention).run(ready)
             )
             for number in (signal.SIGTERM, signal.SIGINT):
                 loop.add_signal_handler(number, service.cancel)

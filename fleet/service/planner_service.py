@@ -15,18 +15,22 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.dispatch.delays import SAME_CLOCK_S
 from fleet.core.dispatch.dispatcher import next_timer
+from fleet.core.effects import Archive as ToArchive
 from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import At, Event
 from fleet.core.model.skills import phrases_of
 from fleet.core.planning_input import InterpretationInput, PlanningInput
 from fleet.core.state import LOGIC, Policy, State
-from fleet.core.step import replay, step
+from fleet.core.step import step
 from fleet.errors import Superseded
+from fleet.history.archive import Archive
+from fleet.history.retention import Retention
 from fleet.service.catch_up import prior_state, stale_documents, until_synced
 from fleet.service.composition import Composition
 from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, event_of, missed_deletions
 from fleet.service.outbox import Outbox
+from fleet.service.past import Past
 from fleet.service.planning.planning_job import run_interpretation, run_planning_job
 from keyexpr_schema.keyspace import (
     PLANNER_ALIVE,
@@ -48,7 +52,9 @@ class PlannerService:
         session: Session,
         journal: EventJournal,
         composition: Composition,
+        archive: Archive,
         policy: Policy | None = None,
+        retention: Retention | None = None,
     ) -> None:
         self._session = session
         self._journal = journal
@@ -62,6 +68,9 @@ class PlannerService:
         self._state = State()
         self._time_s = 0.0
         self._outbox = Outbox(session)
+        self._past = Past(
+            session, archive, self._outbox, retention or Retention(), lambda: self._state
+        )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
         self._planning: set[asyncio.Task[None]] = set()
         self._held: list[Effect] | None = []
@@ -82,13 +91,14 @@ class PlannerService:
         if not snapshot.skills:  # in journals of earlier versions no event brings them
             snapshot = replace(snapshot, skills=dict(self._composition.skills))
         first_run = self._journal.empty
-        self._state = replay(self._journal.events(number), snapshot)
+        self._state = self._replayed(number, snapshot)
         async with AsyncExitStack() as stack:
             watch = await stack.enter_async_context(
                 self._session.watch(*WATCHED, SIM_CLOCK, PLANNER_STATUS)
             )
             tokens = await stack.enter_async_context(self._session.watch_tokens(ROBOT_ALIVE))
             await stack.enter_async_context(self._outbox.running())
+            await stack.enter_async_context(self._past.running())
             if first_run:
                 self._apply(await prior_state(self._session, self._at()))
             await self._take_charge()
@@ -106,11 +116,22 @@ class PlannerService:
                     tasks.create_task(self._listen(watch))
                     tasks.create_task(self._watch_workers(tokens))
                     tasks.create_task(self._take_events())
+                    tasks.create_task(self._past.delete_keys_in_time())
             except* Superseded as group:
                 raise group.exceptions[0] from None
             finally:
                 for task in self._planning:
                     task.cancel()
+
+    def _replayed(self, number: int, snapshot: State) -> State:
+        """The state after all that is journaled; what became over on the way is archived, if an
+        earlier run was killed before it could."""
+        state = snapshot
+        self._past.keep(ToArchive(record) for record in snapshot.over)
+        for event in self._journal.events(number):
+            state, effects = step(state, event)
+            self._past.keep(effects)
+        return state
 
     def _at(self) -> At:
         now_s = time.time()
@@ -177,6 +198,7 @@ class PlannerService:
         """
         held = [e for e in self._held or () if isinstance(e, Publish | Retract)]
         self._held = None
+        self._past.publish_unsettled()
         self._carry_out((*held, *effects_of(self._state)))
 
     async def _listen(self, watch: Watch) -> None:
@@ -218,10 +240,13 @@ class PlannerService:
             self._apply(event)
 
     def _apply(self, event: Event) -> None:
-        state, effects = step(self._state, event)
+        if (news := self._past.news(event)) is None:
+            return
+        state, effects = step(self._state, news)
         if state is self._state:
             return
-        self._journal.append(event, state)
+        self._journal.append(news, state)
+        self._past.keep(effects)
         self._state = state
         self._carry_out(effects)
 
@@ -230,6 +255,7 @@ class PlannerService:
             self._held.extend(effects)
             return
         self._outbox.send(e for e in effects if isinstance(e, Publish | Retract))
+        self._past.sent(effects)
         for effect in effects:
             if isinstance(effect, MakePlan):
                 self._in_background(self._make_plan(effect.given))

@@ -137,6 +137,34 @@ COLUMNS: dict[str, Sequence[Column]] = {
         _number("running_at_the_end"),
         _number("succeeded"),
     ),
+    "lifetime": (
+        ("missions", lambda row: row["missions"]),
+        ("a mission takes", lambda row: f"{row['took_s']:.2f} s"),
+        ("the longest", lambda row: f"{row['worst_s']:.2f} s"),
+        _number("restarts"),
+        _number("planner_ready_s", ".2f", " s"),
+        *(
+            (f"CPU of a mission, {name}", lambda row, name=name: f"{row['cpu_s'][name]:.2f} s")
+            for name in ("planner", "router", "workers")
+        ),
+        *(
+            (f"RSS, {name}", lambda row, name=name: f"{row['rss_mb'][name]:.0f} MB")
+            for name in ("planner", "router", "workers")
+        ),
+        *(
+            (f"files, {name}", lambda row, name=name: f"{row['files_mb'][name]:.1f} MB")
+            for name in ("planner", "history", "store", "workers")
+        ),
+        ("load average", lambda row: f"{row['load']:.1f}"),
+    ),
+    "recording": (
+        ("after", lambda row: f"{row['after_s']:.0f} s"),
+        _number("missions"),
+        _number("cpu_s", ".1f", " s"),
+        _number("rss_mb", ".0f", " MB"),
+        _number("files"),
+        _number("files_mb", ".1f", " MB"),
+    ),
 }
 
 

@@ -25,8 +25,18 @@ from benchmarks.scale import report
 from benchmarks.tables import as_json, machine
 
 PARTS = (
-    "core", "events", "goals", "keys", "dispatch", "writes", "restart", "idle", "physics",
-)  # fmt: skip
+    "core",
+    "events",
+    "goals",
+    "keys",
+    "dispatch",
+    "writes",
+    "restart",
+    "idle",
+    "physics",
+    "lifetime",
+    "recording",
+)
 
 
 def main() -> None:
@@ -55,7 +65,7 @@ def _measured(part: str, quick: bool) -> dict[str, Any]:
     began_s, load = time.perf_counter(), os.getloadavg()[0]
     results = measure(quick)
     return {
-        "command": " ".join(["python -m benchmarks.scale.run", *sys.argv[1:]]),
+        "command": _command(),
         "machine": machine(),
         "commit": _commit(),
         "load_before": round(load, 1),
@@ -63,6 +73,12 @@ def _measured(part: str, quick: bool) -> dict[str, Any]:
         "took_s": round(time.perf_counter() - began_s, 1),
         "results": results,
     }
+
+
+def _command() -> str:
+    """What was called, wherever results were to go."""
+    own = [Path(word).name if "/" in word else word for word in sys.argv[1:]]
+    return " ".join(["python -m benchmarks.scale.run", *own])
 
 
 def _commit() -> str:

@@ -157,6 +157,26 @@ def _writes(rows: Rows) -> str:
     return f"{together}; {single}"
 
 
+def _lifetime(rows: Rows) -> str:
+    def say(row: dict[str, Any]) -> str:
+        memory = sum(row["rss_mb"][name] for name in ("planner", "router", "workers"))
+        files = sum(row["files_mb"][name] for name in ("planner", "store", "workers"))
+        return (
+            f"missions {row['missions']}: {row['took_s']:.2f} s each, {memory:.0f} MB, "
+            f"files {files:.0f} MB"
+        )
+
+    return "; ".join(say(rows[place]) for place in (0, len(rows) // 2, -1)) if rows else NOTHING
+
+
+def _recorder(rows: Rows) -> str:
+    first, last = rows[0], rows[-1]
+    return (
+        f"{last['cpu_s']:.0f} s CPU in {last['after_s']:.0f} s, "
+        f"RSS {first['rss_mb']:.0f} to {last['rss_mb']:.0f} MB, {last['missions']} missions"
+    )
+
+
 ROWS = (
     Target("tasks a second through `step` alone: 50 robots x 1,000 tasks · 50 x 10,000 · "
            "1,000 x 10,000", "", "core", _tasks_a_second),
@@ -180,5 +200,9 @@ ROWS = (
     Target("idle planner, 120,000 reports stored", "≤ 1 % (router ≤ 1 %)", "idle", _idle_planner),
     Target("idle worker, of a core for each robot", "≤ 0.2 %", "idle", _idle_workers),
     Target("50 robots, MuJoCo, with their workers, of real time", "≥ 4 x", "physics", _physics),
+    Target("500 missions with restarts in between: time, memory, files", "flat after retention",
+           "lifetime", _lifetime),
+    Target("recorder over 600 s of missions", "≤ 60 s CPU, bounded memory; files that roll",
+           "recording", _recorder),
     Target("confirmed writes, 64 at once; one alone", "≥ 10,000/s; p99 ≤ 3 ms", "writes", _writes),
 )  # fmt: skip

@@ -16,7 +16,7 @@ from fleet.core.effects import Effect, MakePlan, Publish
 from fleet.core.events import Event
 from fleet.core.state import LOGIC, State
 from fleet.core.step import step
-from fleet.service.composition import load_all_skills
+from fleet.service.skill_models import load_all_skills
 from keyexpr_schema.keyspace import FACT, ORDER, PLAN_STATUS
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import PlanRequest

@@ -10,7 +10,7 @@ from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.keyspace import REPORT
 from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState
 from keyexpr_schema.transport.samples import encoding_of
-from keyexpr_schema.transport.storage import Write
+from keyexpr_schema.transport.store.storage import Write
 
 TASKS_A_PLAN = 16
 ROBOTS = 50

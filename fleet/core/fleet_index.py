@@ -106,7 +106,7 @@ def index_of(
             for robot in robots_of(record):
                 work.setdefault(robot, {})[plan, record.task] = None
         if not entry.ended:
-            for goal in entry.plan.goals:
+            for goal in entry.wanted_goals:
                 plans_of.setdefault(goal, []).append(plan)
     things_at: Sets = immutables.Map()
     for fact in facts.values():

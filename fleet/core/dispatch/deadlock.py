@@ -17,7 +17,7 @@ def break_deadlock(state: State) -> State:
     if any(robot is not None and not lost(state, robot) for robot in robots):
         return state
     for entry in alive:
-        if not may_order(entry):
+        if not may_order(state, entry):
             continue
         ready = {task for tasks in entry.index.ready.values() for task in tasks}
         for task in sorted(ready, key=entry.index.graph.position.__getitem__):

@@ -7,7 +7,8 @@ from math import inf
 from msgspec.structs import replace
 
 from fleet.core.model.durations import late_at_s
-from fleet.core.plan_entry import PlanEntry, ReplanScope
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import set_entry, set_late_bound
 from keyexpr_schema.payloads.plans import PlanState
@@ -29,19 +30,22 @@ def react_to_delays(state: State) -> State:
         if late is None:
             state = set_late_bound(state, entry, min(map(late_at_s, running), default=inf))
             continue
-        reason = f"{late.robot} is late with {late.task} ({late.skill})"
+        sentence = f"{late.robot} is late with {late.task} ({late.skill})"
         entry = replace(entry, late=(*entry.late, late.task))
-        state = set_entry(state, entry.to_replan(ReplanScope.REALLOCATE, reason))
+        robots = () if late.robot is None else (late.robot,)
+        entry = entry.to_replan(ReplanScope.REALLOCATE, sentence, robots=robots)
+        state = set_entry(state, entry)
     return state
 
 
 def next_lateness(state: State) -> float | None:
-    """The Unix time [s] before which no task becomes late, where the fleet's clock tells it."""
+    """When the next task may become late, by `State.monotonic_s`, where the fleet's clock tells
+    it."""
     if abs(state.time_s - state.wall_time_s) > SAME_CLOCK_S:
         return None
     entries = (state.plans[plan] for plan in state.index.active)
     next_s = min((entry.index.late_s for entry in entries if _counts(entry)), default=inf)
-    return None if next_s == inf else next_s
+    return None if next_s == inf else state.monotonic_s + next_s - state.time_s
 
 
 def _counts(entry: PlanEntry) -> bool:

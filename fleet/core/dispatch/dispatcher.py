@@ -11,10 +11,11 @@ from fleet.core.dispatch.deadlock import break_deadlock
 from fleet.core.dispatch.delays import next_lateness, react_to_delays
 from fleet.core.dispatch.lost_robots import give_up_work_of_lost_robots, lost, next_loss
 from fleet.core.dispatch.ready_tasks import by_priority, may_order, order_ready
-from fleet.core.dispatch.replan_triggers import new_robots, why_replan
+from fleet.core.dispatch.replan_triggers import unforeseen
 from fleet.core.handlers.goals import next_stage
 from fleet.core.handlers.requests import plan_waiting_goals
-from fleet.core.plan_entry import PlanEntry, ReplanScope
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.replan_reasons import ReplanScope
 from fleet.core.revision.replanning import start_replanning
 from fleet.core.state import State
 from fleet.core.state_updates import give_up, mark_goals, set_entry, with_waiting_cancelled
@@ -43,47 +44,52 @@ def advance(state: State) -> State:
 
 
 def next_timer(state: State) -> float | None:
-    """The Unix time [s] at which time alone changes something: a robot is lost, or a task late."""
+    """When time alone changes something, by `State.monotonic_s`: a loss, or a late task."""
     times = [at_s for at_s in (next_loss(state), next_lateness(state)) if at_s is not None]
     return min(times, default=None)
 
 
 def _look_at(state: State, concerns: Concerns) -> State:
+    """What is reached is marked, what is done ends, and what is ready is ordered: also while the
+    plan is made again, as far as that does not touch it."""
     robots = sorted(concerns.robots)
     concerned = {*concerns.plans, *concerns.goals, *concerns.tasks}
     if robots:
         concerned.update(state.index.active)
     for plan in by_priority(state, concerned):
-        entry = state.plans[plan]
-        if plan in concerns.plans:
-            state = _look_at_plan(state, entry)
-        elif may_order(entry):
-            state = _mark_reached(state, entry, sorted(concerns.goals.get(plan, ())))
-        if may_order(entry := state.plans[plan]):
+        entry, whole = state.plans[plan], plan in concerns.plans
+        if may_order(state, entry):
+            goals = entry.plan.goals if whole else sorted(concerns.goals.get(plan, ()))
+            state = _mark_reached(state, entry, goals)
+            if whole:
+                state = _end_or_replan(state, state.plans[plan])
+            entry = state.plans[plan]
             ready = (robot for robot in robots if robot in entry.index.ready)
             state = order_ready(state, plan, concerns.tasks.get(plan, ()), ready)
+        if whole:
+            state = _cancel_or_make_again(state, state.plans[plan])
     return state
 
 
-def _look_at_plan(state: State, entry: PlanEntry) -> State:
-    if entry.cancelling:
-        return _cancel(state, entry)
-    if entry.job is None and entry.replan is not None:
-        return start_replanning(state, entry)
-    if not may_order(entry):
+def _end_or_replan(state: State, entry: PlanEntry) -> State:
+    if entry.job is not None or entry.replan is not None:
         return state
-    state = _mark_reached(state, entry, entry.plan.goals)
-    entry = state.plans[entry.plan.plan]
-    if not may_order(entry):
-        return state
-    if (reason := why_replan(state, entry)) is not None:
-        return set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason))
-    if (helpers := new_robots(state, entry)) is not None:
-        return set_entry(state, helpers)
+    if (changed := unforeseen(state, entry)) is not None:
+        return set_entry(state, changed)
     if entry.index.unfinished == 0:
         return set_entry(state, replace(entry, state=PlanState.SUCCEEDED))
     if entry.index.broken:
         return give_up(state, entry, "a task of the plan was cancelled or failed")
+    return state
+
+
+def _cancel_or_make_again(state: State, entry: PlanEntry) -> State:
+    if entry.ended:
+        return state
+    if entry.cancelling:
+        return _cancel(state, entry)
+    if entry.job is None and entry.replan is not None:
+        return start_replanning(state, entry)
     return state
 
 
@@ -99,7 +105,7 @@ def _cancel(state: State, entry: PlanEntry) -> State:
         cancelling=False,
         records=records,
         unwanted=unwanted,
-        replan=None,
+        reasons=(),
     )
     state = set_entry(state, entry)
     return mark_goals(
@@ -115,6 +121,7 @@ def _mark_reached(state: State, entry: PlanEntry, goals: Iterable[str]) -> State
         if (
             status is None
             or status.state in ENDED_GOALS
+            or (entry.wishes and goal not in entry.plan.goals)
             or goal in entry.index.goal_open
             or not all(world.holds(condition) for condition in status.conditions)
         ):
@@ -124,7 +131,8 @@ def _mark_reached(state: State, entry: PlanEntry, goals: Iterable[str]) -> State
             state = next_stage(state, goal)
             reason = f"goal {goal} goes on with its next step"
             entry = replace(entry, fruitless_replans=0)
-            state = set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason))
+            entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=(goal,))
+            state = set_entry(state, entry)
         else:
             if entry.fruitless_replans:
                 state = set_entry(state, replace(entry, fruitless_replans=0))

@@ -10,9 +10,11 @@ from heapq import merge
 
 from msgspec.structs import replace
 
+from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
 from fleet.core.model.preconditions import action_of, unmet_before
 from fleet.core.model.skills import Action
-from fleet.core.plan_entry import PlanEntry, ReplanScope
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import give_up, set_entry, set_record
 from keyexpr_schema.facts import AT
@@ -44,14 +46,15 @@ def order_ready(state: State, plan: str, tasks: Iterable[str], robots: Iterable[
     first = sorted((position[task], task) for task in tasks if task in entry.index.open)
     for _, task in merge(first, *(ready_for(robot) for robot in sorted(robots))):
         now[0] = order_if_ready(now[0], plan, task)
-        if not may_order(now[0].plans[plan]):
+        if not may_order(now[0], now[0].plans[plan]):
             break
     return now[0]
 
 
-def may_order(entry: PlanEntry) -> bool:
-    """Whether tasks of the plan are given out now."""
-    return entry.state is PlanState.RUNNING and entry.job is None and entry.replan is None
+def may_order(state: State, entry: PlanEntry) -> bool:
+    """Whether tasks of the plan are given out now, if nothing else holds them back."""
+    running = entry.state is PlanState.RUNNING and not entry.cancelling
+    return running and not stands_still(state, entry)
 
 
 def order_if_ready(state: State, plan: str, task: str, reservations: bool = True) -> State:
@@ -67,13 +70,17 @@ def order_if_ready(state: State, plan: str, task: str, reservations: bool = True
     if action is None:
         reason = f"{record.task} cannot start: there is no skill {record.skill} any more"
         return give_up(state, entry, reason)
+    if waits_for_new_plan(state, entry, record, action):
+        return state
     if not all(_is_free(state, robot, plan, reservations) for robot in action.participants):
         return state
     if _touches_unwanted_work(state, action):
         return state
     if (unmet := unmet_before(action, state.world())) is not None:
         reason = f"{record.task} ({record.skill}) cannot start: {unmet}"
-        return set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason))
+        goals, tasks = (record.goal,), (record.task,)
+        entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=goals, tasks=tasks)
+        return set_entry(state, entry)
     serial = state.attempts_made + 1
     state = replace(state, attempts_made=serial)
     ordered = replace(
@@ -85,6 +92,8 @@ def order_if_ready(state: State, plan: str, task: str, reservations: bool = True
         ordered_s=state.time_s if record.ordered_s is None else record.ordered_s,
         way_s=_way_s(state, action),
     )
+    if entry.job is not None:
+        entry = replace(entry, given_out=entry.given_out.set(record.task, None))
     return set_record(state, entry, ordered)
 
 

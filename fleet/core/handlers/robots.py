@@ -29,7 +29,7 @@ def robot_unregistered(state: State, event: events.RobotUnregistered) -> State:
     state = replace(
         state,
         robots=state.robots.without(event.robot),
-        gone_since=state.gone_since.set(event.robot, event.wall_time_s),
+        gone_since=state.gone_since.set(event.robot, state.monotonic_s),
     )
     return robot_changed(state, event.robot)
 
@@ -54,5 +54,5 @@ def worker_disconnected(state: State, event: events.WorkerDisconnected) -> State
     state = replace(state, connected=state.connected.set(event.robot, rest))
     if rest:
         return state
-    state = replace(state, gone_since=state.gone_since.set(event.robot, event.wall_time_s))
+    state = replace(state, gone_since=state.gone_since.set(event.robot, state.monotonic_s))
     return robot_changed(state, event.robot)

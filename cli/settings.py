@@ -162,9 +162,9 @@ def _planner(section: object, path: Path) -> PlannerSettings:
     def seconds(name: str, least_s: float) -> float | None:
         value = written.get(name)
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        right = is_number and least_s <= value < math.inf
-        check(name, right, f"a number of seconds from {least_s:g} up")
-        return float(value) if right else None
+        number = float(value or 0.0) if is_number else -math.inf
+        check(name, least_s <= number < math.inf, f"a number of seconds from {least_s:g} up")
+        return None if value is None else number
 
     check("llm_config", isinstance(written.get("llm_config"), str), "the name of a file")
     skills = written.get("skills") or []

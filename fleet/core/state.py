@@ -122,7 +122,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             places=self.places,
             objects=self.objects,
             robots=self.robots,
-            available=frozenset(self.index.team),
+            available=self.index.available,
             facts=FactValues(self.facts),
             durations=self.durations,
         )

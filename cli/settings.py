@@ -29,6 +29,8 @@ class PlannerSettings:
     approval: bool | None = None
     auto_plan: bool | None = None
     lost_after_s: float | None = None
+    keep_days: float | None = None
+    keep: int | None = None
     llm_config: Path | None = None
     skills: tuple[Path, ...] = ()
 
@@ -154,10 +156,12 @@ def _planner(section: object, path: Path) -> PlannerSettings:
 
     for name in ("approval", "auto_plan"):
         check(name, isinstance(written.get(name), bool), "true or false")
-    lost = written.get("lost_after_s")
-    is_number = isinstance(lost, int | float) and not isinstance(lost, bool)
-    lost_s = float(lost or 0.0) if is_number else -1.0
-    check("lost_after_s", 0.0 <= lost_s < math.inf, "a number of seconds from 0 up")
+    lost_s, keep_days = (_number(written.get(name)) for name in ("lost_after_s", "keep_days"))
+    keep = written.get("keep")
+    check("lost_after_s", lost_s is not None, "a number of seconds from 0 up")
+    check("keep_days", keep_days is not None, "a number of days from 0 up")
+    is_count = isinstance(keep, int) and not isinstance(keep, bool) and keep >= 0
+    check("keep", is_count, "a whole number from 0 up")
     check("llm_config", isinstance(written.get("llm_config"), str), "the name of a file")
     skills = written.get("skills") or []
     skills = [skills] if isinstance(skills, str) else skills
@@ -167,7 +171,16 @@ def _planner(section: object, path: Path) -> PlannerSettings:
     return PlannerSettings(
         approval=written.get("approval"),
         auto_plan=written.get("auto_plan"),
-        lost_after_s=None if lost is None else lost_s,
+        lost_after_s=lost_s,
+        keep_days=keep_days,
+        keep=keep,
         llm_config=None if llm is None else path.parent / Path(llm).expanduser(),
         skills=tuple(path.parent / Path(each).expanduser() for each in skills),
     )
+
+
+def _number(value: object) -> float | None:
+    """A number from 0 up; `None` for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    return float(value) if 0.0 <= value < math.inf else None

@@ -95,6 +95,24 @@ def planner(
             help="A robot whose worker is gone for longer is lost; else 30.",
         ),
     ] = None,
+    keep_days: Annotated[
+        float | None,
+        typer.Option(
+            "--keep-days",
+            metavar="DAYS",
+            min=0.0,
+            help="How long what is over keeps its keys; else 7. `history` keeps it for good.",
+        ),
+    ] = None,
+    keep: Annotated[
+        int | None,
+        typer.Option(
+            "--keep",
+            metavar="N",
+            min=0,
+            help="Of no more than so many ended plans, though; else 200.",
+        ),
+    ] = None,
 ) -> None:
     """Run the planner: it turns goals into plans and has them carried out.
 
@@ -102,9 +120,10 @@ def planner(
     """
     from cli.demo.child_processes import end_with_parent
     from fleet.core.state import Policy
+    from fleet.history.retention import Retention
     from fleet.service.planner_process import run
 
-    settings, default = call.settings.planner, Policy()
+    settings, default, kept = call.settings.planner, Policy(), Retention()
     end_with_parent()
     run(
         endpoints=call.settings.routers,
@@ -116,6 +135,10 @@ def planner(
             approval=_first(approval, settings.approval, default.approval),
             auto_plan=_first(auto_plan, settings.auto_plan, default.auto_plan),
             lost_after_s=_first(lost_after_s, settings.lost_after_s, default.lost_after_s),
+        ),
+        retention=Retention(
+            days=_first(keep_days, settings.keep_days, kept.days),
+            count=_first(keep, settings.keep, kept.count),
         ),
     )
 

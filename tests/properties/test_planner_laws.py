@@ -100,15 +100,15 @@ class Undisturbed(RuleBasedStateMachine):
 
     @rule()
     def a_person_wants_another_plan(self) -> None:
-        number = len(self.model.state.answers)
+        number = len(self.model.replies)
         request = ReplanRequest(request=f"again-{number}", plan="plan-1", reason="because")
         self.model.receive(events.ReplanRequested, request=request)
 
     @rule(plan=st.sampled_from(["plan-1", "plan-2", "plan-3"]))
     def a_person_cancels_a_plan_that_is_being_made(self, plan: str) -> None:
-        entry = self.model.state.plans.get(plan)
+        entry = self.model.plans.get(plan)
         if entry is not None and entry.job is not None:
-            number = len(self.model.state.answers)
+            number = len(self.model.replies)
             request = ControlRequest(request=f"stop-{number}", control=Control.CANCEL, plan=plan)
             self.model.receive(events.ControlRequested, request=request)
             self.a_plan_was_cancelled = True
@@ -125,7 +125,7 @@ class Undisturbed(RuleBasedStateMachine):
     @precondition(lambda self: len(self.model.state.goals) < MOST_GOALS)
     @rule(room=st.sampled_from(["kitchen", "hallway", "living_room"]))
     def a_goal_comes_up_in_the_middle(self, room: str) -> None:
-        number = len(self.model.state.answers)
+        number = len(self.model.replies)
         wanted = Condition(relation="searched", subject=room, value=True)
         goal = Goal(goal=f"look-{number}", text="", conditions=(wanted,), ordinal=100 + number)
         self.model.receive(events.GoalPut, goal=goal)
@@ -133,7 +133,7 @@ class Undisturbed(RuleBasedStateMachine):
             request=f"more-{number}", plan="plan-1", reason="more", goals=(goal.goal,)
         )
         self.model.receive(events.ReplanRequested, request=request)
-        if self.model.state.answers[request.request].accepted:
+        if self.model.replies[request.request].accepted:
             self.promised.add(goal.goal)
 
     @precondition(lambda self: len(self.model.state.goals) > 1)
@@ -158,19 +158,18 @@ class Undisturbed(RuleBasedStateMachine):
             self.model.return_(robot)
         self.model.finish()
         self.met.update(self.model.met)
-        state = self.model.state
-        for entry in state.plans.values():
+        plans = self.model.plans
+        for entry in plans.values():
             assert entry.state in ENDED_PLANS, f"{entry.plan.plan} is {entry.state}: it never ends"
             assert not entry.outstanding()
-        for goal, status in state.goal_states.items():
+        for goal, status in self.model.goal_states.items():
             assert (
                 goal not in self.promised
                 or self.a_plan_was_cancelled
-                or any(goal in entry.plan.goals for entry in state.plans.values())
+                or any(goal in entry.plan.goals for entry in plans.values())
             ), f"{goal} was asked for while a plan was being made, and is in none"
             waits = all(
-                goal not in entry.plan.goals or entry.state in UNDONE
-                for entry in state.plans.values()
+                goal not in entry.plan.goals or entry.state in UNDONE for entry in plans.values()
             )
             assert status.state in ENDED_GOALS or waits, f"{goal} is {status.state} for ever"
             if self.reaches_everything and not waits:
@@ -182,7 +181,7 @@ class Undisturbed(RuleBasedStateMachine):
     def finished_work_stays_finished(self) -> None:
         if not hasattr(self, "model"):
             return
-        for plan, entry in self.model.state.plans.items():
+        for plan, entry in self.model.plans.items():
             for record in entry.records.values():
                 if (plan, record.task) in self.finished:
                     assert record.state is TaskState.SUCCEEDED, "finished work was undone"

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 from fleet.core.effects import Publish, Retract, effects_of
 from fleet.core.events import At, PriorStateLoaded
 from fleet.core.state import State
-from keyexpr_schema.key import Key
+from keyexpr_schema.key import Address, Key
 from keyexpr_schema.keyspace import (
-    ANSWER,
     DURATIONS,
     GOAL_STATUS,
     ORDER,
@@ -25,23 +24,22 @@ OWN: tuple[Key[Any, Any], ...] = (ORDER, TASK_RECORD, PLAN_SPEC, PLAN_STATUS, GO
 
 
 async def prior_state(session: Session, at: At) -> PriorStateLoaded:
-    """Without a journal: what an earlier planner answered and ended is not done again, and what it
+    """Without a journal: names that an earlier planner gave are not given again, and what it
     learned is not forgotten."""
-    answers = await session.list(ANSWER)
-    goals = await session.list(GOAL_STATUS)
     plans = await session.list(PLAN_STATUS)
     durations = await session.list(DURATIONS)
     return PriorStateLoaded(
-        answers=tuple(answers.values()),
-        goals=tuple(goals.values()),
         plans=tuple(address.plan for address in plans),
         durations=tuple(durations.values()),
         **at,
     )
 
 
-async def stale_documents(session: Session, state: State) -> list[Retract]:
-    """Documents of the planner in the store that the state does not have.
+async def stale_documents(
+    session: Session, state: State, is_over: Callable[[Address], bool]
+) -> list[Retract]:
+    """Documents of the planner in the store that the state does not have, and of nothing that is
+    over: that keeps its keys for a while.
 
     A planner that was killed between its journal and a deletion leaves such; one that lost its
     journal leaves its orders, which nobody would ever follow up.
@@ -55,8 +53,7 @@ async def stale_documents(session: Session, state: State) -> list[Retract]:
         Retract(key, address)
         for key in OWN
         for address in await session.list(key, timeout_s=60.0)
-        if key.build(address) not in wanted
-        and (key is ORDER or getattr(address, "plan", None) not in state.past_plans)
+        if key.build(address) not in wanted and (key is ORDER or not is_over(address))
     ]
 
 

@@ -96,13 +96,14 @@ class PlannerService:
             await stack.enter_async_context(self._outbox.running())
             await stack.enter_async_context(self._past.running())
             if first_run:
+                await self._past.inherit(self._at()["wall_time_s"])
                 self._apply(await prior_state(self._session, self._at()))
             await self._take_charge()
             await stack.enter_async_context(
                 self._session.token(PLANNER_ALIVE, PlannerAliveAddress(self._incarnation))
             )
             await self._catch_up(watch, tokens)
-            stale = await stale_documents(self._session, self._state)
+            stale = await stale_documents(self._session, self._state, self._past.has)
             self._go_live()
             self._carry_out(stale)
             if ready is not None:

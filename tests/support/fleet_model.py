@@ -51,7 +51,10 @@ class FleetModel:
     With `late` answers, what planning jobs came to waits in `answers` until `answer` is called.
     """
 
-    def __init__(self, robots: tuple[RobotSpec, ...], cups: int, late: bool = False) -> None:
+    def __init__(
+        self, robots: tuple[RobotSpec, ...], cups: int, late: bool = False, logic: int = LOGIC
+    ) -> None:
+        self._logic = logic
         self.late = late
         self.answers: list[Answer] = []
         self.given_answers: list[Answer] = []
@@ -88,7 +91,7 @@ class FleetModel:
             epoch=epoch,
             incarnation=incarnation,
             skills=dict(SKILLS),
-            logic=LOGIC,
+            logic=self._logic,
             lineage=incarnation,
         )
 

@@ -15,12 +15,33 @@ from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact
 
+AHEAD_S = 60.0
+"""A fact from further ahead than this [s] was said in an earlier era, if there was one."""
+COMPARED_SINCE_LOGIC = 1
+"""Before this logic of the core, only facts in reports gave way to newer ones."""
+
 
 def believe(state: State, fact: Fact) -> State:
-    """Believe a fact, whatever was known of its variable."""
-    if state.facts.get(fact.key) == fact:
+    """Believe a fact, unless a newer one is known: the newest word holds, on whatever way it came.
+
+    One that does not say when it was said (0) is said now.
+    """
+    known = state.facts.get(fact.key)
+    if known == fact:
         return state
-    return replace(state, facts=state.facts.set(fact.key, fact))
+    earlier = _said_in_earlier_era(state, fact)
+    if known is not None and fact.time_s != 0.0 and state.logic >= COMPARED_SINCE_LOGIC:
+        known_earlier = fact.key in state.older_facts
+        if earlier > known_earlier or (earlier == known_earlier and fact.time_s < known.time_s):
+            return state
+    older = state.older_facts.without(fact.key)
+    if earlier:
+        older = older.set(fact.key, None)
+    return replace(state, facts=state.facts.set(fact.key, fact), older_facts=older)
+
+
+def _said_in_earlier_era(state: State, fact: Fact) -> bool:
+    return state.era > 0 and fact.time_s > state.time_s + AHEAD_S
 
 
 def conclude(state: State, fact: Fact) -> State:
@@ -29,12 +50,6 @@ def conclude(state: State, fact: Fact) -> State:
     if believed is state:
         return state
     return replace(believed, concluded=state.concluded.set(fact.key, fact))
-
-
-def believe_if_newer(state: State, fact: Fact) -> State:
-    """Believe a fact that came on another way than its key, unless a newer one is known."""
-    known = state.fact(fact.relation, fact.subject)
-    return state if known is not None and fact.time_s < known.time_s else believe(state, fact)
 
 
 def set_goal(state: State, status: GoalStatus) -> State:
@@ -69,7 +84,7 @@ def mark_goals(
 def active_plan_of(state: State, goal: str) -> str | None:
     """The plan that works on a goal and has not ended."""
     for plan, entry in state.plans.items():
-        if goal in entry.plan.goals and not entry.ended:
+        if not entry.ended and goal in entry.wanted_goals:
             return plan
     return None
 
@@ -118,7 +133,15 @@ def cancel(state: State, entry: PlanEntry) -> State:
     name = entry.plan.plan
     waiting = entry.job.request if entry.job is not None else None
     state = answer(state, waiting, False, f"plan {name} was cancelled while it was made")
-    return set_entry(state, replace(entry, cancelling=True, job=None))
+    state = refuse_wishes(state, entry, f"plan {name} was cancelled")
+    return set_entry(state, replace(entry, cancelling=True, job=None, wishes=()))
+
+
+def refuse_wishes(state: State, entry: PlanEntry, reason: str) -> State:
+    """Answer whatever somebody still wants of a plan, which ends."""
+    for wish in entry.wishes:
+        state = answer(state, wish.request, False, reason, entry.plan.plan)
+    return state
 
 
 def with_waiting_cancelled(entry: PlanEntry, reason: str) -> Table[str, TaskRecord]:
@@ -135,11 +158,13 @@ def with_waiting_cancelled(entry: PlanEntry, reason: str) -> Table[str, TaskReco
 def give_up(state: State, entry: PlanEntry, reason: str, to: GoalState = GoalState.FAILED) -> State:
     """End a plan as failed, and with it those of its goals that are not reached; or, with `to`,
     have them wait for another."""
+    state = refuse_wishes(state, entry, f"plan {entry.plan.plan} failed: {reason}")
     entry = replace(
         entry,
         state=PlanState.FAILED,
         reason=reason,
-        replan=None,
+        reasons=(),
+        wishes=(),
         records=with_waiting_cancelled(entry, "the plan failed"),
         unwanted=tuple(record.task for record in entry.outstanding()),
         job=None,

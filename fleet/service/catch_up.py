@@ -16,6 +16,7 @@ from keyexpr_schema.keyspace import (
     ORDER,
     PLAN_SPEC,
     PLAN_STATUS,
+    STATEMENT_STATUS,
     TASK_RECORD,
 )
 from keyexpr_schema.transport.session import Session, TokenWatch, Watch
@@ -28,8 +29,10 @@ async def prior_state(session: Session, at: At) -> PriorStateLoaded:
     learned is not forgotten."""
     plans = await session.list(PLAN_STATUS)
     durations = await session.list(DURATIONS)
+    statements = await session.list(STATEMENT_STATUS)
     return PriorStateLoaded(
         plans=tuple(address.plan for address in plans),
+        statements=tuple(statements.values()),
         durations=tuple(durations.values()),
         **at,
     )

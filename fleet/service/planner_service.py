@@ -13,7 +13,6 @@ from typing import Any
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.dispatch.delays import SAME_CLOCK_S
 from fleet.core.dispatch.dispatcher import next_timer
 from fleet.core.effects import Archive as ToArchive
 from fleet.core.effects import DropJob, Effect, Interpret, MakePlan, Publish, Retract, effects_of
@@ -27,6 +26,7 @@ from fleet.history.retention import Retention
 from fleet.service.catch_up import prior_state, stale_documents, until_synced
 from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, event_of, missed_deletions
+from fleet.service.fleet_clock import FleetClock
 from fleet.service.outbox import Outbox
 from fleet.service.past import Past
 from fleet.service.planning.pool import PlanningPool
@@ -35,11 +35,14 @@ from keyexpr_schema.keyspace import (
     PLANNER_STATUS,
     ROBOT_ALIVE,
     SIM_CLOCK,
+    SIM_SCENE,
 )
 from keyexpr_schema.payloads.system import PlannerAddress, PlannerAliveAddress, PlannerStatus
 from keyexpr_schema.transport.session import Session, TokenWatch, Watch
 
 log = logging.getLogger(__name__)
+CHARGE_S = 3600.0
+"""How long a planner that starts waits for a store."""
 
 
 class PlannerService:
@@ -63,7 +66,7 @@ class PlannerService:
         self._policy = replace(policy, skill_phrases=phrases_of(skills))
         self._incarnation = uuid.uuid4().hex[:12]
         self._state = State()
-        self._time_s = 0.0
+        self._clock = FleetClock()
         self._outbox = Outbox(session)
         self._past = Past(
             session, archive, self._outbox, retention or Retention(), lambda: self._state
@@ -95,6 +98,8 @@ class PlannerService:
             tokens = await stack.enter_async_context(self._session.watch_tokens(ROBOT_ALIVE))
             await stack.enter_async_context(self._outbox.running())
             await stack.enter_async_context(self._past.running())
+            scenes = await self._session.list(SIM_SCENE)
+            self._clock.resume(self._state.time_s, bool(scenes))
             if first_run:
                 await self._past.inherit(self._at()["wall_time_s"])
                 self._apply(await prior_state(self._session, self._at()))
@@ -129,19 +134,32 @@ class PlannerService:
         return state
 
     def _at(self) -> At:
-        now_s = time.time()
-        if abs(now_s - self._time_s) < SAME_CLOCK_S:
-            self._time_s = now_s  # no simulation: the fleet's clock goes on without messages, too
-        return {"time_s": self._time_s, "wall_time_s": now_s}
+        return self._clock.at()
 
     async def _take_charge(self) -> None:
+        """Take the next epoch: no two planners ever have the same, however they were started.
+
+        What is there that is no status counts for nothing: it must not keep a planner from
+        starting.
+        """
         parts = await self._pool.ready()
-        # Listed, not got: a value there that is none must not keep the planner from starting.
-        status = (await self._session.list(PLANNER_STATUS)).get(PlannerAddress())
-        epoch = 1 + max(self._state.epoch, status.epoch if status else 0)
+
+        def next_epoch(status: PlannerStatus | None) -> PlannerStatus:
+            return PlannerStatus(
+                epoch=1 + max(self._state.epoch, status.epoch if status else 0),
+                incarnation=self._incarnation,
+                planners=tuple(parts.planners_wait_s),
+                strategies=parts.strategies,
+                allocators=tuple(parts.allocators_wait_s),
+                skills=tuple(self._skills),
+            )
+
+        ours = await self._session.update(
+            PLANNER_STATUS, PlannerAddress(), next_epoch, timeout_s=CHARGE_S
+        )
         self._apply(
             events.PlannerStarted(
-                epoch=epoch,
+                epoch=ours.epoch,
                 incarnation=self._incarnation,
                 policy=self._policy,
                 skills=self._skills,
@@ -149,19 +167,6 @@ class PlannerService:
                 lineage=self._incarnation,
                 **self._at(),
             )
-        )
-        await self._session.confirm(
-            PLANNER_STATUS,
-            PlannerAddress(),
-            PlannerStatus(
-                epoch=epoch,
-                incarnation=self._incarnation,
-                planners=tuple(parts.planners_wait_s),
-                strategies=parts.strategies,
-                allocators=tuple(parts.allocators_wait_s),
-                skills=tuple(self._skills),
-            ),
-            timeout_s=3600.0,
         )
 
     async def _catch_up(self, watch: Watch, tokens: TokenWatch[Any]) -> None:
@@ -203,7 +208,8 @@ class PlannerService:
 
     def _on_change(self, change: Any) -> None:
         if change.key is SIM_CLOCK:
-            self._time_s = change.value.time_s
+            if change.value is not None:
+                self._clock.ticked(change.value.time_s)
         elif change.key is PLANNER_STATUS:
             other = change.value
             if other is not None and other.epoch > self._state.epoch:
@@ -212,7 +218,9 @@ class PlannerService:
                     f"{self._session.config.realm} (epoch {other.epoch}); this one stops"
                 )
         elif (event := event_of(change, self._at())) is not None:
-            self._time_s = max(self._time_s, _report_time_s(event))
+            if self._held is None and isinstance(event, events.ReportReceived):
+                report = event.report
+                self._clock.reported(report.ended_s or report.started_s or 0.0)
             self._inbox.put_nowait(event)
 
     async def _watch_workers(self, tokens: TokenWatch[Any]) -> None:
@@ -229,7 +237,7 @@ class PlannerService:
         while True:
             timer = next_timer(self._state)
             try:
-                async with asyncio.timeout(None if timer is None else timer - time.time()):
+                async with asyncio.timeout(None if timer is None else timer - time.monotonic()):
                     event = await self._inbox.get()
             except TimeoutError:
                 event = events.TimerFired(**self._at())
@@ -263,9 +271,3 @@ class PlannerService:
         while True:
             answer = await self._pool.answers.get()
             self._inbox.put_nowait(replace(answer, **self._at()))
-
-
-def _report_time_s(event: Event) -> float:
-    if isinstance(event, events.ReportReceived):
-        return event.report.ended_s or event.report.started_s or 0.0
-    return 0.0

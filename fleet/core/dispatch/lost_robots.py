@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import set_entry
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
@@ -24,7 +25,7 @@ def lost(state: State, robot: str) -> bool:
     """Whether a robot is not to be waited for."""
     since = state.gone_since.get(robot)
     return since is not None and (
-        robot not in state.robots or state.wall_time_s - since >= state.policy.lost_after_s
+        robot not in state.robots or state.monotonic_s - since >= state.policy.lost_after_s
     )
 
 
@@ -45,7 +46,7 @@ def give_up_work_of_lost_robots(state: State) -> State:
 
 
 def next_loss(state: State) -> float | None:
-    """The Unix time [s] at which a robot that is away becomes lost to a plan that counts on it."""
+    """When, by `State.monotonic_s`, a robot that is away becomes lost to a plan that needs it."""
     counting = [
         entry
         for entry in state.plans.values()
@@ -74,7 +75,8 @@ def _give_up(state: State, entry: PlanEntry, robot: str, reason: str) -> State:
         unwanted = (*entry.unwanted, *(record.task for record in given_up))
         entry = replace(entry, unwanted=unwanted)
     entry = replace(entry, records=entry.records.updated({r.task: r for r in given_up}))
-    return set_entry(state, entry.to_replan(ReplanScope.REALLOCATE, reason))
+    entry = entry.to_replan(ReplanScope.REALLOCATE, reason, robots=(robot,))
+    return set_entry(state, entry)
 
 
 def _write_off(state: State, robot: str, reason: str) -> State:

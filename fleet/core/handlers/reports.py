@@ -9,10 +9,11 @@ from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.model.durations import learn
 from fleet.core.model.preconditions import action_of, effects_hold, unmet_before
 from fleet.core.model.skills import Action
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import (
-    believe_if_newer,
+    believe,
     conclude,
     give_up,
     mark_goals,
@@ -35,7 +36,7 @@ def report_received(state: State, event: events.ReportReceived) -> State:
     """A report of an attempt that is not current, or of another planner's, only brings facts."""
     report = event.report
     for fact in report.facts:
-        state = believe_if_newer(state, fact)
+        state = believe(state, fact)
     entry = state.plans.get(report.plan)
     record = entry.records.get(report.task) if entry else None
     if (
@@ -144,7 +145,7 @@ def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) 
     if entry.ended or record.task in entry.unwanted:
         return set_record(state, entry, record)
     reason = f"{record.task} ({record.skill}) failed: {report.reason}"
-    entry = entry.to_replan(ReplanScope.REPAIR, reason)
+    entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=(record.goal,))
     if record.goal is not None and record.goal in entry.plan.goals:
         count = entry.failures.get(record.goal, 0) + 1
         entry = replace(entry, failures=entry.failures.set(record.goal, count))

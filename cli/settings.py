@@ -17,13 +17,16 @@ DEFAULT_REALM = "robotfleet"
 _ENDPOINT = re.compile(r"^[a-z][a-z0-9_]*/\S+$")
 _REALM = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,62}", re.ASCII)
 _FIELDS = ("router", "realm", "planner")
+LEAST_PLANNING_LIMIT_S = 1.0
+"""Allocating alone takes as long."""
 
 
 @dataclass(frozen=True)
 class PlannerSettings:
     """How `robotctl planner` behaves where no flag says so; `None` and empty: it is not given.
 
-    Files are relative to the folder of the configuration file. `lost_after_s` is wall time [s].
+    Files are relative to the folder of the configuration file. `lost_after_s` and
+    `planning_limit_s` are wall time [s].
     """
 
     approval: bool | None = None
@@ -31,6 +34,7 @@ class PlannerSettings:
     lost_after_s: float | None = None
     keep_days: float | None = None
     keep: int | None = None
+    planning_limit_s: float | None = None
     llm_config: Path | None = None
     skills: tuple[Path, ...] = ()
 
@@ -156,12 +160,17 @@ def _planner(section: object, path: Path) -> PlannerSettings:
 
     for name in ("approval", "auto_plan"):
         check(name, isinstance(written.get(name), bool), "true or false")
-    lost_s, keep_days = (_number(written.get(name)) for name in ("lost_after_s", "keep_days"))
     keep = written.get("keep")
-    check("lost_after_s", lost_s is not None, "a number of seconds from 0 up")
-    check("keep_days", keep_days is not None, "a number of days from 0 up")
     is_count = isinstance(keep, int) and not isinstance(keep, bool) and keep >= 0
     check("keep", is_count, "a whole number from 0 up")
+
+    def number(name: str, least: float, unit: str = "seconds") -> float | None:
+        value = written.get(name)
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        found = float(value or 0.0) if is_number else -math.inf
+        check(name, least <= found < math.inf, f"a number of {unit} from {least:g} up")
+        return None if value is None else found
+
     check("llm_config", isinstance(written.get("llm_config"), str), "the name of a file")
     skills = written.get("skills") or []
     skills = [skills] if isinstance(skills, str) else skills
@@ -171,16 +180,10 @@ def _planner(section: object, path: Path) -> PlannerSettings:
     return PlannerSettings(
         approval=written.get("approval"),
         auto_plan=written.get("auto_plan"),
-        lost_after_s=lost_s,
-        keep_days=keep_days,
+        lost_after_s=number("lost_after_s", 0.0),
+        keep_days=number("keep_days", 0.0, "days"),
         keep=keep,
+        planning_limit_s=number("planning_limit_s", LEAST_PLANNING_LIMIT_S),
         llm_config=None if llm is None else path.parent / Path(llm).expanduser(),
         skills=tuple(path.parent / Path(each).expanduser() for each in skills),
     )
-
-
-def _number(value: object) -> float | None:
-    """A number from 0 up; `None` for anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    return float(value) if 0.0 <= value < math.inf else None

@@ -31,7 +31,7 @@ def history_table(entries: Iterable[PastEntry]) -> Table:
                     *((_at(entry.ended_wall_s), entry.plan) if number == 0 else ("", "")),
                     goal.text or goal.goal if goal else "",
                     (goal.outcome if goal else entry.outcome).value,
-                    seconds(goal.took_s if goal else entry.ended_s - entry.begun_s),
+                    seconds(goal.took_s if goal else max(0.0, entry.ended_s - entry.begun_s)),
                     *(_work(entry) if number == 0 else ("", "", "")),
                     (goal.reason if goal else entry.reason) or (entry.reason if not number else ""),
                 )

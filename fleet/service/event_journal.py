@@ -84,7 +84,7 @@ class EventJournal:
         self._since_snapshot += 1
         if self._since_snapshot >= SNAPSHOT_EVERY:
             self._since_snapshot = 0
-            kept = _Snapshot(format=SNAPSHOT_FORMAT, state=state)
+            kept = _Snapshot(format=SNAPSHOT_FORMAT, state=state.bare())
             self._db.execute("BEGIN")
             self._db.execute("DELETE FROM snapshots")
             self._db.execute(
@@ -115,7 +115,7 @@ class EventJournal:
             kept = msgspec.convert(read, _Snapshot, dec_hook=decode_table)
         except (msgspec.DecodeError, LookupError, TypeError, AttributeError):
             return 0, State()
-        return (int(row[0]), kept.state) if kept.format in _READABLE else (0, State())
+        return (int(row[0]), kept.state.reindexed()) if kept.format in _READABLE else (0, State())
 
     def events(self, after: int = 0) -> Iterator[Event]:
         """Every event with a higher number than `after`, in order."""

@@ -77,8 +77,7 @@ def test_a_running_plan_without_an_answer_ends_and_its_goals_wait() -> None:
     model = short()
     model.plan(*BOTH)
     model.lost = True
-    ask = ReplanRequest(request="q", plan="plan-1", reason="so")
-    model.receive(events.ReplanRequested, request=ask)
+    model.fail(model.orders()[0])
     assert waits(model, "g1")
     assert waits(model, "g2")
     for order in model.orders():

@@ -48,7 +48,7 @@ else:
                 "GOAL_SPEC GOAL_STATUS FACT STATEMENT STATEMENT_STATUS PLACE OBJECT ROBOT_SPEC "
                 "ROBOT_STATE ROBOT_ALIVE ORDER REPORT DURATIONS PLAN_SPEC PLAN_PROPOSAL "
                 "PLAN_STATUS TASK_RECORD PLAN_REQUEST REPLAN_REQUEST CONTROL_REQUEST ANSWER "
-                "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE STORE_JOURNAL STORE_CHANGES "
+                "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE DIAGNOSTIC STORE_JOURNAL STORE_CHANGES "
                 "SIM_MOTION SIM_SENSES SIM_CLOCK SIM_FRAMES SIM_SCENE SIM_TRUTH SIM_CONTACTS "
                 "KEYSPACE key_of"
             ),
@@ -67,9 +67,9 @@ else:
                 "Alive AliveAddress PoseMRad RobotActivity RobotAddress RobotSpec RobotState"
             ),
             "payloads.system": (
-                "JournalEntry PlannerAddress PlannerAliveAddress PlannerStatus StoreAddress "
-                "StoreChanges StoreChangesQuery StoreJournal StoreQuery StoredValue "
-                "UndecodableAddress UndecodableValue"
+                "Diagnostic DiagnosticAddress JournalEntry PlannerAddress PlannerAliveAddress "
+                "PlannerStatus StoreAddress StoreChanges StoreChangesQuery StoreJournal StoreQuery "
+                "StoredValue UndecodableAddress UndecodableValue"
             ),
             "payloads.simulation": (
                 "Body ContactCount Frame Frames MotionCall QuaternionWxyz Scene Shape ShapeKind "

@@ -163,6 +163,11 @@ UNDECODABLE = Key(
     delivery=STORED, writers=ANYONE, readers=PERSON | RECORDER,
     about="A value that is not what its key promises: which key, why, how often.",
 )
+DIAGNOSTIC = Key(
+    "diagnostic", "diagnostics/{component}/{check}", system.DiagnosticAddress, system.Diagnostic,
+    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
+    about="What is wrong with a component now; nothing there means that all is well.",
+)
 STORE_JOURNAL = Key(
     "store_journal", "store/journal", system.StoreAddress, system.StoreQuery,
     delivery=QUERY, writers=ANYONE, readers=STORE,

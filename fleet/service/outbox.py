@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Iterable, Iterator
 from contextlib import asynccontextmanager
+from itertools import chain
 
 from fleet.core.effects import Publish, Retract
 from keyexpr_schema.errors import SchemaError, UndecodablePayload
@@ -29,6 +30,7 @@ class Outbox:
         self._session = session
         self._wanted: dict[str, Publish | Retract] = {}
         self._busy: set[str] = set()
+        self._writing: dict[str, Publish | Retract] = {}
         self._room = asyncio.Semaphore(IN_FLIGHT)
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -41,6 +43,11 @@ class Outbox:
             for task in self._tasks:
                 task.cancel()
             await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    @property
+    def unconfirmed(self) -> Iterator[Publish | Retract]:
+        """What was sent and is not confirmed."""
+        return chain(self._writing.values(), self._wanted.values())
 
     def send(self, effects: Iterable[Publish | Retract]) -> None:
         """Want these values at their keys."""
@@ -56,6 +63,7 @@ class Outbox:
     async def _write(self, keyexpr: str) -> None:
         async with self._room:
             while (effect := self._wanted.pop(keyexpr, None)) is not None:
+                self._writing[keyexpr] = effect
                 try:
                     if isinstance(effect, Publish):
                         await self._session.confirm(
@@ -69,4 +77,5 @@ class Outbox:
                     log.warning("%s", error)
                     self._wanted.setdefault(keyexpr, effect)
                     await asyncio.sleep(_RETRY_S)
+                del self._writing[keyexpr]
         self._busy.discard(keyexpr)

@@ -10,6 +10,7 @@ from keyexpr_schema.lazy import lazy_names
 if TYPE_CHECKING:
     from workers.embodiment import *  # noqa: F403
     from workers.errors import *  # noqa: F403
+    from workers.orders.journal import *  # noqa: F403
     from workers.process import *  # noqa: F403
     from workers.skill_context import *  # noqa: F403
     from workers.skill_registry import *  # noqa: F403
@@ -23,9 +24,10 @@ else:
             "embodiment": "Embodiment EmbodimentFactory",
             "errors": (
                 "BadArguments BadSkill JournalBusy JournalUnreadable RobotTaken "
-                "RobotUnreachable SkillFailed UnknownSkill WorkerError"
+                "RobotUnreachable SkillFailed UnknownSkill WorkerError WorkersEnded"
             ),
-            "process": "run_worker",
+            "orders.journal": "Retention",
+            "process": "run_worker run_workers",
             "skill_registry": "ParameterKind Skill SkillRegistry skill",
             "skills.household": "HOUSEHOLD",
             "world_cache": "WorldCache",

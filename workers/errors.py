@@ -54,3 +54,7 @@ class RobotTaken(WorkerError):
 
 class JournalUnreadable(WorkerError):
     """The journal's file is not a journal that this version can read."""
+
+
+class WorkersEnded(WorkerError):
+    """A process of several workers ended, and some of its robots were not served then."""

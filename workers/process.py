@@ -1,4 +1,4 @@
-"""A worker as a process: `run_worker` is the main function of `robotctl worker`."""
+"""Workers as a process: `run_workers` is the main function of `robotctl worker`."""
 
 from __future__ import annotations
 
@@ -6,23 +6,36 @@ import asyncio
 import logging
 import secrets
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import AbstractAsyncContextManager, AsyncExitStack
+from contextvars import ContextVar
 from pathlib import Path
 
+from keyexpr_schema.errors import BrokenPlugIn, SchemaError
 from keyexpr_schema.ids import check_id
-from keyexpr_schema.keyspace import ROBOT_SPEC
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.signals import run_until_signal
-from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from keyexpr_schema.transport.session import SessionConfig, open_session
 from workers.embodiment import Embodiment, EmbodimentFactory
-from workers.orders.journal import Journal
+from workers.errors import JournalBusy, JournalUnreadable, RobotTaken, WorkerError, WorkersEnded
+from workers.orders.journal import KEPT, Journal, Retention
 from workers.runtime import Worker
+from workers.shared_watch import SharedWatch
 from workers.skill_registry import Skill, SkillRegistry
 from workers.skills.household import HOUSEHOLD
 
 WAITING_LINE_S = 1.0
 """Wall seconds of waiting for a robot to be registered before it is announced."""
+AGAIN_S, LONGEST_AGAIN_S = 1.0, 60.0
+"""Wall seconds before a robot that could not be served is tried again; twice as long each time."""
+HELD_UP_S = 5.0
+"""The same, for a robot that another process serves: it is free as soon as that one ends."""
+
+HOPELESS = (JournalUnreadable, BrokenPlugIn)
+"""What trying again does not help."""
+
+_robot: ContextVar[str] = ContextVar("robot")
+_log = logging.getLogger("robotfleet.worker.process")
 
 
 def run_worker(
@@ -33,6 +46,7 @@ def run_worker(
     embodiment_factory: EmbodimentFactory,
     *,
     skills: Iterable[Skill] = HOUSEHOLD,
+    retention: Retention = KEPT,
 ) -> None:
     """Be the worker of `robot` until SIGTERM or SIGINT; then stop the robot and return.
 
@@ -45,68 +59,185 @@ def run_worker(
         InvalidId: `robot` or `realm` cannot stand in a key.
         JournalBusy: another worker runs for this robot on the same `data_dir`.
         JournalUnreadable: the journal's file is something else.
+        RobotTaken: another worker of this robot is connected.
         BadSkill: two of `skills` share a name.
     """
-    check_id(robot, "robot")
+    run_workers(
+        {robot: data_dir},
+        endpoints,
+        realm,
+        embodiment_factory,
+        skills=skills,
+        retention=retention,
+    )
+
+
+def run_workers(
+    data_dirs: Mapping[str, Path],
+    endpoints: tuple[str, ...],
+    realm: str,
+    embodiment_factory: EmbodimentFactory,
+    *,
+    skills: Iterable[Skill] = HOUSEHOLD,
+    retention: Retention = KEPT,
+) -> None:
+    """Be the workers of several robots, each with the folder of its journal; see `run_worker`.
+
+    They share a Zenoh session and what they know of the world, and nothing else. One that fails is
+    reported on stderr and does not disturb the others. It is tried again, again and again; it has
+    ended where that cannot help (a journal that cannot be read, an embodiment that cannot be made).
+
+    A single robot is not tried again: what went wrong is raised.
+
+    Raises:
+        WorkersEnded: at the end, if some robots were not served then; it names them, with reasons.
+        InvalidId: a robot or `realm` cannot stand in a key.
+        BadSkill: two of `skills` share a name.
+    """
+    for robot in data_dirs:
+        check_id(robot, "robot")
+    first, alone = next(iter(data_dirs)), len(data_dirs) == 1
     config = SessionConfig(
         endpoints=endpoints,
         realm=realm,
-        component=f"worker-{robot}",
+        component=f"worker-{first}" if alone else f"workers-{first}",
         connect_timeout_s=None,
     )
-    logging.basicConfig(
-        stream=sys.stderr, level=logging.INFO, format=f"{robot}: %(levelname)s: %(message)s"
-    )
+    _log_to_stderr(first if alone else "workers")
     registry = SkillRegistry.installed(skills)
-    with Journal(data_dir / f"{robot}.journal") as journal:
-        run_until_signal(_work(robot, config, journal, registry, embodiment_factory))
-
-
-async def _work(
-    robot: str,
-    config: SessionConfig,
-    journal: Journal,
-    registry: SkillRegistry,
-    embodiment_factory: EmbodimentFactory,
-) -> None:
-    async with AsyncExitStack() as stack:
-        session = await stack.enter_async_context(open_session(config))
-        spec = await _registered(session, robot)
-        incarnation = f"{robot[:40]}-{secrets.token_hex(4)}"
-        made = embodiment_factory(session, spec, incarnation)
-        body: Embodiment = (
-            await stack.enter_async_context(made)
-            if isinstance(made, AbstractAsyncContextManager)
-            else made
+    process = _Process(config, registry, embodiment_factory, retention, alone=alone)
+    run_until_signal(process.serve(data_dirs))
+    if alone and process.failures:
+        raise process.failures[first]
+    if process.failures:
+        raise WorkersEnded(
+            f"{len(process.failures)} of {len(data_dirs)} robots were not served: "
+            + "; ".join(f"{robot}: {_sentence(e)}" for robot, e in process.failures.items())
         )
-        worker = Worker(session, spec, body, journal, registry, incarnation)
-        announcing = asyncio.create_task(_announce_ready(worker))
+
+
+class _Process:
+    """All robots of a process. `failures` are the robots that are not served now, and why."""
+
+    def __init__(
+        self,
+        config: SessionConfig,
+        registry: SkillRegistry,
+        embodiment_factory: EmbodimentFactory,
+        retention: Retention,
+        *,
+        alone: bool,
+    ) -> None:
+        self.failures: dict[str, Exception] = {}
+        self._config, self._registry = config, registry
+        self._embodiment_factory, self._retention = embodiment_factory, retention
+        self._alone = alone
+
+        self._connected = asyncio.Event()
+
+    async def serve(self, data_dirs: Mapping[str, Path]) -> None:
+        """Serve until cancelled, or until no robot is left that could be."""
+        async with asyncio.TaskGroup() as group:
+            connecting = group.create_task(self._connect(data_dirs))
+            async with asyncio.TaskGroup() as robots:
+                for robot, data_dir in data_dirs.items():
+                    robots.create_task(self._attend(robot, data_dir))
+            connecting.cancel()
+
+    async def _connect(self, robots: Iterable[str]) -> None:
+        async with open_session(self._config) as self._session:
+            self._shared = SharedWatch(self._session, *robots)
+            self._connected.set()
+            await self._shared.run()
+
+    async def _attend(self, robot: str, data_dir: Path) -> None:
+        """Serve one robot, as often as it takes; nothing that fails in it leaves this method."""
+        _robot.set(robot)
+        pause_s = AGAIN_S
+        while True:
+            try:
+                await self._work(robot, data_dir)
+            except Exception as error:  # also what a stranger's embodiment raises
+                if robot not in self.failures:
+                    pause_s = AGAIN_S
+                self.failures[robot] = error
+                if self._alone:
+                    return
+                cause = _cause(error)
+                known = isinstance(cause, (WorkerError, SchemaError))
+                held_up = isinstance(cause, (JournalBusy, RobotTaken))
+                _log.error("%s", _sentence(error), exc_info=None if known else error)
+                if isinstance(cause, HOPELESS):
+                    _log.error("%s is not served any more; the other robots are", robot)
+                    return
+                await asyncio.sleep(HELD_UP_S if held_up else pause_s)
+                pause_s = min(2 * pause_s, LONGEST_AGAIN_S)
+
+    async def _work(self, robot: str, data_dir: Path) -> None:
+        """Serve one robot until it fails."""
+        async with AsyncExitStack() as stack:
+            # Before there is a router: whoever starts a second one hears of it at once.
+            journal = Journal(data_dir / f"{robot}.journal", self._retention)
+            await asyncio.to_thread(journal.__enter__)
+            stack.push(journal)
+            await self._connected.wait()
+            spec = await self._registered(robot)
+            incarnation = f"{robot[:40]}-{secrets.token_hex(4)}"
+            made = self._embodiment_factory(self._session, spec, incarnation)
+            body: Embodiment = (
+                await stack.enter_async_context(made)
+                if isinstance(made, AbstractAsyncContextManager)
+                else made
+            )
+            worker = Worker(
+                self._session, spec, body, journal, self._registry, incarnation, self._shared
+            )
+            announcing = asyncio.create_task(self._announce_ready(worker))
+            try:
+                await worker.run()
+            finally:
+                announcing.cancel()
+
+    async def _registered(self, robot: str) -> RobotSpec:
+        """The robot's spec, as soon as somebody has registered it."""
+        finding = asyncio.create_task(self._shared.registered(robot))
         try:
-            await worker.run()
+            done, _ = await asyncio.wait({finding}, timeout=WAITING_LINE_S)
+            if not done:
+                print(f"worker {robot} waits: the robot is not registered yet", flush=True)  # noqa: T201
+            return await finding
         finally:
-            announcing.cancel()
+            finding.cancel()
+
+    async def _announce_ready(self, worker: Worker) -> None:
+        await worker.ready()
+        robot = worker.spec.robot
+        self.failures.pop(robot, None)
+        print(f"worker {robot} ready (incarnation {worker.incarnation})", flush=True)  # noqa: T201
 
 
-async def _registered(session: Session, robot: str) -> RobotSpec:
-    """The robot's spec, as soon as somebody has registered it."""
-
-    async def first() -> RobotSpec:
-        async with session.watch((ROBOT_SPEC, {"robot": robot})) as watch:
-            async for change in watch:
-                if change.value is not None:
-                    return change.value  # type: ignore[no-any-return]
-        raise AssertionError("a watch does not end")
-
-    finding = asyncio.create_task(first())
-    try:
-        done, _ = await asyncio.wait({finding}, timeout=WAITING_LINE_S)
-        if not done:
-            print(f"worker {robot} waits: the robot is not registered yet", flush=True)  # noqa: T201
-        return await finding
-    finally:
-        finding.cancel()
+def _cause(error: BaseException) -> BaseException:
+    while isinstance(error, BaseExceptionGroup):
+        error = error.exceptions[0]
+    return error
 
 
-async def _announce_ready(worker: Worker) -> None:
-    await worker.ready()
-    print(f"worker {worker.spec.robot} ready (incarnation {worker.incarnation})", flush=True)  # noqa: T201
+def _sentence(error: BaseException) -> str:
+    """What went wrong, for a person."""
+    cause = _cause(error)
+    if isinstance(cause, (WorkerError, SchemaError)):
+        return str(cause)
+    return f"{type(cause).__name__}: {cause}"
+
+
+def _log_to_stderr(otherwise: str) -> None:
+    """Log lines begin with the robot that they are about, or `otherwise`."""
+
+    def name_robot(record: logging.LogRecord) -> bool:
+        record.robot = _robot.get(otherwise)
+        return True
+
+    handler = logging.StreamHandler(sys.stderr)
+    handler.addFilter(name_robot)
+    line = "%(robot)s: %(levelname)s: %(message)s"
+    logging.basicConfig(handlers=[handler], level=logging.INFO, format=line)

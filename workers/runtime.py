@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from contextlib import suppress
 
 from msgspec.structs import replace
 
 from keyexpr_schema.errors import SchemaError
-from keyexpr_schema.keyspace import ORDER, ROBOT_ALIVE
+from keyexpr_schema.keyspace import ROBOT_ALIVE
 from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotSpec
-from keyexpr_schema.payloads.tasks import Order, OrderAddress, Report, ReportState
-from keyexpr_schema.transport.session import Session, Watch
+from keyexpr_schema.payloads.tasks import Order, Report, ReportState
+from keyexpr_schema.transport.session import Session
 from workers.embodiment import Embodiment
 from workers.errors import BadArguments, UnknownSkill
 from workers.orders.fencing import Phase
@@ -27,17 +28,21 @@ from workers.recovery import (
     was_interrupted,
 )
 from workers.retry import run_attempt
+from workers.shared_watch import SharedWatch
 from workers.skill_context import SkillContext
 from workers.skill_registry import SkillRegistry
 from workers.state_publisher import StatePublisher
-from workers.world_cache import WORLD_KEYS, WorldCache
 
 DRAIN_S = 3.0
 """Wall seconds that a worker which ends spends on getting its last report out."""
+REPEAT_S = 5.0
+"""Wall seconds between two looks whether the reports of attempts that are still ordered are there.
+It costs nothing while there are none."""
 
 
 class Worker:
-    """One robot's worker. The journal must be open; `run` ends by being cancelled."""
+    """One robot's worker. The journal must be open and `shared` be running; `run` ends by being
+    cancelled."""
 
     def __init__(
         self,
@@ -47,6 +52,7 @@ class Worker:
         journal: Journal,
         registry: SkillRegistry,
         incarnation: str,
+        shared: SharedWatch,
     ) -> None:
         self.spec = spec
         self.incarnation = incarnation
@@ -54,11 +60,11 @@ class Worker:
         self._embodiment = embodiment
         self._journal = journal
         self._registry = registry
-        self._world = WorldCache()
+        self._shared = shared
+        self._world = shared.world
         self._state_publisher = StatePublisher(session, embodiment, incarnation)
         self._outbox = Outbox(session, journal, embodiment.now_s)
         self._order_queue = OrderQueue(session, journal, self._outbox, spec.robot, incarnation)
-        self._arrived: asyncio.Queue[tuple[OrderAddress, Order | None]] = asyncio.Queue()
         self._ready = asyncio.Event()
         self._log = logging.getLogger(f"robotfleet.worker.{spec.robot}")
 
@@ -76,15 +82,14 @@ class Worker:
             RobotTaken: another worker of this robot is connected.
         """
         robot = self.spec.robot
-        watched = self._session.watch(*WORLD_KEYS, (ORDER, {"robot": robot}))
         alive = self._session.token(ROBOT_ALIVE, AliveAddress(robot, self.incarnation))
         await ensure_single_worker(self._session, robot)
         sending = asyncio.create_task(self._outbox.run())
         try:
-            async with watched as watch, alive:
+            async with alive:
                 try:
                     async with asyncio.TaskGroup() as group:
-                        await self._serve(watch, sending, group)
+                        await self._serve(sending, group)
                 finally:
                     # While the token is still there: who sees it go must find the last report.
                     await self._drain_outbox()
@@ -92,15 +97,13 @@ class Worker:
             sending.cancel()
             await asyncio.gather(sending, return_exceptions=True)
 
-    async def _serve(
-        self, watch: Watch, sending: asyncio.Task[None], group: asyncio.TaskGroup
-    ) -> None:
-        group.create_task(self._follow(watch))
+    async def _serve(self, sending: asyncio.Task[None], group: asyncio.TaskGroup) -> None:
         await first_senses(self._embodiment)
         group.create_task(self._state_publisher.run())
-        await watch.synced()
+        await self._shared.synced()
         await self._recover()
         group.create_task(self._receive_orders())
+        group.create_task(self._repeat_reports())
         group.create_task(self._execute())
         group.create_task(_propagate(sending))
         self._ready.set()
@@ -116,16 +119,22 @@ class Worker:
 
     # --- what comes in ---------------------------------------------------------------------------
 
-    async def _follow(self, watch: Watch) -> None:
-        async for change in watch:
-            if change.key is ORDER:
-                self._arrived.put_nowait((change.address, change.value))
-            else:
-                self._world.apply(change)
-
     async def _receive_orders(self) -> None:
+        with self._shared.orders(self.spec.robot) as arrivals:
+            for _ in range(arrivals.qsize()):
+                await self._order_queue.receive(*arrivals.get_nowait())
+            self._order_queue.all_received()
+            while True:
+                await self._order_queue.receive(*await arrivals.get())
+
+    async def _repeat_reports(self) -> None:
+        """Say again what the store has lost: at the start, after a reconnection, and for ever."""
         while True:
-            await self._order_queue.receive(*await self._arrived.get())
+            connections = self._session.connections
+            await self._order_queue.repeat_what_is_missing()
+            with suppress(TimeoutError):
+                async with asyncio.timeout(REPEAT_S):
+                    await self._session.wait_reconnected(connections)
 
     # --- what is done ----------------------------------------------------------------------------
 

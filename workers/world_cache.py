@@ -45,10 +45,10 @@ class WorldCache:
         self._changed.set()
         self._changed = asyncio.Event()
 
-    async def until(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+    async def until(self, condition: Callable[[], bool], timeout_s: float | None = None) -> bool:
         """Wait until `condition` holds, looking again at every change; whether it came to hold.
 
-        `timeout_s` is wall time: what is waited for are messages of others.
+        `timeout_s` is wall time (`None`: for ever): what is waited for are messages of others.
         """
         try:
             async with asyncio.timeout(timeout_s):

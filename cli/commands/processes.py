@@ -123,30 +123,44 @@ def planner(
 @single
 def worker(
     call: Call,
-    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Which registered robot.")],
+    robots: Annotated[
+        list[str],
+        typer.Argument(metavar="ROBOT...", help="Which registered robots; one process for all."),
+    ],
     data: DataOption = None,
     embodiment: Annotated[
-        str, typer.Option("--embodiment", help="What drives the robot; `sim` or a plug-in's name.")
+        str, typer.Option("--embodiment", help="What drives the robots; `sim` or a plug-in's name.")
     ] = SIM,
+    keep: Annotated[
+        int,
+        typer.Option(
+            "--keep", metavar="N", min=0, help="Attempts that are over a journal keeps, at most."
+        ),
+    ] = 100,
+    keep_days: Annotated[
+        float, typer.Option("--keep-days", metavar="DAYS", min=0.0, help="And for how long.")
+    ] = 7.0,
 ) -> None:
-    """Run one robot's worker: it takes orders and carries them out."""
+    """Run the workers of robots: they take orders and carry them out."""
     from cli.demo.child_processes import end_with_parent
-    from cli.errors import check_known
+    from cli.errors import BadArgument, check_known
     from keyexpr_schema.plug_ins import plug_in_names
     from sim.embodiment import sim_embodiment
     from workers.embodiment import EMBODIMENTS, installed_embodiment
-    from workers.process import run_worker
+    from workers.orders.journal import Retention
+    from workers.process import run_workers
 
     check_known("embodiment", embodiment, [SIM, *plug_in_names(EMBODIMENTS)])
+    for robot in robots:
+        if robots.count(robot) > 1:
+            raise BadArgument(f"{robot} is named twice: a robot has one worker")
     end_with_parent()
-    run_worker(
-        robot=robot,
-        endpoints=call.settings.routers,
-        realm=call.settings.realm,
-        data_dir=data_folder(data, f"worker-{robot}", call.settings.realm),
-        embodiment_factory=(
-            sim_embodiment if embodiment == SIM else installed_embodiment(embodiment)
-        ),
+    run_workers(
+        {robot: data_folder(data, f"worker-{robot}", call.settings.realm) for robot in robots},
+        call.settings.routers,
+        call.settings.realm,
+        sim_embodiment if embodiment == SIM else installed_embodiment(embodiment),
+        retention=Retention(count=keep, age_s=keep_days * 24 * 3600.0),
     )
 
 

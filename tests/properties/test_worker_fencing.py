@@ -23,17 +23,27 @@ from workers.orders.fencing import (
     Refuse,
     Renew,
     Repeat,
-    attempt_name,
     decide,
     superseded,
 )
-from workers.orders.journal import Journal
+from workers.orders.journal import Journal, Retention
 from workers.orders.outbox import make_report
 
 small = st.integers(1, 3)
+
+
+def numbered(order: Order) -> Order:
+    """The order with the serial that the second lineage gives its attempt: rising, never twice."""
+    if order.planner != "numbering":
+        return replace(order, serial=0)
+    task = (order.plan == "q") * 2 + (order.task == "t2")
+    return replace(order, serial=4 * order.attempt + task)
+
+
 orders = st.builds(
     Order,
     robot=st.just("hsr"),
+    planner=st.sampled_from([None, "counting", "numbering"]),
     plan=st.sampled_from(["p", "q"]),
     task=st.sampled_from(["t1", "t2"]),
     revision=small,
@@ -43,7 +53,7 @@ orders = st.builds(
     args=st.just({"robot": "hsr", "to": "kitchen"}),
     deadline_s=st.just(60.0),
     cancelled=st.booleans(),
-)
+).map(numbered)
 
 
 class Fenced:
@@ -54,7 +64,7 @@ class Fenced:
         self.queue: list[AttemptName] = []
         self.running: AttemptName | None = None
         self.started: list[AttemptName] = []
-        self.fences: tuple[int, dict[str, int]] = (0, {})
+        self.epoch = 0
         self.met: set[str] = set()
 
     def end(self, name: AttemptName, state: ReportState) -> None:
@@ -63,10 +73,10 @@ class Fenced:
         self.ledger.put(Attempt(order, Phase.ENDED, report))
 
     def deliver(self, order: Order) -> None:
-        name = attempt_name(order)
+        name = AttemptName.of(order)
         before = self.ledger.attempts.get(name)
         older = order.epoch < self.ledger.epoch or order.revision < self.ledger.revisions.get(
-            order.plan, 0
+            name.in_plan, 0
         )
         decision = decide(self.ledger, order)
         self.met.add(type(decision).__name__)
@@ -79,7 +89,8 @@ class Fenced:
             case Accept():
                 assert not order.cancelled
                 assert order.attempt > max(
-                    (a for *t, a in self.started if t == [*name[:2]]), default=0
+                    (done.attempt for done in self.started if done.of_task == name.of_task),
+                    default=0,
                 )
                 for past in superseded(self.ledger, order):
                     if past in self.queue:
@@ -103,8 +114,10 @@ class Fenced:
                     self.ledger.put(
                         Attempt(order, Phase.ENDED, make_report(order, "r", ReportState.CANCELLED))
                     )
-            case Refuse():
+            case Refuse(reason):
                 assert before is None
+                if "forgotten" in reason:
+                    self.met.add("refused as forgotten")
             case Repeat() | Ignore():
                 pass
 
@@ -112,13 +125,42 @@ class Fenced:
         names = list(self.ledger.attempts)
         if not names:
             return
-        order = self.ledger.attempts[names[-1 - number % len(names)]].order
+        name = names[-1 - number % len(names)]
+        order = self.ledger.attempts[name].order
         epoch = self.ledger.epoch + newer
-        revision = self.ledger.revisions[order.plan] + newer
+        revision = self.ledger.revisions[name.in_plan] + newer
         attempt = order.attempt + next_attempt
-        self.deliver(
-            replace(order, epoch=epoch, revision=revision, cancelled=cancelled, attempt=attempt)
+        again = replace(order, epoch=epoch, revision=revision, cancelled=cancelled, attempt=attempt)
+        self.deliver(numbered(again))
+
+    def deliver_what_ran(self, number: int) -> None:
+        """An order of an attempt that was carried out once, by a newer planner and revision."""
+        if not self.started:
+            return
+        name = self.started[-1 - number % len(self.started)]
+        if name not in self.ledger.attempts:
+            self.met.add("ordered after it was forgotten")
+        order = Order(
+            robot="hsr",
+            planner=name.planner,
+            plan=name.plan,
+            task=name.task,
+            revision=self.ledger.revisions.get(name.in_plan, 0) + 1,
+            attempt=name.attempt,
+            epoch=self.ledger.epoch + 1,
+            skill="navigate",
+            args={"robot": "hsr", "to": "kitchen"},
+            deadline_s=60.0,
         )
+        self.deliver(numbered(order))
+        assert self.queue.count(name) == 0
+
+    def forget(self) -> None:
+        """Forget the oldest attempt that has ended."""
+        for attempt in self.ledger.in_phase(Phase.ENDED):
+            self.ledger.forget(attempt.name)
+            self.met.add("forgotten with a serial" if attempt.order.serial else "forgotten")
+            break
 
     def go_on(self, state: ReportState = ReportState.FAILED) -> None:
         """End what runs, or else start what is first in the queue."""
@@ -135,25 +177,28 @@ class Fenced:
             self.ledger.drop(self.queue.pop())
 
     def crash_and_restart(self) -> None:
-        kept = Ledger(epoch=self.ledger.epoch, revisions=dict(self.ledger.revisions))
+        kept = Ledger(
+            epoch=self.ledger.epoch,
+            revisions=dict(self.ledger.revisions),
+            forgotten=dict(self.ledger.forgotten),
+            unnumbered=dict(self.ledger.unnumbered),
+        )
         for attempt in self.ledger.attempts.values():
             if attempt.phase is not Phase.QUEUED:
                 kept.put(attempt)
         self.ledger, self.queue, self.running = kept, [], None
         for attempt in kept.in_phase(Phase.STARTED):
             self.met.add("interrupted by a crash")
-            self.end(attempt_name(attempt.order), ReportState.INTERRUPTED)
+            self.end(attempt.name, ReportState.INTERRUPTED)
 
     def check(self) -> None:
-        """One attempt never runs twice; attempts of a task start in order; fences only rise."""
+        """One attempt never runs twice; attempts of a task start in order; the epoch only rises."""
         assert len(self.started) == len(set(self.started))
-        for plan, task in {name[:2] for name in self.started}:
-            attempts = [a for p, t, a in self.started if (p, t) == (plan, task)]
+        for of_task in {name.of_task for name in self.started}:
+            attempts = [name.attempt for name in self.started if name.of_task == of_task]
             assert attempts == sorted(attempts)
-        epoch, revisions = self.fences
-        assert self.ledger.epoch >= epoch
-        assert all(self.ledger.revisions[plan] >= seen for plan, seen in revisions.items())
-        self.fences = (self.ledger.epoch, dict(self.ledger.revisions))
+        assert self.ledger.epoch >= self.epoch
+        self.epoch = self.ledger.epoch
 
 
 Step = Callable[[Fenced], None]
@@ -166,7 +211,17 @@ steps: st.SearchStrategy[Step] = st.one_of(
         st.integers(0, 1),
         st.integers(0, 1),
     ),
-    st.sampled_from([Fenced.go_on, Fenced.go_on, Fenced.withdraw, Fenced.crash_and_restart]),
+    st.builds(lambda n: lambda m: m.deliver_what_ran(n), st.integers(0, 9)),
+    st.sampled_from(
+        [
+            Fenced.go_on,
+            Fenced.go_on,
+            Fenced.forget,
+            Fenced.forget,
+            Fenced.withdraw,
+            Fenced.crash_and_restart,
+        ]
+    ),
 )
 
 
@@ -175,6 +230,10 @@ steps: st.SearchStrategy[Step] = st.one_of(
     "superseded in the queue",
     "cancelled while it ran",
     "interrupted by a crash",
+    "forgotten",
+    "forgotten with a serial",
+    "ordered after it was forgotten",
+    "refused as forgotten",
 )
 @settings(max_examples=300, deadline=None)
 @given(st.lists(steps, min_size=15, max_size=50))
@@ -186,13 +245,19 @@ def test_one_attempt_never_runs_twice_whatever_comes(reached: Reached, taken: li
     reached.update(fenced.met)
 
 
-@reaches("queue", "start", "end", "dropped")
+@reaches("queue", "start", "end", "dropped", "forgotten")
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     st.lists(
         st.tuples(
-            orders.map(lambda order: replace(order, task="t1")),
-            st.sampled_from(["queue", "start", "end", "open"]),
+            st.builds(
+                lambda order, numbers: numbered(
+                    replace(order, task="t1", plan="p", planner="numbering" if numbers else None)
+                ),
+                orders,
+                st.booleans(),
+            ),
+            st.sampled_from(["queue", "start", "end", "open", "forget"]),
         ),
         min_size=8,
         max_size=14,
@@ -204,10 +269,11 @@ def test_the_journal_on_disk_is_the_ledger_in_memory(
     with TemporaryDirectory() as folder:
         path = Path(folder) / "hsr.journal"
         ledger = Ledger()
-        journal = Journal(path).__enter__()
+        keep = Retention(count=1)
+        journal = Journal(path, keep, lambda: 5.0).__enter__()
         try:
             for order, step in steps:
-                name = attempt_name(order)
+                name = AttemptName.of(order)
                 if step == "queue" and name not in ledger.attempts:
                     reached[step] += 1
                     journal.queued(order)
@@ -220,15 +286,27 @@ def test_the_journal_on_disk_is_the_ledger_in_memory(
                     reached[step] += 1
                     report = make_report(order, "r", ReportState.SUCCEEDED)
                     journal.ended(order, report)
-                    ledger.put(Attempt(order, Phase.ENDED, report))
+                    ledger.put(Attempt(order, Phase.ENDED, report, 5.0))
+                elif step == "forget":
+                    while (unsent := journal.unsent()) is not None:
+                        journal.sent(unsent.number)
+                    journal.forget(name.__eq__)
+                    for known in set(ledger.attempts) - set(journal.ledger.attempts):
+                        reached["forgotten"] += 1
+                        assert known != name
+                        ledger.forget(known)
+                    ended = list(ledger.in_phase(Phase.ENDED))
+                    assert len(ledger.attempts) <= 1 or len(ended) <= 1
                 elif step == "open":
                     journal.__exit__(None, None, None)
-                    journal = Journal(path).__enter__()
+                    journal = Journal(path, keep, lambda: 5.0).__enter__()
                     for attempt in ledger.in_phase(Phase.QUEUED):
                         reached["dropped"] += 1
-                        ledger.drop(attempt_name(attempt.order))
+                        ledger.drop(attempt.name)
                 assert journal.ledger.epoch == ledger.epoch
                 assert journal.ledger.revisions == ledger.revisions
                 assert journal.ledger.attempts == ledger.attempts
+                assert journal.ledger.forgotten == ledger.forgotten
+                assert journal.ledger.unnumbered == ledger.unnumbered
         finally:
             journal.__exit__(None, None, None)

@@ -24,6 +24,7 @@ from sim.files.mission_file import Mission, load_mission
 from sim.files.world_payloads import object_payloads, place_payloads
 from workers.orders.journal import Journal
 from workers.runtime import Worker
+from workers.shared_watch import SharedWatch
 from workers.skill_registry import Skill, SkillRegistry
 from workers.skills.household import HOUSEHOLD
 
@@ -125,6 +126,8 @@ class Planner:
         epoch: int = 1,
         revision: int = 1,
         cancelled: bool = False,
+        planner: str | None = None,
+        serial: int = 0,
         **args: str,
     ) -> Order:
         """Give an order, as a planner would."""
@@ -139,6 +142,8 @@ class Planner:
             args={"robot": robot, **args},
             deadline_s=deadline_s,
             cancelled=cancelled,
+            planner=planner,
+            serial=serial,
         )
         await self.session.confirm(ORDER, OrderAddress(robot, "p", task), order)
         return order
@@ -198,7 +203,10 @@ class Fleet(Planner):
             )
             body = BackendBody(self.world, robot)
             registry = SkillRegistry([*HOUSEHOLD, *more])
-            worker = Worker(session, spec, body, journal, registry, f"{robot}-1")
+            shared = SharedWatch(session, robot)
+            following = asyncio.create_task(shared.run())
+            stack.callback(following.cancel)
+            worker = Worker(session, spec, body, journal, registry, f"{robot}-1", shared)
             running = asyncio.create_task(worker.run())
             ready = asyncio.create_task(worker.ready())
             try:

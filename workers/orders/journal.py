@@ -1,14 +1,16 @@
 """The order journal: what must survive a crash of the worker, in one SQLite file a robot.
 
 WAL with `synchronous=FULL`: when a method returns, what it wrote is on the disk, even if the power
-goes. That costs a few milliseconds a write, and there are some three writes an attempt. The file
-is held exclusively while it is open: two workers for one robot cannot both move it.
+goes. That costs a few milliseconds a write, and there are some three writes an attempt. What may be
+lost in a power cut without harm (that something was sent, or is over) does not wait for the disk.
+The file is held exclusively while it is open: two workers for one robot cannot both move it.
 """
 
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,26 +22,16 @@ from keyexpr_schema.key import Payload
 from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact
 from workers.errors import JournalBusy, JournalUnreadable
-from workers.orders.fencing import Attempt, AttemptName, Ledger, Phase, attempt_name
+from workers.orders.fencing import (
+    Attempt,
+    AttemptName,
+    Ledger,
+    Phase,
+    PlanName,
+    TaskName,
+)
+from workers.orders.journal_file import VERSION, prepare_tables
 
-VERSION = 1
-_TABLES = """
-CREATE TABLE IF NOT EXISTS fence (
-    name TEXT PRIMARY KEY,            -- '' for the epoch, else a plan
-    highest INTEGER NOT NULL
-) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS attempt (
-    number INTEGER PRIMARY KEY,       -- order of arrival
-    plan TEXT NOT NULL, task TEXT NOT NULL, attempt INTEGER NOT NULL,
-    phase TEXT NOT NULL, "order" BLOB NOT NULL, report BLOB,
-    UNIQUE (plan, task, attempt)
-);
-CREATE TABLE IF NOT EXISTS outbox (
-    number INTEGER PRIMARY KEY AUTOINCREMENT,
-    kind TEXT NOT NULL,               -- 'fact' or 'report'
-    payload BLOB NOT NULL
-);
-"""
 _KINDS: dict[str, type[Payload]] = {"fact": Fact, "report": Report}
 
 
@@ -55,18 +47,45 @@ class Unsent:
     earlier_run: bool
 
 
+@dataclass(frozen=True)
+class Retention:
+    """How many attempts that are over are kept, and for how long at most [s].
+
+    An attempt is over when it has ended, its report is in the store, and its order is gone.
+    """
+
+    count: int = 100
+    age_s: float = 7 * 24 * 3600.0
+
+
+KEPT = Retention()
+
+
 class Journal:
     """Orders, attempts and unsent facts and reports of one robot. Use it as a context manager.
 
     `ledger` holds the same attempts in memory; the journal keeps the two in step. At opening,
     attempts that were queued are forgotten: their orders, if they still stand, arrive again.
+
+    Opening blocks for as long as the file is read, and may be done in another thread; all else is
+    for one thread at a time. `wall_s` gives Unix seconds.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(
+        self,
+        path: Path,
+        retention: Retention = KEPT,
+        wall_s: Callable[[], float] = time.time,
+    ) -> None:
         self.path = path
         self.ledger = Ledger()
+        self._retention = retention
+        self._wall_s = wall_s
         self._db: sqlite3.Connection | None = None
         self._earlier = 0
+        self._reports: dict[int, AttemptName] = {}
+        """The attempts of the reports that wait to be sent, by number."""
+        self._last_report: dict[AttemptName, int] = {}
 
     def __enter__(self) -> Self:
         """Open the file, or make it.
@@ -76,21 +95,17 @@ class Journal:
             JournalUnreadable: it is not a journal, or one of another version.
         """
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        db = sqlite3.connect(self.path, timeout=0.5, isolation_level=None)
+        db = sqlite3.connect(self.path, timeout=0.5, isolation_level=None, check_same_thread=False)
         try:
             db.execute("PRAGMA locking_mode=EXCLUSIVE")
             db.execute("PRAGMA journal_mode=WAL")
             db.execute("PRAGMA synchronous=FULL")
             db.execute("BEGIN IMMEDIATE")
-            (version,) = db.execute("PRAGMA user_version").fetchone()
-            if version not in (0, VERSION):
+            if (version := prepare_tables(db)) != VERSION:
                 raise JournalUnreadable(
                     f"{self.path} is an order journal of version {version}, this worker reads "
                     f"version {VERSION}: give the worker another data directory"
                 )
-            db.execute(f"PRAGMA user_version={VERSION}")
-            for statement in _TABLES.split(";"):
-                db.execute(statement)
             db.execute("DELETE FROM attempt WHERE phase=?", (Phase.QUEUED.value,))
             self._load(db)
             db.execute("COMMIT")
@@ -126,7 +141,7 @@ class Journal:
 
         A running attempt stays what it was when it started; only the fences go up.
         """
-        attempt = self.ledger.attempts[attempt_name(order)]
+        attempt = self.ledger.attempts[AttemptName.of(order)]
         known = order if attempt.phase is Phase.QUEUED else attempt.order
         with self._transaction():
             self._fence(order)
@@ -142,7 +157,7 @@ class Journal:
     def ended(self, order: Order, report: Report) -> None:
         """The attempt has ended; its facts, then its report, wait to be sent."""
         with self._transaction():
-            self._write(Attempt(order=order, phase=Phase.ENDED, report=report))
+            self._write(Attempt(order, Phase.ENDED, report, self._wall_s()))
             for fact in report.facts:
                 self._send(fact)
             self._send(report)
@@ -150,10 +165,36 @@ class Journal:
     def dropped(self, name: AttemptName) -> None:
         """The order of a queued attempt was withdrawn."""
         self.ledger.drop(name)
-        self._connection.execute(
-            "DELETE FROM attempt WHERE plan=? AND task=? AND attempt=? AND phase=?",
-            (*name, Phase.QUEUED.value),
-        )
+        with self._transaction(durable=False):
+            self._delete(name, Phase.QUEUED)
+
+    def forget(self, stands: Callable[[AttemptName], bool]) -> None:
+        """Forget what has been over for too long, and the oldest of what is over beyond the count.
+
+        `stands` says whether an attempt's order still does. Looks at no more than it forgets, and
+        at what is not over yet.
+        """
+        attempts, keep = self.ledger.attempts, self._retention
+        surplus = len(attempts) - keep.count
+        before_s = self._wall_s() - keep.age_s
+        over = []
+        for name, attempt in attempts.items():
+            ended_s = attempt.ended_wall_s
+            if surplus <= 0 and ended_s is not None and ended_s >= before_s:
+                break
+            if ended_s is None or name in self._last_report or stands(name):
+                continue
+            if surplus > 0 or ended_s < before_s:
+                over.append(name)
+                surplus -= 1
+        if over:
+            with self._transaction(durable=False):
+                for name in over:
+                    self._forget(name)
+
+    def is_confirmed(self, name: AttemptName) -> bool:
+        """Whether no report of the attempt waits to be sent."""
+        return name not in self._last_report
 
     def send(self, *payloads: Fact | Report) -> None:
         """Facts and reports that belong to no end of an attempt wait to be sent, in this order."""
@@ -181,7 +222,11 @@ class Journal:
 
     def sent(self, number: int) -> None:
         """It was read back from the store."""
-        self._connection.execute("DELETE FROM outbox WHERE number=?", (number,))
+        with self._transaction(durable=False):
+            self._connection.execute("DELETE FROM outbox WHERE number=?", (number,))
+        name = self._reports.pop(number, None)
+        if name is not None and self._last_report.get(name) == number:
+            del self._last_report[name]
 
     @property
     def _connection(self) -> sqlite3.Connection:
@@ -190,68 +235,128 @@ class Journal:
         return self._db
 
     @contextmanager
-    def _transaction(self) -> Iterator[None]:
-        self._connection.execute("BEGIN IMMEDIATE")
+    def _transaction(self, *, durable: bool = True) -> Iterator[None]:
+        db = self._connection
+        db.execute(f"PRAGMA synchronous={'FULL' if durable else 'NORMAL'}")
+        db.execute("BEGIN IMMEDIATE")
         try:
             yield
         except BaseException:
-            self._connection.execute("ROLLBACK")
+            db.execute("ROLLBACK")
             raise
-        self._connection.execute("COMMIT")
+        db.execute("COMMIT")
 
     def _overtaken(self, number: int, payload: Fact | Report) -> bool:
         if isinstance(payload, Fact):
             return False
-        rows = self._connection.execute(
-            "SELECT payload FROM outbox WHERE number>? AND kind='report'", (number,)
-        )
-        name = (payload.plan, payload.task, payload.attempt)
-        later = (msgspec.json.decode(data, type=Report) for (data,) in rows.fetchall())
-        return any((r.plan, r.task, r.attempt) == name for r in later)
+        return self._last_report[AttemptName.of(payload)] != number
 
     def _send(self, payload: Fact | Report) -> None:
         kind = "fact" if isinstance(payload, Fact) else "report"
-        self._connection.execute(
+        number = self._connection.execute(
             "INSERT INTO outbox (kind, payload) VALUES (?, ?)",
             (kind, msgspec.json.encode(payload)),
-        )
+        ).lastrowid
+        assert number is not None
+        self._note_waiting(number, payload)
+
+    def _note_waiting(self, number: int, payload: Payload) -> None:
+        if isinstance(payload, Report):
+            self._reports[number] = name = AttemptName.of(payload)
+            self._last_report[name] = number
 
     def _fence(self, order: Order) -> None:
-        self._connection.executemany(
-            "INSERT INTO fence VALUES (?, ?) ON CONFLICT (name) "
+        self._raise("epoch", highest=order.epoch)
+        self._raise("revision", order.planner, order.plan, highest=order.revision)
+
+    def _raise(
+        self,
+        scope: str,
+        planner: str | None = None,
+        plan: str = "",
+        task: str = "",
+        *,
+        highest: int,
+    ) -> None:
+        self._connection.execute(
+            "INSERT INTO fence VALUES (?, ?, ?, ?, ?) ON CONFLICT (scope, planner, plan, task) "
             "DO UPDATE SET highest = max(highest, excluded.highest)",
-            (("", order.epoch), (order.plan, order.revision)),
+            (scope, planner or "", plan, task, highest),
         )
 
     def _write(self, attempt: Attempt) -> None:
         order = attempt.order
         self._fence(order)
         self._connection.execute(
-            'INSERT INTO attempt (plan, task, attempt, phase, "order", report) '
-            "VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT (plan, task, attempt) DO UPDATE SET "
-            'phase=excluded.phase, "order"=excluded."order", report=excluded.report',
+            "INSERT INTO attempt "
+            '(planner, plan, task, attempt, phase, "order", report, ended_at) '
+            "VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (planner, plan, task, attempt) "
+            'DO UPDATE SET phase=excluded.phase, "order"=excluded."order", '
+            "report=excluded.report, ended_at=excluded.ended_at",
             (
-                *attempt_name(order),
+                *_row_of(attempt.name),
                 attempt.phase.value,
                 msgspec.json.encode(order),
                 None if attempt.report is None else msgspec.json.encode(attempt.report),
+                attempt.ended_wall_s,
             ),
         )
         self.ledger.put(attempt)
 
+    def _forget(self, name: AttemptName) -> None:
+        """Forget an attempt in memory and on the disk; the ledger says which fences stay."""
+        ledger = self.ledger
+        order = ledger.attempts[name].order
+        ledger.forget(name)
+        self._delete(name, Phase.ENDED)
+        if order.serial:
+            self._raise("serial", name.planner, highest=ledger.forgotten[name.planner])
+        else:
+            highest = ledger.unnumbered[name.of_task]
+            self._raise("attempt", *name.of_task, highest=highest)
+        if name.in_plan not in ledger.revisions:
+            self._connection.execute(
+                "DELETE FROM fence WHERE scope='revision' AND planner=? AND plan=?",
+                (name.planner or "", name.plan),
+            )
+
+    def _delete(self, name: AttemptName, phase: Phase) -> None:
+        self._connection.execute(
+            "DELETE FROM attempt WHERE planner=? AND plan=? AND task=? AND attempt=? AND phase=?",
+            (*_row_of(name), phase.value),
+        )
+
     def _load(self, db: sqlite3.Connection) -> None:
-        for name, highest in db.execute("SELECT name, highest FROM fence"):
-            if name:
-                self.ledger.revisions[name] = highest
+        ledger = self.ledger
+        for scope, lineage, plan, task, highest in db.execute(
+            "SELECT scope, planner, plan, task, highest FROM fence"
+        ):
+            planner = lineage or None
+            if scope == "epoch":
+                ledger.epoch = highest
+            elif scope == "revision":
+                ledger.revisions[PlanName(planner, plan)] = highest
+            elif scope == "serial":
+                ledger.forgotten[planner] = highest
             else:
-                self.ledger.epoch = highest
-        rows = db.execute('SELECT phase, "order", report FROM attempt ORDER BY number')
-        for phase, order, report in rows:
-            self.ledger.put(
+                ledger.unnumbered[TaskName(planner, plan, task)] = highest
+        rows = db.execute('SELECT phase, "order", report, ended_at FROM attempt ORDER BY number')
+        for phase, order, report, ended_at in rows:
+            ledger.put(
                 Attempt(
                     order=msgspec.json.decode(order, type=Order),
                     phase=Phase(phase),
                     report=None if report is None else msgspec.json.decode(report, type=Report),
+                    ended_wall_s=ended_at,
                 )
             )
+        for number, payload in db.execute(
+            "SELECT number, payload FROM outbox WHERE kind='report' ORDER BY number"
+        ):
+            self._note_waiting(number, msgspec.json.decode(payload, type=Report))
         (self._earlier,) = db.execute("SELECT coalesce(max(number), 0) FROM outbox").fetchone()
+
+
+def _row_of(name: AttemptName) -> tuple[str, str, str, int]:
+    """How an attempt is named in the file."""
+    return (name.planner or "", name.plan, name.task, name.attempt)

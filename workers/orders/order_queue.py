@@ -25,7 +25,6 @@ from workers.orders.fencing import (
     Refuse,
     Renew,
     Repeat,
-    attempt_name,
     decide,
     malformed,
     superseded,
@@ -51,6 +50,9 @@ class OrderQueue:
         self._queue: deque[AttemptName] = deque()
         self._queued = asyncio.Event()
         self._running: AttemptName | None = None
+        self._standing: dict[OrderAddress, AttemptName] = {}
+        """What the orders that stand on their keys are about."""
+        self._all_standing_known = False
         self._log = logging.getLogger(f"robotfleet.worker.{robot}")
 
     async def next(self) -> Order:
@@ -66,16 +68,38 @@ class OrderQueue:
     async def receive(self, address: OrderAddress, order: Order | None) -> None:
         """Take in what stands on an order's key; `None`: nothing any more."""
         if order is None:
+            self._standing.pop(address, None)
             self._withdraw(address)
+            self.forget_what_is_over()
         elif (wrong := malformed(order)) is not None:
             self._session.report_undecodable(ORDER.build(address), ORDER.encode(order), wrong)
         elif OrderAddress.of(order) != address:
             await self._refuse_misplaced(address, order)
         else:
+            self._standing[address] = AttemptName.of(order)
             await self._take(order)
 
+    def all_received(self) -> None:
+        """Every order that stood at the start has been received: what is missing is gone."""
+        self._all_standing_known = True
+        self.forget_what_is_over()
+
+    def forget_what_is_over(self) -> None:
+        """Let attempts go that have ended, were reported, and are ordered no more."""
+        if self._all_standing_known:
+            self._journal.forget(lambda name: name in self._standing.values())
+
+    async def repeat_what_is_missing(self) -> None:
+        """Say again how attempts ended that are still ordered, where the store has lost it."""
+        for name in list(self._standing.values()):
+            attempt = self._journal.ledger.attempts.get(name)
+            if attempt is None or attempt.report is None or not self._journal.is_confirmed(name):
+                continue
+            await self._report_unless_stored(attempt.report)
+
     def _withdraw(self, address: OrderAddress) -> None:
-        for name in [n for n in self._queue if n[:2] == (address.plan, address.task)]:
+        of_task = [n for n in self._queue if (n.plan, n.task) == (address.plan, address.task)]
+        for name in of_task:
             self._queue.remove(name)
             self._journal.dropped(name)
 
@@ -83,7 +107,7 @@ class OrderQueue:
         here, there = ORDER.build(address), ORDER.build(OrderAddress.of(order))
         reason = f"the order at {here} says that it is the one at {there}"
         placed = replace(order, robot=address.robot, plan=address.plan, task=address.task)
-        if attempt_name(placed) not in self._journal.ledger.attempts:
+        if AttemptName.of(placed) not in self._journal.ledger.attempts:
             await self._report_unless_stored(
                 make_report(
                     placed, self._incarnation, ReportState.REFUSED, reason=reason, retryable=False
@@ -92,7 +116,7 @@ class OrderQueue:
 
     async def _take(self, order: Order) -> None:
         decision = decide(self._journal.ledger, order)
-        name = attempt_name(order)
+        name = AttemptName.of(order)
         if isinstance(decision, Accept):
             for older in superseded(self._journal.ledger, order):
                 self._cancel(older, "a later attempt was ordered")
@@ -114,7 +138,7 @@ class OrderQueue:
             refusal = make_report(
                 order, self._incarnation, ReportState.REFUSED, reason=decision.reason
             )
-            await self._report_unless_stored(refusal)
+            await self._report_unless_stored(refusal, or_any=True)
 
     def _cancel(self, name: AttemptName, why: str = "the order was cancelled") -> None:
         if name == self._running:
@@ -129,14 +153,25 @@ class OrderQueue:
         self._journal.ended(order, report)
         self._outbox.wake()
 
-    async def _report_unless_stored(self, report: Report) -> None:
-        """Report what is no news to the journal, unless it stands there already."""
+    async def _report_unless_stored(self, report: Report, *, or_any: bool = False) -> None:
+        """Report what is no news to the journal, unless it stands there already.
+
+        `or_any`: or unless any report of the attempt does, which is truer than a refusal. A report
+        that a newer planner of another lineage has for the same names stays, too.
+        """
         address = ReportAddress.of(report)
         try:
             stored = await self._session.get(REPORT, address)
         except SchemaError as error:
             self._log.info("cannot see whether %s is known: %s", REPORT.build(address), error)
             stored = None
-        if stored is None or replace(stored, incarnation=report.incarnation) != report:
-            self._journal.send(report)
-            self._outbox.wake()
+        if stored is not None and AttemptName.of(stored) != AttemptName.of(report):
+            if stored.epoch > report.epoch:
+                return
+        elif stored is not None:
+            if or_any and stored.state is not ReportState.REFUSED:
+                return
+            if replace(stored, incarnation=report.incarnation) == report:
+                return
+        self._journal.send(report)
+        self._outbox.wake()

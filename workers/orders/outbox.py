@@ -40,6 +40,7 @@ def make_report(
         reason=reason,
         retryable=retryable,
         started_s=started_s,
+        planner=order.planner,
     )
 
 

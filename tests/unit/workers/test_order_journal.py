@@ -6,20 +6,23 @@ import sqlite3
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import pytest
 from msgspec.structs import replace
 
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState
 from keyexpr_schema.payloads.world import Fact
 from workers.errors import JournalBusy, JournalUnreadable
-from workers.orders.fencing import Phase, attempt_name
-from workers.orders.journal import Journal
+from workers.orders.fencing import AttemptName, Phase, PlanName
+from workers.orders.journal import Journal, Retention
 from workers.orders.outbox import make_report
 
 
-def order(task: str = "t1", attempt: int = 1) -> Order:
+def order(task: str = "t1", attempt: int = 1, **more: Any) -> Order:
     return Order(
+        **more,
         robot="hsr",
         plan="p",
         revision=1,
@@ -74,7 +77,7 @@ os.kill(os.getpid(), signal.SIGKILL)
     killed = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True)
     assert killed.returncode == -9, killed.stderr
     with Journal(path) as journal:
-        phases = {name[1]: e.phase for name, e in journal.ledger.attempts.items()}
+        phases = {name.task: e.phase for name, e in journal.ledger.attempts.items()}
         assert phases == {"t1": Phase.ENDED, "t2": Phase.STARTED}
         first = journal.unsent()
         assert first is not None and first.payload == fact("hallway") and first.earlier_run
@@ -131,6 +134,99 @@ def test_a_renewed_order_moves_the_fence_but_not_what_runs(tmp_path: Path) -> No
         journal.queued(order())
         journal.started(order(), make_report(order(), "r1", ReportState.STARTED))
         journal.renewed(newer)
-        assert journal.ledger.attempts[attempt_name(order())].order.skill == "navigate"
+        assert journal.ledger.attempts[AttemptName.of(order())].order.skill == "navigate"
     with Journal(path) as journal:
-        assert (journal.ledger.epoch, journal.ledger.revisions) == (7, {"p": 3})
+        assert (journal.ledger.epoch, journal.ledger.revisions) == (7, {PlanName(None, "p"): 3})
+
+
+VERSION_1 = """
+CREATE TABLE fence (name TEXT PRIMARY KEY, highest INTEGER NOT NULL) WITHOUT ROWID;
+CREATE TABLE attempt (
+    number INTEGER PRIMARY KEY,
+    plan TEXT NOT NULL, task TEXT NOT NULL, attempt INTEGER NOT NULL,
+    phase TEXT NOT NULL, "order" BLOB NOT NULL, report BLOB,
+    UNIQUE (plan, task, attempt)
+);
+CREATE TABLE outbox (
+    number INTEGER PRIMARY KEY AUTOINCREMENT, kind TEXT NOT NULL, payload BLOB NOT NULL
+);
+INSERT INTO fence VALUES ('', 4), ('p', 2);
+PRAGMA user_version=1;
+"""
+
+
+def test_a_journal_of_the_version_before_is_read_and_goes_on(tmp_path: Path) -> None:
+    path = tmp_path / "hsr.journal"
+    end = make_report(order("t1"), "r1", ReportState.SUCCEEDED)
+    with sqlite3.connect(path) as db:
+        db.executescript(VERSION_1)
+        rows = (("t1", "ended", end), ("t2", "started", None))
+        for task, phase, report in rows:
+            db.execute(
+                'INSERT INTO attempt (plan, task, attempt, phase, "order", report) '
+                "VALUES ('p', ?, 1, ?, ?, ?)",
+                (task, phase, encoded(order(task)), report and encoded(report)),
+            )
+        db.execute("INSERT INTO outbox (kind, payload) VALUES ('report', ?)", (encoded(end),))
+    db.close()
+    for _ in range(2):
+        with Journal(path) as journal:
+            ledger = journal.ledger
+            assert (ledger.epoch, ledger.revisions) == (4, {PlanName(None, "p"): 2})
+            assert {n.task: a.phase for n, a in ledger.attempts.items()} == {
+                "t1": Phase.ENDED,
+                "t2": Phase.STARTED,
+            }
+            unsent = journal.unsent()
+            assert unsent is not None and unsent.payload == end
+
+
+def encoded(payload: Order | Report) -> bytes:
+    return msgspec.json.encode(payload)
+
+
+def live(journal: Journal, count: int, first: int = 1) -> None:
+    """Take on, carry out and report so many orders, each of which is gone then."""
+    for serial in range(first, first + count):
+        one = order(f"t{serial}", planner="lineage", serial=serial)
+        journal.queued(one)
+        journal.started(one, make_report(one, "r1", ReportState.STARTED))
+        journal.ended(one, make_report(one, "r1", ReportState.SUCCEEDED))
+        words(journal)
+        journal.forget(lambda name: False)
+
+
+def rows(path: Path) -> int:
+    with sqlite3.connect(path) as db:
+        tables = ("attempt", "fence", "outbox")
+        counts = [db.execute(f"SELECT count(*) FROM {t}").fetchone()[0] for t in tables]
+    db.close()
+    return sum(counts)
+
+
+def test_a_journal_holds_no_more_after_hundreds_of_orders_than_after_some(tmp_path: Path) -> None:
+    path = tmp_path / "hsr.journal"
+    sizes = []
+    for opened in range(4):
+        with Journal(path, Retention(count=20)) as journal:
+            assert len(journal.ledger.attempts) <= 20
+            live(journal, 60, first=1 + 60 * opened)
+        sizes.append((rows(path), path.stat().st_size))
+    assert len(set(sizes)) == 1, sizes
+
+
+def test_what_is_over_is_forgotten_after_its_time_and_what_is_not_is_kept(tmp_path: Path) -> None:
+    wall_s = 0.0
+    keep = Retention(count=100, age_s=10.0)
+    with Journal(tmp_path / "hsr.journal", keep, lambda: wall_s) as journal:
+        live(journal, 3)
+        standing, unreported = order("stands"), order("unreported")
+        for one in (standing, unreported):
+            journal.queued(one)
+        journal.ended(standing, make_report(standing, "r1", ReportState.SUCCEEDED))
+        words(journal)
+        journal.ended(unreported, make_report(unreported, "r1", ReportState.SUCCEEDED))
+        wall_s = 11.0
+        journal.queued(order("waits"))
+        journal.forget(lambda name: name.task == "stands")
+        assert {n.task for n in journal.ledger.attempts} == {"stands", "unreported", "waits"}

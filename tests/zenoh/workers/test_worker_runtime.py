@@ -242,6 +242,51 @@ async def test_a_report_that_was_lost_is_put_again_and_nothing_moves(fleet_of: M
         assert len(fleet.world.begun) == moved
 
 
+async def test_a_report_that_is_lost_is_put_again_while_its_order_stands(
+    fleet_of: MakeFleet,
+) -> None:
+    """Without an order that is put again, and by a worker that was started anew, too."""
+    where = ReportAddress("locobot", "p", "t1", 1)
+    async with fleet_of() as fleet:
+        async with fleet.worker("locobot"):
+            order = await fleet.order("locobot", "t1", "navigate", to="kitchen")
+            report = await fleet.report(order)
+            moved = len(fleet.world.begun)
+            await fleet.session.delete(REPORT, where)
+            assert await fleet.report(order) == report
+        await fleet.session.delete(REPORT, where)
+        async with fleet.worker("locobot"):
+            assert await fleet.report(order) == report
+            assert len(fleet.world.begun) == moved
+            # An order that is gone takes its report along: nobody asks for it any more.
+            await fleet.session.delete(ORDER, OrderAddress("locobot", "p", "t1"))
+            await fleet.session.delete(REPORT, where)
+            other = await fleet.order("locobot", "t2", "navigate", to="kitchen")
+            assert (await fleet.report(other)).state is ReportState.SUCCEEDED
+            assert await fleet.session.get(REPORT, where) is None
+
+
+async def test_the_same_names_of_a_planner_that_lost_its_journal_are_another_attempt(
+    fleet_of: MakeFleet,
+) -> None:
+    async with fleet_of() as fleet, fleet.worker("locobot"):
+        names = ("locobot", "t1", "navigate")
+        old = await fleet.order(*names, planner="before", revision=7, attempt=2, to="kitchen")
+        first = await fleet.report(old)
+        assert (first.state, first.planner) == (ReportState.SUCCEEDED, "before")
+        new = await fleet.order(*names, planner="after", attempt=2, epoch=2, to="hallway")
+        second = await fleet.report(new, newer_than=first)
+        assert (second.state, second.planner) == (ReportState.SUCCEEDED, "after")
+        assert fleet.world.backend.senses("locobot").place == "hallway"
+        moved = len(fleet.world.begun)
+        # What the planner before orders now counts for nothing, and does not hide the newer word.
+        await fleet.order(*names, planner="before", revision=7, attempt=2, to="kitchen")
+        late = await fleet.order("locobot", "t2", "navigate", planner="before", to="kitchen")
+        assert (await fleet.report(late)).state is ReportState.REFUSED
+        assert await fleet.report(new) == second
+        assert len(fleet.world.begun) == moved
+
+
 async def first_report(fleet: Fleet, **fixed: str) -> Report:
     """The first report on a key whose address has these values."""
     async with asyncio.timeout(DEADLINE_S), fleet.session.watch((REPORT, dict(fixed))) as watch:

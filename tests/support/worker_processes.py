@@ -1,0 +1,88 @@
+"""A simulated world and workers as processes, in front of a test's router."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.support.router_process import RouterProcess
+from tests.support.worker_world import DEADLINE_S
+
+SIM = """
+import sys
+from sim.server.process import run_simulation
+endpoint, speed = sys.argv[1], float(sys.argv[2])
+run_simulation("two-cups", (endpoint,), backend="kinematic", speed=speed)
+"""
+WORKER = """
+import sys
+from pathlib import Path
+from sim.embodiment import sim_embodiment
+from workers.errors import WorkerError
+from workers.process import run_worker
+endpoint, robot, data = sys.argv[1:]
+try:
+    run_worker(robot, (endpoint,), "robotfleet", Path(data), sim_embodiment)
+except WorkerError as error:
+    sys.exit(f"robotctl: {error}")
+"""
+
+
+WORKERS = """
+import sys
+from cli.main import main
+endpoint, data, *robots = sys.argv[1:]
+sys.argv = ["robotctl", "worker", *robots, "--data", data, "--router", endpoint]
+main()
+"""
+
+
+class Processes:
+    """Starts the processes of a test, and ends every one of them."""
+
+    def __init__(self, router: RouterProcess, data_dir: Path) -> None:
+        self.endpoint, self.data_dir = router.endpoint, data_dir
+        self._all: list[subprocess.Popen[str]] = []
+
+    def start(self, program: str, *args: str) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            [sys.executable, "-c", program, self.endpoint, *args],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self._all.append(process)
+        return process
+
+    def sim(self, speed: float) -> subprocess.Popen[str]:
+        process = self.start(SIM, str(speed))
+        assert process.stdout is not None
+        assert "running" in process.stdout.readline()
+        return process
+
+    def worker(self, robot: str = "hsr", data: str = "") -> subprocess.Popen[str]:
+        return self.start(WORKER, robot, str(self.data_dir / data))
+
+    def end(self) -> None:
+        for process in self._all:
+            process.kill()
+            process.communicate(timeout=10)
+
+    def workers(self, *robots: str, program: str = WORKERS) -> subprocess.Popen[str]:
+        """One process for several robots."""
+        return self.start(program, str(self.data_dir), *robots)
+
+
+async def line(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    async with asyncio.timeout(DEADLINE_S):
+        return (await asyncio.to_thread(process.stdout.readline)).strip()
+
+
+async def ready(process: subprocess.Popen[str], robot: str = "hsr") -> str:
+    """Waits for the line that says that a worker is ready; its incarnation."""
+    said = await line(process)
+    assert said.startswith(f"worker {robot} ready (incarnation {robot}-"), said
+    return said.removeprefix(f"worker {robot} ready (incarnation ").removesuffix(")")

@@ -1,0 +1,62 @@
+"""The order journal's file: its tables, and how those of an earlier version become these."""
+
+from __future__ import annotations
+
+import sqlite3
+
+VERSION = 2
+_TABLES = """
+CREATE TABLE IF NOT EXISTS fence (
+    scope TEXT NOT NULL,              -- 'epoch', 'revision', 'attempt' or 'serial'
+    planner TEXT NOT NULL,            -- the lineage, '' for none
+    plan TEXT NOT NULL, task TEXT NOT NULL,
+    highest INTEGER NOT NULL,
+    PRIMARY KEY (scope, planner, plan, task)
+) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS attempt (
+    number INTEGER PRIMARY KEY,       -- order of arrival
+    planner TEXT NOT NULL,            -- the lineage, '' for none
+    plan TEXT NOT NULL, task TEXT NOT NULL, attempt INTEGER NOT NULL,
+    phase TEXT NOT NULL, "order" BLOB NOT NULL, report BLOB,
+    ended_at REAL,                    -- Unix seconds
+    UNIQUE (planner, plan, task, attempt)
+);
+CREATE TABLE IF NOT EXISTS outbox (
+    number INTEGER PRIMARY KEY AUTOINCREMENT,
+    kind TEXT NOT NULL,               -- 'fact' or 'report'
+    payload BLOB NOT NULL
+);
+"""
+_FROM_VERSION_1 = """
+INSERT INTO fence SELECT CASE name WHEN '' THEN 'epoch' ELSE 'revision' END, '', name, '', highest
+    FROM fence_1;
+INSERT INTO attempt SELECT number, '', plan, task, attempt, phase, "order", report,
+    CASE phase WHEN 'ended' THEN CAST(strftime('%s', 'now') AS REAL) END
+    FROM attempt_1;
+DROP TABLE fence_1;
+DROP TABLE attempt_1;
+"""
+
+
+def prepare_tables(db: sqlite3.Connection) -> int:
+    """Make the tables, inside the caller's transaction; the version that the file had.
+
+    A file of a version that is not known is left as it is: the caller compares.
+    """
+    (version,) = db.execute("PRAGMA user_version").fetchone()
+    if version not in (0, 1, VERSION):
+        return int(version)
+    if version == 1:
+        db.execute("ALTER TABLE fence RENAME TO fence_1")
+        db.execute("ALTER TABLE attempt RENAME TO attempt_1")
+    _run(db, _TABLES)
+    if version == 1:
+        _run(db, _FROM_VERSION_1)
+    db.execute(f"PRAGMA user_version={VERSION}")
+    return VERSION
+
+
+def _run(db: sqlite3.Connection, script: str) -> None:
+    # `executescript` would end the transaction.
+    for statement in script.split(";"):
+        db.execute(statement)

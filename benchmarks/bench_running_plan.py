@@ -26,6 +26,7 @@ from fleet.core.state import Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
 from fleet.service.planning.planning_job import run_planning_job
+from fleet.service.skill_models import load_all_skills
 from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import PlanChange
@@ -93,7 +94,7 @@ class Running:
             events.PlannerStarted,
             epoch=1,
             incarnation="bench",
-            skills=dict(self.composition.skills),
+            skills=load_all_skills(),
         )
         for number in range(PLACES):
             ways = {f"room_{n}": abs(n - number) * STEP_M for n in range(PLACES) if n != number}

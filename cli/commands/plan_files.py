@@ -60,7 +60,7 @@ async def check(
     from cli.plans.files import read_plan
     from cli.plans.worlds import world_of_files, world_of_fleet
     from fleet.core.checker.plan_checker import check_plan
-    from fleet.service.composition import load_all_skills
+    from fleet.service.skill_models import load_all_skills
 
     _only_with_world(world, connected, robots, facts)
     plan = read_plan(file)

@@ -6,7 +6,7 @@ import asyncio
 import logging
 import time
 import uuid
-from collections.abc import Coroutine, Sequence
+from collections.abc import Sequence
 from contextlib import AsyncExitStack
 from typing import Any
 
@@ -15,19 +15,17 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.dispatch.delays import SAME_CLOCK_S
 from fleet.core.dispatch.dispatcher import next_timer
-from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, effects_of
+from fleet.core.effects import DropJob, Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import At, Event
-from fleet.core.model.skills import phrases_of
-from fleet.core.planning_input import InterpretationInput, PlanningInput
+from fleet.core.model.skills import Skills, phrases_of
 from fleet.core.state import LOGIC, Policy, State
 from fleet.core.step import replay, step
 from fleet.errors import Superseded
 from fleet.service.catch_up import prior_state, stale_documents, until_synced
-from fleet.service.composition import Composition
 from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, event_of, missed_deletions
 from fleet.service.outbox import Outbox
-from fleet.service.planning.planning_job import run_interpretation, run_planning_job
+from fleet.service.planning.pool import PlanningPool
 from keyexpr_schema.keyspace import (
     PLANNER_ALIVE,
     PLANNER_STATUS,
@@ -47,23 +45,21 @@ class PlannerService:
         self,
         session: Session,
         journal: EventJournal,
-        composition: Composition,
-        policy: Policy | None = None,
+        pool: PlanningPool,
+        skills: Skills,
+        policy: Policy,
     ) -> None:
+        """`pool` is running; `skills` are the models that are planned with."""
         self._session = session
         self._journal = journal
-        self._composition = composition
-        self._policy = replace(
-            policy or Policy(),
-            interpreter=composition.language_model.configured,
-            skill_phrases=phrases_of(composition.skills),
-        )
+        self._pool = pool
+        self._skills = dict(skills)
+        self._policy = replace(policy, skill_phrases=phrases_of(skills))
         self._incarnation = uuid.uuid4().hex[:12]
         self._state = State()
         self._time_s = 0.0
         self._outbox = Outbox(session)
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
-        self._planning: set[asyncio.Task[None]] = set()
         self._held: list[Effect] | None = []
         """Effects held back until everything stored is known; afterwards `None`."""
 
@@ -80,7 +76,7 @@ class PlannerService:
         """
         number, snapshot = self._journal.snapshot()
         if not snapshot.skills:  # in journals of earlier versions no event brings them
-            snapshot = replace(snapshot, skills=dict(self._composition.skills))
+            snapshot = replace(snapshot, skills=self._skills)
         first_run = self._journal.empty
         self._state = replay(self._journal.events(number), snapshot)
         async with AsyncExitStack() as stack:
@@ -106,11 +102,9 @@ class PlannerService:
                     tasks.create_task(self._listen(watch))
                     tasks.create_task(self._watch_workers(tokens))
                     tasks.create_task(self._take_events())
+                    tasks.create_task(self._take_answers())
             except* Superseded as group:
                 raise group.exceptions[0] from None
-            finally:
-                for task in self._planning:
-                    task.cancel()
 
     def _at(self) -> At:
         now_s = time.time()
@@ -119,6 +113,7 @@ class PlannerService:
         return {"time_s": self._time_s, "wall_time_s": now_s}
 
     async def _take_charge(self) -> None:
+        parts = await self._pool.ready()
         # Listed, not got: a value there that is none must not keep the planner from starting.
         status = (await self._session.list(PLANNER_STATUS)).get(PlannerAddress())
         epoch = 1 + max(self._state.epoch, status.epoch if status else 0)
@@ -127,7 +122,7 @@ class PlannerService:
                 epoch=epoch,
                 incarnation=self._incarnation,
                 policy=self._policy,
-                skills=dict(self._composition.skills),
+                skills=self._skills,
                 logic=LOGIC,
                 lineage=self._incarnation,
                 **self._at(),
@@ -139,10 +134,10 @@ class PlannerService:
             PlannerStatus(
                 epoch=epoch,
                 incarnation=self._incarnation,
-                planners=tuple(self._composition.planners),
-                strategies=self._composition.strategies,
-                allocators=tuple(self._composition.allocators),
-                skills=tuple(self._composition.skills),
+                planners=tuple(parts.planners_wait_s),
+                strategies=parts.strategies,
+                allocators=tuple(parts.allocators_wait_s),
+                skills=tuple(self._skills),
             ),
             timeout_s=3600.0,
         )
@@ -231,32 +226,16 @@ class PlannerService:
             return
         self._outbox.send(e for e in effects if isinstance(e, Publish | Retract))
         for effect in effects:
-            if isinstance(effect, MakePlan):
-                self._in_background(self._make_plan(effect.given))
-            elif isinstance(effect, Interpret):
-                self._in_background(self._interpret(effect.given))
+            if isinstance(effect, MakePlan | Interpret):
+                self._pool.submit(effect.given)
+            elif isinstance(effect, DropJob):
+                self._pool.drop(effect.job)
 
-    def _in_background(self, work: Coroutine[Any, Any, None]) -> None:
-        task = asyncio.create_task(work)
-        self._planning.add(task)
-        task.add_done_callback(self._planning.discard)
-
-    async def _make_plan(self, given: PlanningInput) -> None:
-        try:
-            event: Event = await asyncio.to_thread(run_planning_job, given, self._composition)
-        except Exception as error:
-            log.exception("planning job %d", given.job.job)
-            event = events.PlanningFailed(
-                job=given.job.job,
-                reason=f"the planner failed: {error or type(error).__name__}",
-                postponed=True,
-                **self._at(),
-            )
-        self._inbox.put_nowait(replace(event, **self._at()))
-
-    async def _interpret(self, given: InterpretationInput) -> None:
-        event = await asyncio.to_thread(run_interpretation, given, self._composition)
-        self._inbox.put_nowait(replace(event, **self._at()))
+    async def _take_answers(self) -> None:
+        """Answers of planning jobs are events of the moment at which they come."""
+        while True:
+            answer = await self._pool.answers.get()
+            self._inbox.put_nowait(replace(answer, **self._at()))
 
 
 def _report_time_s(event: Event) -> float:

@@ -86,8 +86,8 @@ class EventJournal:
         self._db.execute("PRAGMA journal_size_limit=4194304")
         self._db.executescript(_TABLES)
         self._snapshots.tidy()
-        (last,) = self._db.execute("SELECT coalesce(max(number), 0) FROM events").fetchone()
-        self.last = max(last, *self._snapshots.numbers(), 0)
+        last: int = self._db.execute("SELECT coalesce(max(number), 0) FROM events").fetchone()[0]
+        self.last: int = max(last, *self._snapshots.numbers(), 0)
         """The number of the newest event."""
         self._set_aside = {
             digest

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 from fleet.core import events
 from fleet.core.events import At, Event
-from fleet.core.state import State
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
     CONTROL_REQUEST,
@@ -21,14 +20,6 @@ from keyexpr_schema.keyspace import (
     REPORT,
     ROBOT_SPEC,
     STATEMENT,
-)
-from keyexpr_schema.payloads.goals import GoalAddress
-from keyexpr_schema.payloads.robots import RobotAddress
-from keyexpr_schema.payloads.world import (
-    FactAddress,
-    ObjectAddress,
-    PlaceAddress,
-    StatementAddress,
 )
 from keyexpr_schema.transport.watch import Change
 
@@ -74,18 +65,8 @@ def event_of(change: Change[Any, Any], at: At) -> Event | None:
     return kind(**{field: change.value}, **at)
 
 
-def keys_of(state: State) -> Iterator[tuple[Key[Any, Any], Address]]:
-    """The keys that a state has its names and facts from."""
-    yield from ((GOAL_SPEC, GoalAddress(goal)) for goal in state.goals)
-    yield from ((STATEMENT, StatementAddress(name)) for name in state.statements)
-    yield from ((PLACE, PlaceAddress(place)) for place in state.places)
-    yield from ((OBJECT, ObjectAddress(thing)) for thing in state.objects)
-    yield from ((ROBOT_SPEC, RobotAddress(robot)) for robot in state.robots)
-    yield from ((FACT, FactAddress.of(key)) for key in state.facts)
-
-
 def key_behind(event: Event) -> tuple[Key[Any, Any], Address, Payload] | None:
-    """The key that an event came from, with the value there; None: from none, or from a deletion."""
+    """The key that an event came from, and the value there; None: from none, or it was deleted."""
     found = _KEYS.get(type(event))
     if found is None:
         return None

@@ -141,6 +141,4 @@ class JournaledCore:
             for effect in unconfirmed
             if isinstance(effect, Retract) or effect.key is FACT
         )
-        return Snapshot(
-            state=self._state, number=self._journal.last, unconfirmed=tuple(keyexprs)
-        )
+        return Snapshot(state=self._state, number=self._journal.last, unconfirmed=tuple(keyexprs))

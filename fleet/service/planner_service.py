@@ -6,7 +6,7 @@ import asyncio
 import logging
 import time
 import uuid
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import AsyncExitStack
 from typing import Any
 
@@ -14,26 +14,42 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.dispatch.delays import SAME_CLOCK_S
-from fleet.core.dispatch.dispatcher import next_timer
 from fleet.core.effects import DropJob, Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import At, Event
 from fleet.core.model.skills import Skills, phrases_of
 from fleet.core.state import LOGIC, Policy, State
-from fleet.core.step import replay, step
 from fleet.errors import Superseded
-from fleet.service.catch_up import prior_state, stale_documents, until_synced
+from fleet.service.catch_up import (
+    in_order,
+    known_keys,
+    open_plans,
+    prior_state,
+    stale_documents,
+    stale_orders,
+    until_synced,
+)
+from fleet.service.diagnostics import Diagnostics
 from fleet.service.event_journal import EventJournal
-from fleet.service.event_translation import WATCHED, event_of, missed_deletions
+from fleet.service.event_translation import WATCHED, event_of
+from fleet.service.journaled_core import JournaledCore
 from fleet.service.outbox import Outbox
 from fleet.service.planning.pool import PlanningPool
+from fleet.service.recovery import Recovered
+from fleet.service.timers import Timers
+from keyexpr_schema.facts import FactKey
 from keyexpr_schema.keyspace import (
+    FACT,
     PLANNER_ALIVE,
     PLANNER_STATUS,
+    REPORT,
     ROBOT_ALIVE,
     SIM_CLOCK,
 )
 from keyexpr_schema.payloads.system import PlannerAddress, PlannerAliveAddress, PlannerStatus
-from keyexpr_schema.transport.session import Session, TokenWatch, Watch
+from keyexpr_schema.payloads.world import FactAddress
+from keyexpr_schema.transport.session import Narrowed, Session, TokenWatch, Watch
+
+SNAPSHOT_CHECK_S = 0.5
 
 log = logging.getLogger(__name__)
 
@@ -56,9 +72,10 @@ class PlannerService:
         self._skills = dict(skills)
         self._policy = replace(policy, skill_phrases=phrases_of(skills))
         self._incarnation = uuid.uuid4().hex[:12]
-        self._state = State()
         self._time_s = 0.0
         self._outbox = Outbox(session)
+        self._diagnostics = Diagnostics(session, self._outbox)
+        self._core = JournaledCore(journal, self._diagnostics.set_aside)
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
         self._held: list[Effect] | None = []
         """Effects held back until everything stored is known; afterwards `None`."""
@@ -66,7 +83,7 @@ class PlannerService:
     @property
     def state(self) -> State:
         """What the planner knows now."""
-        return self._state
+        return self._core.state
 
     async def run(self, ready: asyncio.Event | None = None) -> None:
         """Plan until cancelled; sets `ready` once everything that is stored was taken in.
@@ -74,26 +91,31 @@ class PlannerService:
         Raises:
             Superseded: a planner with a higher epoch is in charge.
         """
-        number, snapshot = self._journal.snapshot()
-        if not snapshot.skills:  # in journals of earlier versions no event brings them
-            snapshot = replace(snapshot, skills=self._skills)
         first_run = self._journal.empty
-        self._state = replay(self._journal.events(number), snapshot)
+        recovered = self._core.recover(self._skills)
         async with AsyncExitStack() as stack:
+            await stack.enter_async_context(self._outbox.running())
             watch = await stack.enter_async_context(
-                self._session.watch(*WATCHED, SIM_CLOCK, PLANNER_STATUS)
+                self._session.watch(
+                    *(key for key in WATCHED if key is not REPORT),
+                    Narrowed(REPORT, "plan", lambda: open_plans(self.state)),
+                    SIM_CLOCK,
+                    PLANNER_STATUS,
+                    known=known_keys(self.state, recovered.concluded),
+                    on_trouble=self._diagnostics.store,
+                )
             )
             tokens = await stack.enter_async_context(self._session.watch_tokens(ROBOT_ALIVE))
-            await stack.enter_async_context(self._outbox.running())
             if first_run:
                 self._apply(await prior_state(self._session, self._at()))
             await self._take_charge()
             await stack.enter_async_context(
                 self._session.token(PLANNER_ALIVE, PlannerAliveAddress(self._incarnation))
             )
-            await self._catch_up(watch, tokens)
-            stale = await stale_documents(self._session, self._state)
-            self._go_live()
+            await self._catch_up(watch, tokens, recovered.concluded)
+            stale = await stale_orders(self._session, self.state)
+            await self._diagnostics.start()
+            self._go_live(recovered)
             self._carry_out(stale)
             if ready is not None:
                 ready.set()
@@ -103,8 +125,13 @@ class PlannerService:
                     tasks.create_task(self._watch_workers(tokens))
                     tasks.create_task(self._take_events())
                     tasks.create_task(self._take_answers())
+                    tasks.create_task(self._keep_snapshots())
+                    if first_run:
+                        tasks.create_task(self._retract_stale_documents())
             except* Superseded as group:
                 raise group.exceptions[0] from None
+            finally:
+                self._core.keep_last_snapshot(self._outbox.unconfirmed)
 
     def _at(self) -> At:
         now_s = time.time()
@@ -116,7 +143,7 @@ class PlannerService:
         parts = await self._pool.ready()
         # Listed, not got: a value there that is none must not keep the planner from starting.
         status = (await self._session.list(PLANNER_STATUS)).get(PlannerAddress())
-        epoch = 1 + max(self._state.epoch, status.epoch if status else 0)
+        epoch = 1 + max(self.state.epoch, status.epoch if status else 0)
         self._apply(
             events.PlannerStarted(
                 epoch=epoch,
@@ -142,37 +169,58 @@ class PlannerService:
             timeout_s=3600.0,
         )
 
-    async def _catch_up(self, watch: Watch, tokens: TokenWatch[Any]) -> None:
-        """Hear of everything stored, and of what went away while no planner was there."""
-        seen: set[str] = set()
-        async for change in until_synced(watch):
-            seen.add(change.key.build(change.address))
-            self._on_change(change)
-        for event in missed_deletions(self._state, seen, self._at()):
-            self._apply(event)
+    async def _catch_up(
+        self, watch: Watch, tokens: TokenWatch[Any], concluded: Collection[FactKey]
+    ) -> None:
+        """Hear of everything stored that matters, and of what went away meanwhile.
+
+        What the planner `concluded` itself, and may not have published, is not overruled by an
+        older word.
+        """
+        for change in in_order([change async for change in until_synced(watch)]):
+            if not (change.key is FACT and self._outdated(change, concluded)):
+                self._on_change(change)
         here: set[tuple[str, str]] = set()
         async for token in until_synced(tokens):
             self._on_token(token)
             if token.alive:
                 here.add((token.address.robot, token.address.incarnation))
-        for robot, runs in self._state.connected.items():
+        for robot, runs in self.state.connected.items():
             for run in runs:
                 if (robot, run) not in here:
                     self._apply(
                         events.WorkerDisconnected(robot=robot, incarnation=run, **self._at())
                     )
-
         while not self._inbox.empty():
             self._apply(self._inbox.get_nowait())
 
-    def _go_live(self) -> None:
+    def _outdated(self, change: Any, concluded: Collection[FactKey]) -> bool:
+        own = self.state.concluded.get(change.address.key)
+        return (
+            change.address.key in concluded
+            and own is not None
+            and change.value is not None
+            and change.value.time_s < own.time_s
+        )
+
+    def _go_live(self, recovered: Recovered) -> None:
         """From now on effects are carried out; those of the catching up all at once.
 
-        Until here nothing was ordered, since a report that is not read yet could forbid it.
+        Until here nothing was ordered, since a report that is not read yet could forbid it. What
+        an earlier run may not have done is done again, where the state says nothing else by now.
         """
         held = [e for e in self._held or () if isinstance(e, Publish | Retract)]
         self._held = None
-        self._carry_out((*held, *effects_of(self._state)))
+        state = self.state
+        facts = (
+            Publish(FACT, FactAddress.of(key), own)
+            for key in recovered.concluded
+            if (own := state.concluded.get(key)) is not None and own == state.facts.get(key)
+        )
+        self._carry_out((*recovered.retracted, *facts, *held, *effects_of(state)))
+
+    async def _retract_stale_documents(self) -> None:
+        self._carry_out(await stale_documents(self._session, self.state))
 
     async def _listen(self, watch: Watch) -> None:
         async for change in watch:
@@ -180,10 +228,11 @@ class PlannerService:
 
     def _on_change(self, change: Any) -> None:
         if change.key is SIM_CLOCK:
-            self._time_s = change.value.time_s
+            if change.value is not None:
+                self._time_s = change.value.time_s
         elif change.key is PLANNER_STATUS:
             other = change.value
-            if other is not None and other.epoch > self._state.epoch:
+            if other is not None and other.epoch > self.state.epoch:
                 raise Superseded(
                     f"planner {other.incarnation} took charge of realm "
                     f"{self._session.config.realm} (epoch {other.epoch}); this one stops"
@@ -203,22 +252,28 @@ class PlannerService:
 
     async def _take_events(self) -> None:
         """Take events one after the other; wake up when a timer of the state runs out."""
+        timers = Timers()
         while True:
-            timer = next_timer(self._state)
+            timer_s = timers.next(self.state)
             try:
-                async with asyncio.timeout(None if timer is None else timer - time.time()):
+                async with asyncio.timeout(None if timer_s is None else timer_s - time.time()):
                     event = await self._inbox.get()
             except TimeoutError:
                 event = events.TimerFired(**self._at())
+                timers.fired(time.time())
             self._apply(event)
 
     def _apply(self, event: Event) -> None:
-        state, effects = step(self._state, event)
-        if state is self._state:
-            return
-        self._journal.append(event, state)
-        self._state = state
-        self._carry_out(effects)
+        self._carry_out(self._core.apply(event))
+
+    async def _keep_snapshots(self) -> None:
+        """Keep a snapshot whenever there is much to replay, or nothing else to do."""
+        before = self._core.replayable
+        while True:
+            await asyncio.sleep(SNAPSHOT_CHECK_S)
+            if self._core.snapshot_due(idle=self._core.replayable == before):
+                await self._core.keep_snapshot(self._outbox.unconfirmed)
+            before = self._core.replayable
 
     def _carry_out(self, effects: Sequence[Effect]) -> None:
         if self._held is not None:

@@ -93,9 +93,7 @@ class Unconfirmed:
 
     def retracted(self) -> Iterable[Retract]:
         """What was to be deleted."""
-        return (
-            e for e in self._effects.values() if isinstance(e, Retract) and e.key is not FACT
-        )
+        return (e for e in self._effects.values() if isinstance(e, Retract) and e.key is not FACT)
 
     def concluded(self) -> frozenset[FactKey]:
         """Variables whose facts the planner concluded."""

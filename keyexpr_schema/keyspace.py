@@ -9,10 +9,11 @@ from __future__ import annotations
 from typing import Any
 
 from keyexpr_schema.errors import ForeignKey
-from keyexpr_schema.key import Component, Delivery, Key
+from keyexpr_schema.key import Component, Delivery, Key, KeyTree
 from keyexpr_schema.payloads import (
     durations,
     goals,
+    history,
     motions,
     plans,
     requests,
@@ -168,6 +169,24 @@ DIAGNOSTIC = Key(
     delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
     about="What is wrong with a component now; nothing there means that all is well.",
 )
+HISTORY = Key(
+    "history", "planner/history", system.PlannerAddress, history.HistoryQuery,
+    delivery=QUERY, writers=PERSON, readers=PLANNER,
+    about="What is over: what was wanted, what came of it, who did it, how long it took.",
+    reply=history.HistoryPage,
+)
+HISTORY_STATS = Key(
+    "history_stats", "planner/history/stats", system.PlannerAddress, history.HistoryStatsQuery,
+    delivery=QUERY, writers=PERSON, readers=PLANNER,
+    about="The history, added up by day.",
+    reply=history.HistoryStats,
+)
+RETIREMENT = Key(
+    "retirement", "planner/retirement", system.PlannerAddress, history.RetireQuery,
+    delivery=QUERY, writers=PERSON, readers=PLANNER,
+    about="Deletes the keys of what is over at once; the history keeps it.",
+    reply=history.Retired,
+)
 STORE_JOURNAL = Key(
     "store_journal", "store/journal", system.StoreAddress, system.StoreQuery,
     delivery=QUERY, writers=ANYONE, readers=STORE,
@@ -224,6 +243,14 @@ KEYSPACE: tuple[Key[Any, Any], ...] = tuple(
     value for value in list(globals().values()) if isinstance(value, Key)
 )
 """Every key, in the order of this file."""
+
+PLAN_TREE = KeyTree("plans/{plan}/**", (PLAN_SPEC, PLAN_PROPOSAL, PLAN_STATUS, TASK_RECORD))
+REPORT_TREE = KeyTree("robots/*/reports/{plan}/**", (REPORT,))
+GOAL_TREE = KeyTree("goals/{goal}/*", (GOAL_SPEC, GOAL_STATUS))
+REQUEST_TREE = KeyTree("requests/*/{request}", (PLAN_REQUEST, REPLAN_REQUEST, CONTROL_REQUEST))
+ANSWER_TREE = KeyTree("answers/{request}", (ANSWER,))
+KEY_TREES = (PLAN_TREE, REPORT_TREE, GOAL_TREE, REQUEST_TREE, ANSWER_TREE)
+"""What the planner deletes, whoever wrote it, when what it is about has been over for long."""
 
 
 def key_of(keyexpr: str) -> Key[Any, Any]:

@@ -267,7 +267,9 @@ def _order(record: TaskRecord, entry: PlanEntry, epoch: int) -> Order:
         skill=record.skill,
         args=record.args,
         deadline_s=DEADLINE_FACTOR * record.duration_s + DEADLINE_MARGIN_S,
-        cancelled=entry.cancelling or record.task in entry.unwanted,
+        cancelled=entry.cancelling or entry.ended or record.task in entry.unwanted,
+        planner=entry.lineage,
+        serial=record.serial,
     )
 
 

@@ -105,6 +105,8 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True):
     plan: Plan
     state: PlanState
     planner: str = "symbolic"
+    lineage: str | None = None
+    """That of the planner that gives the plan's orders; `None` in what is older than lineages."""
     start: bool = True
     records: Table[str, TaskRecord] = Table()
     outcome: PlanOutcome = PlanOutcome()

@@ -70,6 +70,10 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     """Unix time [s] at which the last worker of a robot went away."""
     plans: Table[str, PlanEntry] = Table()
     past_plans: tuple[str, ...] = ()
+    plans_made: int = 0
+    """The highest number that a plan `plan-N` has had; names that the planner gives go on there."""
+    attempts_made: int = 0
+    """The serial of the latest attempt that was ordered."""
     answers: Table[str, Answer] = Table()
     jobs: int = 0
     previews: Table[str, PlanningJob] = Table()

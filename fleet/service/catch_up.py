@@ -83,41 +83,25 @@ async def prior_state(session: Session, at: At) -> PriorStateLoaded:
     )
 
 
-async def stale_orders(session: Session, state: State) -> list[Retract]:
-    """Orders that the state does not have: nobody would ever follow them up.
+async def stale_documents(session: Session, state: State, *, all_of_them: bool) -> list[Retract]:
+    """Documents of the planner in the store that the state does not have.
 
-    There are as many as there is work under way. A planner that lost its journal leaves such, and
-    a store that lost the latest seconds in a power cut.
+    Orders, whatever happened: nobody would ever follow them up, and there are no more of them than
+    there is work under way. All others only where the journal is lost: with a journal there are
+    none, it remembers what is to be deleted until that is confirmed.
     """
-    wanted = _published(state)
-    return [
-        Retract(ORDER, address)
-        for address in await session.list(ORDER)
-        if ORDER.build(address) not in wanted
-    ]
-
-
-async def stale_documents(session: Session, state: State) -> list[Retract]:
-    """Documents of a planner whose journal is lost that are of no plan and no goal that is known.
-
-    With a journal there are none: it remembers what is to be deleted until that is confirmed.
-    """
-    wanted = _published(state)
-    return [
-        Retract(key, address)
-        for key in OWN
-        for address in await session.list(key)
-        if key.build(address) not in wanted
-        and getattr(address, "plan", None) not in state.past_plans
-    ]
-
-
-def _published(state: State) -> set[str]:
-    return {
+    wanted = {
         effect.key.build(effect.address)
         for effect in effects_of(state)
         if isinstance(effect, Publish)
     }
+    return [
+        Retract(key, address)
+        for key in (ORDER, *(OWN if all_of_them else ()))
+        for address in await session.list(key)
+        if key.build(address) not in wanted
+        and (key is ORDER or getattr(address, "plan", None) not in state.past_plans)
+    ]
 
 
 async def until_synced(watch: Watch | TokenWatch[Any]) -> AsyncIterator[Any]:

@@ -54,13 +54,19 @@ class JournaledCore:
         """How many events a start would have to replay now."""
         return self._replayable
 
-    def recover(self, skills: Mapping[str, SkillModel]) -> Recovered:
+    def recover(
+        self,
+        skills: Mapping[str, SkillModel],
+        on_effects: Callable[[Iterable[Effect]], None],
+    ) -> Recovered:
         """Come back to where the journal ends; `skills` are for journals that have none.
+
+        `on_effects` gets what was to be done about each event, and perhaps was not.
 
         Raises:
             JournalUnreadable: another version of the program wrote it.
         """
-        recovered = recover(self._journal, skills)
+        recovered = recover(self._journal, skills, on_effects)
         self._state, self._replayable = recovered.state, recovered.replayed
         return recovered
 

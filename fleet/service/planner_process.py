@@ -14,6 +14,8 @@ from msgspec.structs import replace
 from fleet.core.model.skills import Skills
 from fleet.core.state import Policy
 from fleet.errors import FleetError
+from fleet.history.archive import Archive
+from fleet.history.retention import Retention
 from fleet.llm.configuration import load_llm_config
 from fleet.llm.conversation import LanguageModel
 from fleet.service.event_journal import EventJournal
@@ -31,11 +33,13 @@ def run(
     skill_files: tuple[Path, ...] = (),
     llm_file: Path | None = None,
     policy: Policy | None = None,
+    retention: Retention | None = None,
 ) -> None:
     """Be the central planner of a realm until SIGTERM or SIGINT; prints a line once it is ready.
 
-    The event journal lies in `data_dir`. It waits for a router as long as there is none.
-    `skill_files` are those of `load_all_skills`, `llm_file` that of `compose`.
+    The event journal and the archive of what is over lie in `data_dir`; `retention` says how long
+    that keeps its keys. It waits for a router as long as there is none. `skill_files` are those of
+    `load_all_skills`, `llm_file` that of `compose`.
 
     Raises:
         SystemExit: with 1 and one sentence on stderr, when it cannot start or is superseded.
@@ -48,7 +52,7 @@ def run(
         model = LanguageModel(load_llm_config(llm_file))
         policy = replace(policy or Policy(), interpreter=model.configured)
         pool = PlanningPool(llm_file, data_dir / "failed-planning-jobs")
-        asyncio.run(_run(endpoints, realm, data_dir, pool, skills, policy))
+        asyncio.run(_run(endpoints, realm, data_dir, pool, skills, policy, retention))
     except (FleetError, SchemaError) as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201
         raise SystemExit(1) from None
@@ -61,16 +65,19 @@ async def _run(
     pool: PlanningPool,
     skills: Skills,
     policy: Policy,
+    retention: Retention | None,
 ) -> None:
     config = SessionConfig(
         endpoints=endpoints, realm=realm, component="planner", connect_timeout_s=None
     )
     loop = asyncio.get_running_loop()
-    with EventJournal(data_dir) as journal:
+    with EventJournal(data_dir) as journal, Archive(data_dir) as archive:
         async with pool.running(), open_session(config) as session:
             ready = asyncio.Event()
             service = asyncio.create_task(
-                PlannerService(session, journal, pool, skills, policy).run(ready)
+                PlannerService(session, journal, pool, skills, archive, policy, retention).run(
+                    ready
+                )
             )
             for number in (signal.SIGTERM, signal.SIGINT):
                 loop.add_signal_handler(number, service.cancel)

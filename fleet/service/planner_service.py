@@ -19,13 +19,14 @@ from fleet.core.events import At, Event
 from fleet.core.model.skills import Skills, phrases_of
 from fleet.core.state import LOGIC, Policy, State
 from fleet.errors import Superseded
+from fleet.history.archive import Archive
+from fleet.history.retention import Retention
 from fleet.service.catch_up import (
     in_order,
     known_keys,
     open_plans,
     prior_state,
     stale_documents,
-    stale_orders,
     until_synced,
 )
 from fleet.service.diagnostics import Diagnostics
@@ -33,6 +34,7 @@ from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, event_of
 from fleet.service.journaled_core import JournaledCore
 from fleet.service.outbox import Outbox
+from fleet.service.past import Past
 from fleet.service.planning.pool import PlanningPool
 from fleet.service.recovery import Recovered
 from fleet.service.timers import Timers
@@ -63,7 +65,9 @@ class PlannerService:
         journal: EventJournal,
         pool: PlanningPool,
         skills: Skills,
+        archive: Archive,
         policy: Policy,
+        retention: Retention | None = None,
     ) -> None:
         """`pool` is running; `skills` are the models that are planned with."""
         self._session = session
@@ -76,6 +80,9 @@ class PlannerService:
         self._outbox = Outbox(session)
         self._diagnostics = Diagnostics(session, self._outbox)
         self._core = JournaledCore(journal, self._diagnostics.set_aside)
+        self._past = Past(
+            session, archive, self._outbox, retention or Retention(), lambda: self._core.state
+        )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
         self._held: list[Effect] | None = []
         """Effects held back until everything stored is known; afterwards `None`."""
@@ -92,9 +99,10 @@ class PlannerService:
             Superseded: a planner with a higher epoch is in charge.
         """
         first_run = self._journal.empty
-        recovered = self._core.recover(self._skills)
+        recovered = self._core.recover(self._skills, self._past.keep)
         async with AsyncExitStack() as stack:
             await stack.enter_async_context(self._outbox.running())
+            await stack.enter_async_context(self._past.running())
             watch = await stack.enter_async_context(
                 self._session.watch(
                     *(key for key in WATCHED if key is not REPORT),
@@ -113,7 +121,7 @@ class PlannerService:
                 self._session.token(PLANNER_ALIVE, PlannerAliveAddress(self._incarnation))
             )
             await self._catch_up(watch, tokens, recovered.concluded)
-            stale = await stale_orders(self._session, self.state)
+            stale = await stale_documents(self._session, self.state, all_of_them=first_run)
             await self._diagnostics.start()
             self._go_live(recovered)
             self._carry_out(stale)
@@ -126,8 +134,7 @@ class PlannerService:
                     tasks.create_task(self._take_events())
                     tasks.create_task(self._take_answers())
                     tasks.create_task(self._keep_snapshots())
-                    if first_run:
-                        tasks.create_task(self._retract_stale_documents())
+                    tasks.create_task(self._past.delete_keys_in_time())
             except* Superseded as group:
                 raise group.exceptions[0] from None
             finally:
@@ -211,6 +218,7 @@ class PlannerService:
         """
         held = [e for e in self._held or () if isinstance(e, Publish | Retract)]
         self._held = None
+        self._past.publish_unsettled()
         state = self.state
         facts = (
             Publish(FACT, FactAddress.of(key), own)
@@ -218,9 +226,6 @@ class PlannerService:
             if (own := state.concluded.get(key)) is not None and own == state.facts.get(key)
         )
         self._carry_out((*recovered.retracted, *facts, *held, *effects_of(state)))
-
-    async def _retract_stale_documents(self) -> None:
-        self._carry_out(await stale_documents(self._session, self.state))
 
     async def _listen(self, watch: Watch) -> None:
         async for change in watch:
@@ -264,7 +269,10 @@ class PlannerService:
             self._apply(event)
 
     def _apply(self, event: Event) -> None:
-        self._carry_out(self._core.apply(event))
+        if (news := self._past.news(event)) is not None:
+            effects = self._core.apply(news)
+            self._past.keep(effects)
+            self._carry_out(effects)
 
     async def _keep_snapshots(self) -> None:
         """Keep a snapshot whenever there is much to replay, or nothing else to do."""
@@ -280,6 +288,7 @@ class PlannerService:
             self._held.extend(effects)
             return
         self._outbox.send(e for e in effects if isinstance(e, Publish | Retract))
+        self._past.sent(effects)
         for effect in effects:
             if isinstance(effect, MakePlan | Interpret):
                 self._pool.submit(effect.given)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import logging
 import traceback
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from msgspec.structs import replace
@@ -32,18 +32,23 @@ class Recovered:
     """A state, and what may not have been done about it.
 
     `retracted` are deletions that may not have been carried out, `concluded` the planner's own
-    facts that may not have been published, `archived` what may not have been archived.
+    facts that may not have been published.
     """
 
     state: State
     replayed: int
     retracted: tuple[Retract, ...] = ()
     concluded: frozenset[FactKey] = frozenset()
-    archived: tuple[Archive, ...] = ()
 
 
-def recover(journal: EventJournal, skills: Mapping[str, SkillModel]) -> Recovered:
+def recover(
+    journal: EventJournal,
+    skills: Mapping[str, SkillModel],
+    on_effects: Callable[[Iterable[Effect]], None] = lambda effects: None,
+) -> Recovered:
     """The state that a journal leads to; events that the core cannot handle are set aside.
+
+    `on_effects` gets what was to be done about each event, and perhaps was not.
 
     Raises:
         JournalUnreadable: another version of the program wrote it.
@@ -53,8 +58,8 @@ def recover(journal: EventJournal, skills: Mapping[str, SkillModel]) -> Recovere
     if not state.skills:  # in journals of earlier versions no event brings them
         state = replace(state, skills=dict(skills))
     pending = Unconfirmed(snapshot.unconfirmed)
-    archived: list[Archive] = []
     replayed = 0
+    on_effects([Archive(record) for record in state.over])
     for number, event in journal.events(snapshot.number):
         try:
             state, effects = step(state, event)
@@ -65,10 +70,8 @@ def recover(journal: EventJournal, skills: Mapping[str, SkillModel]) -> Recovere
             continue
         replayed += 1
         pending.note(effects)
-        archived += (effect for effect in effects if isinstance(effect, Archive))
-    return Recovered(
-        state, replayed, tuple(pending.retracted()), pending.concluded(), tuple(archived)
-    )
+        on_effects(effects)
+    return Recovered(state, replayed, tuple(pending.retracted()), pending.concluded())
 
 
 class Unconfirmed:

@@ -9,7 +9,7 @@ from typing import Any
 
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload, Unreachable
 from keyexpr_schema.ids import check_id
-from keyexpr_schema.key import A, Address, Delivery, Key, P, Payload
+from keyexpr_schema.key import A, Address, Delivery, Key, KeyTree, P, Payload
 from keyexpr_schema.transport.connecting import open_link
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
@@ -136,6 +136,17 @@ class Session:
             Unconfirmed: the old value was still there after `timeout_s`.
         """
         await self._confirm(key, address, None, timeout_s)
+
+    async def delete_tree(self, tree: KeyTree, name: str, timeout_s: float = 10.0) -> None:
+        """Delete every value about `name`, and return when the store has none, or newer ones.
+
+        Raises:
+            Unconfirmed: there were old values after `timeout_s`.
+        """
+        keyexpr = tree.build(name)
+        for key in tree.keys:
+            self._trace.note("delete", key, keyexpr)
+        await self._store.write(tree.keys[0], keyexpr, None, timeout_s)
 
     async def _confirm(
         self, key: Key[A, Any], address: A, data: bytes | None, timeout_s: float

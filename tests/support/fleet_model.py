@@ -15,7 +15,7 @@ from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry
 from fleet.core.planning_input import PlanningInput
-from fleet.core.state import Policy, State
+from fleet.core.state import LOGIC, Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
 from fleet.service.planning.planning_job import run_planning_job
@@ -64,7 +64,7 @@ class FleetModel:
         """When each attempt was started."""
         self.reports: list[Report] = []
         self._truth: dict[tuple[str, str], Value] = {}
-        self.receive(events.PlannerStarted, epoch=1, incarnation="one", skills=dict(SKILLS))
+        self._start(epoch=1, incarnation="one")
         for place in PLACES:
             self.receive(events.PlacePut, place=place)
         for number in range(1, cups + 1):
@@ -74,6 +74,16 @@ class FleetModel:
             self.receive(events.RobotRegistered, spec=spec)
             self.receive(events.WorkerConnected, robot=spec.robot, incarnation="i1")
             self.learn(spec.robot, "holding", "nothing")
+
+    def _start(self, epoch: int, incarnation: str) -> None:
+        self.receive(
+            events.PlannerStarted,
+            epoch=epoch,
+            incarnation=incarnation,
+            skills=dict(SKILLS),
+            logic=LOGIC,
+            lineage=incarnation,
+        )
 
     # --- what happens to the planner -------------------------------------------------------------
 
@@ -190,12 +200,17 @@ class FleetModel:
         """Orders that stand, in a fixed order."""
         return [d for _, d in sorted(self.documents.items()) if isinstance(d, Order)]
 
+    def wanted(self) -> list[Order]:
+        """Orders that stand and are not cancelled."""
+        return [order for order in self.orders() if not order.cancelled]
+
     def goal_state(self, goal: str) -> GoalState:
         """How a goal stands."""
         return self.state.goal_states[goal].state
 
     def report(self, order: Order, state: ReportState, **more: Any) -> None:
         """A worker reports on an order."""
+        more = {"planner": order.planner, **more}
         report = Report(
             robot=order.robot,
             plan=order.plan,
@@ -268,11 +283,11 @@ class FleetModel:
         self.receive(events.WorkerConnected, robot=robot, incarnation="i1")
 
     def finish(self, limit: int = 500) -> None:
-        """Jobs are answered and orders carried out, until there are none left."""
+        """Jobs are answered and orders carried out, until there are none left for robots there."""
         for _ in range(limit):
             if self.answers:
                 self.answer()
-            elif orders := self.orders():
+            elif orders := [o for o in self.orders() if self.state.connected.get(o.robot)]:
                 self.succeed(orders[0])
             else:
                 return
@@ -288,7 +303,7 @@ class FleetModel:
             state, _ = step(state, decode_event(line))
         assert state == self.state, "the journal replays to another state"
         self.state = state
-        self.receive(events.PlannerStarted, epoch=state.epoch + 1, incarnation="again")
+        self._start(epoch=state.epoch + 1, incarnation="again")
         self._take(effects_of(self.state))
 
 

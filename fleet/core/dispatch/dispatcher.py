@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from fleet.core.dispatch.deadlock import break_deadlock
 from fleet.core.dispatch.delays import late_task, next_lateness
-from fleet.core.dispatch.lost_robots import fail_tasks_of_lost_robots, next_loss
+from fleet.core.dispatch.lost_robots import give_up_work_of_lost_robots, lost, next_loss
 from fleet.core.dispatch.ready_tasks import by_priority, order_if_ready
 from fleet.core.dispatch.replan_triggers import new_robots, why_replan
 from fleet.core.handlers.goals import next_stage
@@ -22,7 +22,7 @@ from keyexpr_schema.payloads.tasks import TaskState
 
 def advance(state: State) -> State:
     """Take every plan as far as it goes without news: orders, replans, ends."""
-    state = fail_tasks_of_lost_robots(state)
+    state = give_up_work_of_lost_robots(state)
     if state.policy.auto_plan:
         state = plan_waiting_goals(state)
     plans = by_priority(state)
@@ -45,11 +45,18 @@ def next_timer(state: State) -> float | None:
 
 
 def _cancel(state: State, entry: PlanEntry) -> State:
-    if entry.outstanding():
+    outstanding = entry.outstanding()
+    if any(record.robot is None or not lost(state, record.robot) for record in outstanding):
         return state  # their orders now say `cancelled`; the workers' reports bring us back here
+    unwanted = tuple(record.task for record in outstanding)
     records = with_waiting_cancelled(entry, "the plan was cancelled")
     entry = replace(
-        entry, state=PlanState.CANCELLED, cancelling=False, records=records, replan=None
+        entry,
+        state=PlanState.CANCELLED,
+        cancelling=False,
+        records=records,
+        unwanted=unwanted,
+        replan=None,
     )
     state = set_entry(state, entry)
     return mark_goals(

@@ -45,30 +45,38 @@ def order_if_ready(state: State, plan: str, record: TaskRecord, reservations: bo
         return give_up(state, entry, reason)
     if not all(_is_free(state, robot, plan, reservations) for robot in action.participants):
         return state
-    if _touches_unwanted_work(state, entry, action):
+    if _touches_unwanted_work(state, action):
         return state
     if (unmet := unmet_before(action, state.world())) is not None:
         reason = f"{record.task} ({record.skill}) cannot start: {unmet}"
         return set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason))
+    serial = state.attempts_made + 1
+    state = replace(state, attempts_made=serial)
     ordered = replace(
         record,
         state=TaskState.ORDERED,
         attempt=record.attempt + 1,
+        # A plan of before lineages: its workers count attempts without numbers.
+        serial=0 if entry.lineage is None else serial,
         ordered_s=state.time_s if record.ordered_s is None else record.ordered_s,
         way_s=_way_s(state, action),
     )
     return set_record(state, entry, ordered)
 
 
-def _touches_unwanted_work(state: State, entry: PlanEntry, action: Action) -> bool:
-    """Whether a task that is being cancelled, and has not confirmed it, is about the same facts."""
+def _touches_unwanted_work(state: State, action: Action) -> bool:
+    """Whether a task that is being cancelled, and has not confirmed it, is about the same facts.
+
+    That of a robot that is lost, or of a plan that is over, may be carried out as well.
+    """
     variables = action.variables
-    for task in entry.unwanted:
-        record = entry.records[task]
-        if record.state in OUTSTANDING:
-            other = action_of(record, state.skills)
-            if other is None or variables & other.variables:
-                return True
+    for entry in state.plans.values():
+        for task in entry.unwanted:
+            record = entry.records[task]
+            if record.state in OUTSTANDING:
+                other = action_of(record, state.skills)
+                if other is None or variables & other.variables:
+                    return True
     return False
 
 

@@ -36,7 +36,9 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     for goal, reason in event.postponed.items():
         state = mark_goals(state, (goal,), GoalState.WAITING, None, reason)
     event = replace(event, plan=_for_goals_of_now(state, entry, job, event))
-    revision = reconcile(entry, event, state.world(), frozenset(job.under_way))
+    # What was given up meanwhile is cancelled: nothing can go on with it.
+    under_way = frozenset(job.under_way) - set(entry.unwanted)
+    revision = reconcile(entry, event, state.world(), under_way)
     added = (goal for goal in entry.plan.goals if goal not in job.goals)
     to = entry.state
     if first:
@@ -88,6 +90,7 @@ def _as_it_was(entry: PlanEntry, job: PlanningJob, event: events.PlanningSucceed
         and not event.postponed
         and event.allocation.items() <= job.previous_allocation.items()
         and all(record.state not in (TaskState.FAILED, TaskState.CANCELLED) for record in current)
+        and not any(record.task in entry.unwanted for record in current)
         and len(event.plan.tasks) == sum(record.state not in ENDED_TASKS for record in current)
     )
 

@@ -17,6 +17,7 @@ from fleet.core.state_updates import (
     give_up,
     mark_goals,
     open_goals,
+    set_entry,
     set_record,
     without_goal,
 )
@@ -31,7 +32,7 @@ MAX_ATTEMPTS = 3
 
 
 def report_received(state: State, event: events.ReportReceived) -> State:
-    """A report of an attempt that is not current only brings facts."""
+    """A report of an attempt that is not current, or of another planner's, only brings facts."""
     report = event.report
     for fact in report.facts:
         state = believe_if_newer(state, fact)
@@ -40,6 +41,7 @@ def report_received(state: State, event: events.ReportReceived) -> State:
     if (
         entry is None
         or record is None
+        or report.planner not in (None, entry.lineage)
         or record.state not in OUTSTANDING
         or (report.robot, report.attempt) != (record.robot, record.attempt)
     ):
@@ -59,6 +61,8 @@ def report_received(state: State, event: events.ReportReceived) -> State:
         case ReportState.INTERRUPTED:
             return _interrupted(state, entry, record, report)
         case ReportState.REFUSED:
+            if entry.ended or record.task in entry.unwanted:
+                return set_record(state, entry, _ended(record, report, TaskState.CANCELLED))
             if report.retryable and record.attempt < MAX_ATTEMPTS:
                 return set_record(state, entry, _again(record, report))
             return _failed(state, entry, record, report)
@@ -92,7 +96,31 @@ def _succeeded(state: State, entry: PlanEntry, record: TaskRecord, report: Repor
         if literal.variable not in reported:
             time_s = report.ended_s or state.time_s
             state = conclude(state, Fact.of(literal, PLANNER_SOURCE, time_s))
-    return set_record(state, entry, _ended(record, report, TaskState.SUCCEEDED))
+    entry = replace(
+        entry,
+        records=entry.records.set(record.task, _ended(record, report, TaskState.SUCCEEDED)),
+    )
+    if record.task in entry.unwanted:
+        entry = _counting_late_success(entry, record)
+    return set_entry(state, entry)
+
+
+def _counting_late_success(entry: PlanEntry, done: TaskRecord) -> PlanEntry:
+    """What was done after it had been given up need not be done again, if it is still wanted."""
+    for record in entry.current():
+        if (
+            record.state is TaskState.WAITING
+            and (record.skill, record.args) == (done.skill, done.args)
+            and all(
+                entry.records[before].state is TaskState.SUCCEEDED
+                for before in (*record.after, *record.behind)
+                if before in entry.records
+            )
+        ):
+            reason = f"{done.robot} had done it as {done.task}"
+            again = replace(record, state=TaskState.SUCCEEDED, reason=reason)
+            return replace(entry, records=entry.records.set(record.task, again))
+    return entry
 
 
 def _learned(state: State, record: TaskRecord, report: Report, action: Action | None) -> State:

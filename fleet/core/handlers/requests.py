@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from msgspec.structs import replace
@@ -14,6 +15,8 @@ from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState, Task
 from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest, ReplanRequest
+
+_NUMBERED = re.compile("plan-([1-9][0-9]{0,14})")
 
 
 def plan_requested(state: State, event: events.PlanRequested) -> State:
@@ -75,11 +78,13 @@ def _planning(state: State, plan: Plan, job: PlanningJob) -> State:
         state=PlanState.PLANNING,
         planner=job.planner,
         start=plan.autostart,
+        lineage=state.lineage or None,
         job=job,
         begun_s=state.time_s,
         begun_wall_s=state.wall_time_s,
     )
-    return set_entry(replace(state, jobs=job.job), entry)
+    made = max(state.plans_made, _plan_number(plan.plan))
+    return set_entry(replace(state, jobs=job.job, plans_made=made), entry)
 
 
 def _why_not_plan(state: State, plan: str | None, goals: tuple[str, ...]) -> str | None:
@@ -110,8 +115,14 @@ def _waiting_goals(state: State) -> Iterator[str]:
             yield goal
 
 
+def _plan_number(plan: str) -> int:
+    """`N` where the plan is called `plan-N`, else 0."""
+    named = _NUMBERED.fullmatch(plan)
+    return 0 if named is None else int(named[1])
+
+
 def _new_plan_name(state: State) -> str:
-    number = 1
+    number = state.plans_made + 1 if state.logic else 1
     while f"plan-{number}" in state.plans or f"plan-{number}" in state.past_plans:
         number += 1
     return f"plan-{number}"
@@ -199,6 +210,11 @@ def _cancel(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
 def _delete(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if not entry.ended and entry.state not in (PlanState.READY, PlanState.PROPOSED):
         return f"plan {ask.plan} is {entry.state.value}; cancel it before deleting it"
+    if working := [f"{r.robot} with {r.task}" for r in entry.outstanding()]:
+        return (
+            f"plan {ask.plan} has orders that may still be carried out: {', '.join(working)}; "
+            "delete it when those robots have reported; unregister one that does not come back"
+        )
     state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None)
     state = replace(state, plans=state.plans.without(ask.plan))
     return answer(state, ask.request, True, f"plan {ask.plan} is deleted")

@@ -28,20 +28,19 @@ def robot_unregistered(state: State, event: events.RobotUnregistered) -> State:
     return replace(
         state,
         robots=state.robots.without(event.robot),
-        gone_since=state.gone_since.set(event.robot, 0.0),
+        gone_since=state.gone_since.set(event.robot, event.wall_time_s),
     )
 
 
 def worker_connected(state: State, event: events.WorkerConnected) -> State:
-    """The robot is no longer away."""
+    """The robot is no longer away, if it is registered."""
     runs = state.connected.get(event.robot, ())
     if event.incarnation in runs:
         return state
-    return replace(
-        state,
-        connected=state.connected.set(event.robot, (*runs, event.incarnation)),
-        gone_since=state.gone_since.without(event.robot),
-    )
+    state = replace(state, connected=state.connected.set(event.robot, (*runs, event.incarnation)))
+    if event.robot not in state.robots:
+        return state
+    return replace(state, gone_since=state.gone_since.without(event.robot))
 
 
 def worker_disconnected(state: State, event: events.WorkerDisconnected) -> State:

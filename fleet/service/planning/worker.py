@@ -34,8 +34,8 @@ from fleet.service.planning.messages import (
 )
 from fleet.service.planning.planning_job import run_interpretation, run_planning_job
 
-NICENESS = 10
-"""Dispatching comes before planning where both want the same core."""
+NICENESS = 5
+"""Dispatching comes before computing a plan where both want the same core, by a factor of three."""
 MEMORY_BYTES = 8 << 30
 """What the process may allocate; planning that wants more fails, and not the machine."""
 _PR_SET_PDEATHSIG = 1
@@ -60,7 +60,8 @@ def main() -> None:
         _send(answers, frame(Refused(str(error))))
         return
     _send(answers, frame(_greeting(composition)))
-    os.nice(NICENESS)
+    if not start.converses:
+        os.nice(NICENESS)
     threading.Thread(target=_warm_up, args=(composition, start.converses), daemon=True).start()
     while True:
         _send(answers, _answer(JOB.decode(frames.get()), composition))
@@ -127,9 +128,8 @@ def _answer(job: Job, composition: Composition) -> bytes:
         return frame(run_interpretation(job, composition))
     except BaseException as error:  # whatever a stranger's planner raises, SystemExit, too
         log.exception("a planning job failed")
-        return frame(
-            failed_answer(job, f"the planner failed: {str(error) or type(error).__name__}")
-        )
+        said = str(error) or type(error).__name__
+        return frame(failed_answer(job, f"the planner failed: {said}"))
 
 
 if __name__ == "__main__":

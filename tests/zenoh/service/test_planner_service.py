@@ -53,7 +53,11 @@ async def test_a_goal_is_planned_ordered_and_reached(router: RouterProcess, tmp_
     async with planner(router.endpoint, tmp_path), person(router.endpoint) as session:
         await ask_for_plan(session)
         await finish(session, set())
-        assert await session.list(ORDER) == {}
+
+        async def nothing_ordered() -> bool:
+            return await session.list(ORDER) == {}
+
+        await until(nothing_ordered, "the end of all orders")
 
 
 async def test_kill_9_in_the_middle_gives_no_attempt_twice(

@@ -70,6 +70,10 @@ def test_a_lost_robot_that_had_begun_is_followed_by_one_that_begins_anew() -> No
     assert order_of(model, "r2") == undisturbed
     assert {r.robot for r in entry(model).current() if r.state is TaskState.WAITING} == {"r2"}
     model.finish()
+    assert entry(model).state is PlanState.RUNNING  # the cup may be in r1's hand
+    model.return_("r1")
+    model.cancelled(order_of(model, "r1"))
+    model.finish()
     assert entry(model).state is PlanState.SUCCEEDED
 
 

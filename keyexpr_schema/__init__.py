@@ -35,7 +35,8 @@ else:
         __name__,
         {
             "errors": (
-                "CannotListen SchemaError ForeignKey InvalidId NoReply NoConfigFile Unconfirmed "
+                "CannotListen SchemaError ForeignKey InvalidId NoReply NoConfigFile Overtaken "
+                "Unconfirmed "
                 "UndecodablePayload Unreachable"
             ),
             "facts": (
@@ -48,7 +49,8 @@ else:
                 "GOAL_SPEC GOAL_STATUS FACT STATEMENT STATEMENT_STATUS PLACE OBJECT ROBOT_SPEC "
                 "ROBOT_STATE ROBOT_ALIVE ORDER REPORT DURATIONS PLAN_SPEC PLAN_PROPOSAL "
                 "PLAN_STATUS TASK_RECORD PLAN_REQUEST REPLAN_REQUEST CONTROL_REQUEST ANSWER "
-                "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE DIAGNOSTIC STORE_JOURNAL STORE_CHANGES "
+                "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE DIAGNOSTIC STORE_JOURNAL STORE_STAMPS "
+                "STORE_REPLACE STORE_CHANGES "
                 "SIM_MOTION SIM_SENSES SIM_CLOCK SIM_FRAMES SIM_SCENE SIM_TRUTH SIM_CONTACTS "
                 "KEYSPACE key_of"
             ),
@@ -67,9 +69,8 @@ else:
                 "Alive AliveAddress PoseMRad RobotActivity RobotAddress RobotSpec RobotState"
             ),
             "payloads.system": (
-                "Diagnostic DiagnosticAddress JournalEntry PlannerAddress PlannerAliveAddress "
-                "PlannerStatus StoreAddress StoreChanges StoreChangesQuery StoreJournal StoreQuery "
-                "StoredValue UndecodableAddress UndecodableValue"
+                "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE DIAGNOSTIC STORE_JOURNAL STORE_STAMPS "
+                "STORE_REPLACE STORE_CHANGES "
             ),
             "payloads.simulation": (
                 "Body ContactCount Frame Frames MotionCall QuaternionWxyz Scene Shape ShapeKind "

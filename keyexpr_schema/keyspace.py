@@ -193,6 +193,18 @@ STORE_JOURNAL = Key(
     about="What changed in the key-space, in the order in which the store applied it.",
     reply=system.StoreJournal,
 )
+STORE_STAMPS = Key(
+    "store_stamps", "store/stamps", system.StoreAddress, system.StoreStampsQuery,
+    delivery=QUERY, writers=ANYONE, readers=STORE,
+    about="Whether writes have arrived and are on disk: the timestamp that each key holds.",
+    reply=system.StoreStamps,
+)
+STORE_REPLACE = Key(
+    "store_replace", "store/replace", system.StoreAddress, system.StoreReplaceQuery,
+    delivery=QUERY, writers=ANYONE, readers=STORE,
+    about="Compare and set: writes a key unless somebody else has written it since it was seen.",
+    reply=system.StoreReplaced,
+)
 STORE_CHANGES = Key(
     "store_changes", "store/changes", system.StoreAddress, system.StoreChangesQuery,
     delivery=QUERY, writers=ANYONE, readers=STORE,
@@ -253,13 +265,24 @@ KEY_TREES = (PLAN_TREE, REPORT_TREE, GOAL_TREE, REQUEST_TREE, ANSWER_TREE)
 """What the planner deletes, whoever wrote it, when what it is about has been over for long."""
 
 
+def _shape(template: str) -> tuple[str, int]:
+    return template.partition("/")[0], template.count("/")
+
+
+_BY_SHAPE = {
+    shape: tuple(key for key in KEYSPACE if _shape(key.template) == shape)
+    for shape in {_shape(key.template) for key in KEYSPACE}
+}
+"""Keys by first chunk and length, so that `key_of` tries few of them."""
+
+
 def key_of(keyexpr: str) -> Key[Any, Any]:
     """The row of the table that a key expression without wildcards belongs to.
 
     Raises:
         ForeignKey: it belongs to none.
     """
-    for key in KEYSPACE:
+    for key in _BY_SHAPE.get(_shape(keyexpr), ()):
         try:
             key.parse(keyexpr)
         except ForeignKey:

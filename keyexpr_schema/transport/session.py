@@ -15,7 +15,7 @@ from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
 from keyexpr_schema.transport.queries import QueryServer, send_query
 from keyexpr_schema.transport.samples import Sample, decode_value, encoding_of
-from keyexpr_schema.transport.store_client import StoreClient
+from keyexpr_schema.transport.store.client import StoreClient
 from keyexpr_schema.transport.trace import Trace
 from keyexpr_schema.transport.undecodable import UndecodableReports
 from keyexpr_schema.transport.watch import Change, Narrowed, Watch
@@ -119,21 +119,24 @@ class Session:
     async def confirm(
         self, key: Key[A, P], address: A, payload: P, timeout_s: float = 10.0
     ) -> None:
-        """Put, and return when the store holds this value or a newer one.
+        """Put, and return when the store holds exactly this value, or a later one of this session.
 
-        The put is repeated with the same timestamp, so repeating it does no harm.
+        The put is repeated with the same timestamp, so repeating it does no harm. Calls that wait
+        at the same time are confirmed by one question to the store.
 
         Raises:
-            Unconfirmed: it was not read back within `timeout_s`; it may still arrive.
+            Overtaken: somebody else's value has a later timestamp; this one is not stored.
+            Unconfirmed: it was not confirmed within `timeout_s`; it may still arrive.
             UndecodablePayload: no reader could read it, so it is not put at all.
         """
         await self._confirm(key, address, key.check(payload, address), timeout_s)
 
     async def delete(self, key: Key[A, P], address: A, timeout_s: float = 10.0) -> None:
-        """Delete, and return when the store has no value of this key, or a newer one.
+        """Delete, and return when the store has done so.
 
         Raises:
-            Unconfirmed: the old value was still there after `timeout_s`.
+            Overtaken: somebody else's value has a later timestamp; it is still there.
+            Unconfirmed: it was not confirmed within `timeout_s`; it may still be carried out.
         """
         await self._confirm(key, address, None, timeout_s)
 

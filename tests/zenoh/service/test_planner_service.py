@@ -32,6 +32,7 @@ from keyexpr_schema.payloads.robots import AliveAddress, RobotAddress
 from keyexpr_schema.payloads.system import PlannerAddress
 from keyexpr_schema.payloads.tasks import OrderAddress
 from keyexpr_schema.payloads.world import FactAddress
+from keyexpr_schema.transport.link import Put
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from tests.support.household import fact, manipulator
 from tests.support.planner_process import (
@@ -176,9 +177,9 @@ async def test_what_is_malformed_or_unknown_is_told_and_disturbs_nobody(
 ) -> None:
     async with planner(router.endpoint, tmp_path), person(router.endpoint) as session:
         for keyexpr in ("goals/bad/spec", "requests/plan/bad", "world/facts/cup_1/colour"):
-            await session.link.send(
-                keyexpr, b'{"goal": 7, "text":', "application/json", session.link.new_timestamp()
-            )
+            data = b'{"goal": 7, "text":'
+            stamp = session.link.new_timestamp()
+            await session.link.send(Put(keyexpr, data, "application/json", stamp))
         dragon = Goal(goal="dragon", text="Bring the dragon to the hallway")
         await session.confirm(GOAL_SPEC, GoalAddress("dragon"), dragon)
         status = await value(session, GOAL_STATUS, GoalAddress("dragon"), state=GoalState.REJECTED)

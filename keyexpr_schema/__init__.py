@@ -69,8 +69,10 @@ else:
                 "Alive AliveAddress PoseMRad RobotActivity RobotAddress RobotSpec RobotState"
             ),
             "payloads.system": (
-                "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE DIAGNOSTIC STORE_JOURNAL STORE_STAMPS "
-                "STORE_REPLACE STORE_CHANGES "
+                "Diagnostic DiagnosticAddress JournalEntry PlannerAddress PlannerAliveAddress "
+                "PlannerStatus StoreAddress StoreChanges StoreChangesQuery StoreJournal "
+                "StoreQuery StoreReplaced StoreReplaceQuery StoreStamps StoreStampsQuery "
+                "StoredValue UndecodableAddress UndecodableValue"
             ),
             "payloads.simulation": (
                 "Body ContactCount Frame Frames MotionCall QuaternionWxyz Scene Shape ShapeKind "

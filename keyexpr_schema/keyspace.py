@@ -56,7 +56,7 @@ STATEMENT = Key(
 STATEMENT_STATUS = Key(
     "statement_status", "world/statements/{statement}/status",
     world.StatementAddress, world.StatementStatus,
-    delivery=STORED, writers=PLANNER, readers=PERSON,
+    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
     about="The facts that the planner read out of a statement, or why it read none.",
 )
 PLACE = Key(
@@ -236,7 +236,7 @@ SIM_FRAMES = Key(
 )
 SIM_SCENE = Key(
     "sim_scene", "sim/scene", simulation.SimAddress, simulation.Scene,
-    delivery=STORED, writers=SIMULATION, readers=SIMULATION | PERSON | RECORDER,
+    delivery=STORED, writers=SIMULATION, readers=PLANNER | SIMULATION | PERSON | RECORDER,
     about="The shapes of every body, and where the fixed ones stand.",
 )
 SIM_TRUTH = Key(

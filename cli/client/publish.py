@@ -70,7 +70,7 @@ async def put_statement(session: Session, text: str, name: str | None = None) ->
         stored = await session.list(STATEMENT)
         same = [a.statement for a, known in stored.items() if known.text == text]
         name = same[0] if same else free_name(text, (a.statement for a in stored), "statement")
-    statement = Statement(statement=name, text=text)
+    statement = Statement(statement=name, text=text, said_s=await fleet_time_s(session))
     await session.confirm(STATEMENT, StatementAddress(name), statement)
     return statement
 
@@ -107,20 +107,13 @@ async def fleet_time_s(session: Session) -> float:
     A realm that has a simulated scene whose clock is not heard has stopped; then the time is the
     latest that a robot has reported: Unix time would outdate whatever the simulation says later.
     """
-    heard: float | None = None
-    simulated = False
-    async with session.watch(SIM_CLOCK, SIM_SCENE) as watch:
-        with suppress(TimeoutError):
-            async with asyncio.timeout(CLOCK_S):
-                async for change in watch:
-                    if change.key is SIM_CLOCK and change.value is not None:
-                        heard = change.value.time_s
-                        break
-                    simulated = simulated or change.value is not None
-    if heard is not None:
-        return heard
-    if not simulated:
+    if not await session.list(SIM_SCENE):
         return time.time()
+    with suppress(TimeoutError):
+        async with session.watch(SIM_CLOCK) as watch, asyncio.timeout(CLOCK_S):
+            async for change in watch:
+                if change.value is not None:
+                    return float(change.value.time_s)
     states = (await session.list(ROBOT_STATE)).values()
     return max((state.time_s for state in states), default=0.0)
 
@@ -145,12 +138,14 @@ async def put_goal(
         raise BadArgument(
             f"there is a goal {name!r} already: “{stored[name].text}”; use another --id"
         )
+    said_s = await fleet_time_s(session)
     spec = Goal(
         goal=name if name is not None else free_name(text, [*stored, *ended], "goal"),
         text=text,
         priority=priority,
-        due_s=None if within_s is None else await fleet_time_s(session) + within_s,
+        due_s=None if within_s is None else said_s + within_s,
         ordinal=1 + max((each.ordinal for each in stored.values()), default=0),
+        said_s=said_s,
     )
     await session.confirm(GOAL_SPEC, GoalAddress(spec.goal), spec)
     return spec

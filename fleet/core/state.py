@@ -50,8 +50,12 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     """Names the journal that this state comes from; attempts of another planner have another."""
     epoch: int = 0
     incarnation: str = "none"
+    era: int = 0
+    """Counts up when the fleet's clock is set back; times of different eras do not compare."""
     time_s: float = 0.0
     wall_time_s: float = 0.0
+    monotonic_s: float = 0.0
+    """On a clock that nobody sets; see `Event.monotonic_s`."""
     goals: Table[str, Goal] = Table()
     goal_states: Table[str, GoalStatus] = Table()
     statements: Table[str, Statement] = Table()
@@ -60,6 +64,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     objects: Table[str, Object] = Table()
     robots: Table[str, RobotSpec] = Table()
     facts: Table[FactKey, Fact] = Table()
+    older_facts: Table[FactKey, None] = Table()
+    """Variables whose fact was said in an earlier era."""
     concluded: Table[FactKey, Fact] = Table()
     """What the planner itself concluded last of each variable, whatever is believed of it now."""
     durations: dict[str, Durations] = {}
@@ -67,7 +73,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     connected: Table[str, tuple[str, ...]] = Table()
     """The runs of each robot's worker that are connected."""
     gone_since: Table[str, float] = Table()
-    """Unix time [s] at which the last worker of a robot went away."""
+    """When the last worker of a robot went away, on the clock of `monotonic_s`."""
     plans: Table[str, PlanEntry] = Table()
     past_plans: tuple[str, ...] = ()
     plans_made: int = 0

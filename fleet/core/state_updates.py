@@ -15,12 +15,33 @@ from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact
 
+AHEAD_S = 60.0
+"""A fact from further ahead than this [s] was said in an earlier era, if there was one."""
+COMPARED_SINCE_LOGIC = 1
+"""Before this logic of the core, only facts in reports gave way to newer ones."""
+
 
 def believe(state: State, fact: Fact) -> State:
-    """Believe a fact, whatever was known of its variable."""
-    if state.facts.get(fact.key) == fact:
+    """Believe a fact, unless a newer one is known: the newest word holds, on whatever way it came.
+
+    One that does not say when it was said (0) is said now.
+    """
+    known = state.facts.get(fact.key)
+    if known == fact:
         return state
-    return replace(state, facts=state.facts.set(fact.key, fact))
+    earlier = _said_in_earlier_era(state, fact)
+    if known is not None and fact.time_s != 0.0 and state.logic >= COMPARED_SINCE_LOGIC:
+        known_earlier = fact.key in state.older_facts
+        if earlier > known_earlier or (earlier == known_earlier and fact.time_s < known.time_s):
+            return state
+    older = state.older_facts.without(fact.key)
+    if earlier:
+        older = older.set(fact.key, None)
+    return replace(state, facts=state.facts.set(fact.key, fact), older_facts=older)
+
+
+def _said_in_earlier_era(state: State, fact: Fact) -> bool:
+    return state.era > 0 and fact.time_s > state.time_s + AHEAD_S
 
 
 def conclude(state: State, fact: Fact) -> State:
@@ -29,12 +50,6 @@ def conclude(state: State, fact: Fact) -> State:
     if believed is state:
         return state
     return replace(believed, concluded=state.concluded.set(fact.key, fact))
-
-
-def believe_if_newer(state: State, fact: Fact) -> State:
-    """Believe a fact that came on another way than its key, unless a newer one is known."""
-    known = state.fact(fact.relation, fact.subject)
-    return state if known is not None and fact.time_s < known.time_s else believe(state, fact)
 
 
 def set_goal(state: State, status: GoalStatus) -> State:

@@ -12,6 +12,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.clocks import at_time_of, with_clock_of_new_run
 from fleet.core.dispatch import dispatcher
 from fleet.core.effects import Effect, effects_between
 from fleet.core.events import Event
@@ -25,6 +26,7 @@ from keyexpr_schema.payloads.goals import ENDED_GOALS
 def _planner_started(state: State, event: events.PlannerStarted) -> State:
     if state.logic < SINCE_LOGIC <= event.logic:
         state = everything_perhaps_over(state)
+    state = with_clock_of_new_run(state, event)
     return replace(
         state,
         epoch=event.epoch,
@@ -45,6 +47,9 @@ def _prior_state_loaded(state: State, event: events.PriorStateLoaded) -> State:
         answers=Table({**answers, **state.answers}),
         durations={**{known.model: known for known in event.durations}, **state.durations},
         goal_states=Table({**goals, **state.goal_states}),
+        statement_states=Table(
+            {**{status.statement: status for status in event.statements}, **state.statement_states}
+        ),
         past_plans=(*state.past_plans, *(p for p in event.plans if p not in state.plans)),
     )
 
@@ -84,15 +89,10 @@ def step(state: State, event: Event) -> tuple[State, tuple[Effect, ...]]:
 
     An event that changes nothing gives back the very same state and no effects.
     """
-    now = replace(
-        state,
-        time_s=max(state.time_s, event.time_s),
-        wall_time_s=max(state.wall_time_s, event.wall_time_s),
-        over=(),
-    )
+    now = at_time_of(state, event)
     handled = _HANDLERS[type(event)](now, event)
     settled = let_go(dispatcher.advance(handled))
-    if settled is now:
+    if settled is now and now.era == state.era:
         return state, ()
     return settled, effects_between(state, settled)
 

@@ -25,6 +25,7 @@ from keyexpr_schema.keyspace import (
     PLAN_STATUS,
     ROBOT_SPEC,
     STATEMENT,
+    STATEMENT_STATUS,
     TASK_RECORD,
 )
 from keyexpr_schema.payloads.goals import GoalAddress
@@ -54,7 +55,8 @@ def known_keys(
     Facts that the planner concluded, and perhaps never published, were perhaps never on their key.
     """
     yield from ((GOAL_SPEC, GoalAddress(goal)) for goal in state.goals)
-    yield from ((STATEMENT, StatementAddress(name)) for name in state.statements)
+    statements = {**state.statements, **state.statement_states}
+    yield from ((STATEMENT, StatementAddress(name)) for name in statements)
     yield from ((PLACE, PlaceAddress(place)) for place in state.places)
     yield from ((OBJECT, ObjectAddress(thing)) for thing in state.objects)
     yield from ((ROBOT_SPEC, RobotAddress(robot)) for robot in state.robots)
@@ -74,10 +76,12 @@ async def prior_state(session: Session, at: At) -> PriorStateLoaded:
     goals = await session.list(GOAL_STATUS)
     plans = await session.list(PLAN_STATUS)
     durations = await session.list(DURATIONS)
+    statements = await session.list(STATEMENT_STATUS)
     return PriorStateLoaded(
         answers=tuple(answers.values()),
         goals=tuple(goals.values()),
         plans=tuple(address.plan for address in plans),
+        statements=tuple(statements.values()),
         durations=tuple(durations.values()),
         **at,
     )

@@ -203,4 +203,5 @@ class EventJournal:
 
 def _digest(event: Event) -> str:
     """What tells an event from others, whenever it comes."""
-    return hashlib.sha256(encode_event(replace(event, time_s=0.0, wall_time_s=0.0))).hexdigest()
+    timeless = replace(event, time_s=0.0, wall_time_s=0.0, monotonic_s=None)
+    return hashlib.sha256(encode_event(timeless)).hexdigest()

@@ -102,6 +102,7 @@ class JournaledCore:
                 reason=f"the plan that was made cannot be taken over ({reason})",
                 time_s=event.time_s,
                 wall_time_s=event.wall_time_s,
+                monotonic_s=event.monotonic_s,
             )
         )
 

@@ -13,7 +13,6 @@ from typing import Any
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.dispatch.delays import SAME_CLOCK_S
 from fleet.core.effects import DropJob, Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import At, Event
 from fleet.core.model.skills import Skills, phrases_of
@@ -32,6 +31,7 @@ from fleet.service.catch_up import (
 from fleet.service.diagnostics import Diagnostics
 from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, event_of
+from fleet.service.fleet_clock import FleetClock
 from fleet.service.journaled_core import JournaledCore
 from fleet.service.outbox import Outbox
 from fleet.service.past import Past
@@ -46,6 +46,7 @@ from keyexpr_schema.keyspace import (
     REPORT,
     ROBOT_ALIVE,
     SIM_CLOCK,
+    SIM_SCENE,
 )
 from keyexpr_schema.payloads.system import PlannerAddress, PlannerAliveAddress, PlannerStatus
 from keyexpr_schema.payloads.world import FactAddress
@@ -76,7 +77,7 @@ class PlannerService:
         self._skills = dict(skills)
         self._policy = replace(policy, skill_phrases=phrases_of(skills))
         self._incarnation = uuid.uuid4().hex[:12]
-        self._time_s = 0.0
+        self._clock = FleetClock()
         self._outbox = Outbox(session)
         self._diagnostics = Diagnostics(session, self._outbox)
         self._core = JournaledCore(journal, self._diagnostics.set_aside)
@@ -114,6 +115,8 @@ class PlannerService:
                 )
             )
             tokens = await stack.enter_async_context(self._session.watch_tokens(ROBOT_ALIVE))
+            scenes = await self._session.list(SIM_SCENE)
+            self._clock.resume(self.state.time_s, bool(scenes))
             if first_run:
                 self._apply(await prior_state(self._session, self._at()))
             await self._take_charge()
@@ -141,10 +144,7 @@ class PlannerService:
                 self._core.keep_last_snapshot(self._outbox.unconfirmed)
 
     def _at(self) -> At:
-        now_s = time.time()
-        if abs(now_s - self._time_s) < SAME_CLOCK_S:
-            self._time_s = now_s  # no simulation: the fleet's clock goes on without messages, too
-        return {"time_s": self._time_s, "wall_time_s": now_s}
+        return self._clock.at()
 
     async def _take_charge(self) -> None:
         parts = await self._pool.ready()
@@ -234,7 +234,7 @@ class PlannerService:
     def _on_change(self, change: Any) -> None:
         if change.key is SIM_CLOCK:
             if change.value is not None:
-                self._time_s = change.value.time_s
+                self._clock.ticked(change.value.time_s)
         elif change.key is PLANNER_STATUS:
             other = change.value
             if other is not None and other.epoch > self.state.epoch:
@@ -243,7 +243,9 @@ class PlannerService:
                     f"{self._session.config.realm} (epoch {other.epoch}); this one stops"
                 )
         elif (event := event_of(change, self._at())) is not None:
-            self._time_s = max(self._time_s, _report_time_s(event))
+            if self._held is None and isinstance(event, events.ReportReceived):
+                report = event.report
+                self._clock.reported(report.ended_s or report.started_s or 0.0)
             self._inbox.put_nowait(event)
 
     async def _watch_workers(self, tokens: TokenWatch[Any]) -> None:
@@ -261,11 +263,11 @@ class PlannerService:
         while True:
             timer_s = timers.next(self.state)
             try:
-                async with asyncio.timeout(None if timer_s is None else timer_s - time.time()):
+                async with asyncio.timeout(None if timer_s is None else timer_s - time.monotonic()):
                     event = await self._inbox.get()
             except TimeoutError:
                 event = events.TimerFired(**self._at())
-                timers.fired(time.time())
+                timers.fired(time.monotonic())
             self._apply(event)
 
     def _apply(self, event: Event) -> None:
@@ -300,9 +302,3 @@ class PlannerService:
         while True:
             answer = await self._pool.answers.get()
             self._inbox.put_nowait(replace(answer, **self._at()))
-
-
-def _report_time_s(event: Event) -> float:
-    if isinstance(event, events.ReportReceived):
-        return event.report.ended_s or event.report.started_s or 0.0
-    return 0.0

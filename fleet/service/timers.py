@@ -27,7 +27,7 @@ class Timers:
         self._not_before_s = 0.0
 
     def next(self, state: State) -> float | None:
-        """The Unix time [s] of the next timer, if there is one."""
+        """When the next timer runs out, by the monotonic clock [s], if there is one."""
         try:
             self._timer_s = next_timer(state)
         except Exception:

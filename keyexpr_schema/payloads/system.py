@@ -98,13 +98,9 @@ class StoreJournal(Payload, frozen=True, kw_only=True):
 
 
 class StoreStampsQuery(Payload, frozen=True, kw_only=True):
-    """Asks the store for the newest write of each of these keys.
-
-    `timestamps`: which are expected there at least, because the asker has just put them.
-    """
+    """Asks the store for the newest write of each of these keys."""
 
     keys: tuple[str, ...]
-    timestamps: tuple[str, ...] = ()
 
 
 class StoreStamps(Payload, frozen=True, kw_only=True):
@@ -126,9 +122,14 @@ class StoreReplaceQuery(Payload, frozen=True, kw_only=True):
 
 
 class StoreReplaced(Payload, frozen=True, kw_only=True):
-    """Whether the store has written the key, and what it holds now (`value` missing: nothing)."""
+    """Whether the store has written the key, and what it holds now (`value` missing: nothing).
+
+    `behind_s` [s]: it could not, because whoever wrote the key last had a clock that far ahead;
+    ask again after that time.
+    """
 
     done: bool
+    behind_s: float = 0.0
     timestamp: str = ""
     value: str | None = None
     encoding: str = ""

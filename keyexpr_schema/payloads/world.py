@@ -79,19 +79,25 @@ class Fact(Payload, frozen=True, kw_only=True):
 
 
 class Statement(Payload, frozen=True, kw_only=True):
-    """A sentence about the world, kept as it was written."""
+    """A sentence about the world, kept as it was written.
+
+    `said_s` is when it was said, on the fleet's clock [s]; 0: it does not say. The same sentence
+    said again is news, and its facts are believed as of then.
+    """
 
     statement: Id
     text: str
     source: str = "person"
+    said_s: float = 0.0
 
 
 class StatementStatus(Payload, frozen=True, kw_only=True):
-    """What the planner read out of a statement: facts, or why none."""
+    """What the planner read out of a statement: facts, or why none; `said_s` is the statement's."""
 
     statement: Id
     facts: tuple[Fact, ...] = ()
     reason: str | None = None
+    said_s: float = 0.0
 
 
 class Surface(Payload, frozen=True, kw_only=True):

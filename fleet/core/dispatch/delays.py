@@ -20,7 +20,7 @@ def late_task(state: State, entry: PlanEntry) -> TaskRecord | None:
 
 
 def next_lateness(state: State) -> float | None:
-    """The Unix time [s] at which the next task becomes late, where the fleet's clock tells it."""
+    """When the next task becomes late, by `State.monotonic_s`, where the fleet's clock tells it."""
     if abs(state.time_s - state.wall_time_s) > SAME_CLOCK_S:
         return None
     times = [
@@ -29,7 +29,7 @@ def next_lateness(state: State) -> float | None:
         if not entry.ended and entry.job is None and entry.replan is None
         for at_s, _ in _when_late(entry)
     ]
-    return min(times, default=None)
+    return state.monotonic_s + min(times) - state.time_s if times else None
 
 
 def _when_late(entry: PlanEntry) -> list[tuple[float, TaskRecord]]:

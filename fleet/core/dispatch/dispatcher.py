@@ -39,7 +39,7 @@ def advance(state: State) -> State:
 
 
 def next_timer(state: State) -> float | None:
-    """The Unix time [s] at which time alone changes something: a robot is lost, or a task late."""
+    """When time alone changes something, by `State.monotonic_s`: a loss, or a late task."""
     times = [at_s for at_s in (next_loss(state), next_lateness(state)) if at_s is not None]
     return min(times, default=None)
 

@@ -24,7 +24,7 @@ def lost(state: State, robot: str) -> bool:
     """Whether a robot is not to be waited for."""
     since = state.gone_since.get(robot)
     return since is not None and (
-        robot not in state.robots or state.wall_time_s - since >= state.policy.lost_after_s
+        robot not in state.robots or state.monotonic_s - since >= state.policy.lost_after_s
     )
 
 
@@ -45,7 +45,7 @@ def give_up_work_of_lost_robots(state: State) -> State:
 
 
 def next_loss(state: State) -> float | None:
-    """The Unix time [s] at which a robot that is away becomes lost to a plan that counts on it."""
+    """When, by `State.monotonic_s`, a robot that is away becomes lost to a plan that needs it."""
     counting = [
         entry
         for entry in state.plans.values()

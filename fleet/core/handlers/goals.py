@@ -115,7 +115,11 @@ def _begin_stage(state: State, goal: str) -> State:
         for subject in condition.subjects:
             fact = state.fact(condition.relation, subject)
             if condition.relation == SEARCHED and fact is not None and fact.value is True:
-                state = conclude(state, replace(fact, value=False, source=PLANNER_SOURCE))
+                since_s = state.time_s
+                if fact.key not in state.older_facts:
+                    since_s = max(since_s, fact.time_s)
+                unsearched = replace(fact, value=False, source=PLANNER_SOURCE, time_s=since_s)
+                state = conclude(state, unsearched)
     return state
 
 

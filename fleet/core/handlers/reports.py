@@ -12,7 +12,7 @@ from fleet.core.model.skills import Action
 from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import (
-    believe_if_newer,
+    believe,
     conclude,
     give_up,
     mark_goals,
@@ -35,7 +35,7 @@ def report_received(state: State, event: events.ReportReceived) -> State:
     """A report of an attempt that is not current, or of another planner's, only brings facts."""
     report = event.report
     for fact in report.facts:
-        state = believe_if_newer(state, fact)
+        state = believe(state, fact)
     entry = state.plans.get(report.plan)
     record = entry.records.get(report.task) if entry else None
     if (

@@ -28,7 +28,7 @@ def robot_unregistered(state: State, event: events.RobotUnregistered) -> State:
     return replace(
         state,
         robots=state.robots.without(event.robot),
-        gone_since=state.gone_since.set(event.robot, event.wall_time_s),
+        gone_since=state.gone_since.set(event.robot, state.monotonic_s),
     )
 
 
@@ -52,4 +52,4 @@ def worker_disconnected(state: State, event: events.WorkerDisconnected) -> State
     state = replace(state, connected=state.connected.set(event.robot, rest))
     if rest:
         return state
-    return replace(state, gone_since=state.gone_since.set(event.robot, event.wall_time_s))
+    return replace(state, gone_since=state.gone_since.set(event.robot, state.monotonic_s))

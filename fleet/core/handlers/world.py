@@ -32,7 +32,11 @@ def fact_put(state: State, event: events.FactPut) -> State:
 def fact_deleted(state: State, event: events.FactDeleted) -> State:
     """No longer believe anything of that variable."""
     key = FactKey(event.relation, event.subject)
-    return replace(state, facts=state.facts.without(key)) if key in state.facts else state
+    if key not in state.facts:
+        return state
+    return replace(
+        state, facts=state.facts.without(key), older_facts=state.older_facts.without(key)
+    )
 
 
 def place_put(state: State, event: events.PlacePut) -> State:

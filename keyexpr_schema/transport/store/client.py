@@ -16,26 +16,42 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from keyexpr_schema.errors import Unconfirmed, Unreachable
+from keyexpr_schema.errors import Overtaken, Unconfirmed, Unreachable
 from keyexpr_schema.key import Key, P
-from keyexpr_schema.keyspace import STORE_CHANGES, STORE_JOURNAL, STORE_STAMPS
+from keyexpr_schema.keyspace import STORE_CHANGES, STORE_JOURNAL, STORE_REPLACE, STORE_STAMPS
 from keyexpr_schema.payloads.system import (
     StoreAddress,
     StoreChanges,
     StoreChangesQuery,
     StoredValue,
     StoreQuery,
+    StoreReplaced,
+    StoreReplaceQuery,
     StoreStamps,
     StoreStampsQuery,
 )
 from keyexpr_schema.transport.link import Link, Put, Replies
-from keyexpr_schema.transport.samples import Sample, decode_reply, encoding_of, stamp_of_text
-from keyexpr_schema.transport.store.writes import ConfirmedWrites
+from keyexpr_schema.transport.samples import (
+    Sample,
+    decode_reply,
+    encoding_of,
+    stamp_of_text,
+    text_of_stamp,
+)
+from keyexpr_schema.transport.store.writes import ANSWER_S, ConfirmedWrites
 from keyexpr_schema.transport.trace import Trace
 
 SETTLE_S = 0.5
 PAGE = 1000
 """Values asked for at once: some milliseconds of the store's time, in which all others wait."""
+
+
+@dataclass(frozen=True)
+class Replaced:
+    """Whether a key was written by compare-and-set, and what it holds now."""
+
+    done: bool
+    there: Sample | None
 
 
 @dataclass(frozen=True)
@@ -69,15 +85,80 @@ class StoreClient:
             async with asyncio.timeout(timeout_s):
                 await self._writes.confirmed(put)
         except TimeoutError:
-            why = (
-                "a router is there, but no store answers for this key"
-                if self._link.router.up
-                else f"no router answers at {', '.join(self._endpoints)}"
-            )
-            raise Unconfirmed(
-                f"{'deleting ' if data is None else ''}{keyexpr} was not confirmed by the store "
-                f"within {timeout_s:g} s: {why}"
+            raise self._unconfirmed(
+                f"{'deleting ' if data is None else ''}{keyexpr}", timeout_s
             ) from None
+
+    def _unconfirmed(self, what: str, timeout_s: float) -> Unconfirmed:
+        why = (
+            "a router is there, but no store answers for this key"
+            if self._link.router.up
+            else f"no router answers at {', '.join(self._endpoints)}"
+        )
+        return Unconfirmed(f"{what} was not confirmed by the store within {timeout_s:g} s: {why}")
+
+    async def replace(
+        self, key: Key[Any, Any], keyexpr: str, data: bytes, seen: Sample | None, timeout_s: float
+    ) -> Replaced:
+        """Put if the key still holds what was `seen` there (None: nothing); else what it holds.
+
+        The store compares and sets, and stamps the value. A zenohd storage cannot: there the key is
+        looked at, put and read back, so that of two who do so in the same moment both may believe
+        for some milliseconds that they were first.
+
+        Raises:
+            Unconfirmed: it was not known within `timeout_s`; it may have been written.
+        """
+        expected = text_of_stamp(seen.stamp) if seen is not None else ""
+        asked = StoreReplaceQuery(
+            keyexpr=keyexpr, value=data.decode(), encoding=encoding_of(key), expected=expected
+        )
+        router = self._link.router
+        unanswered = generation = 0
+        lost = False
+        try:
+            async with asyncio.timeout(timeout_s):
+                while True:
+                    await router.wait_up()
+                    unanswered = unanswered + 1 if generation == router.generation else 1
+                    generation = router.generation
+                    replies = await self._ask(STORE_REPLACE, asked, ANSWER_S)
+                    if replies.values:
+                        answer: StoreReplaced = decode_reply(STORE_REPLACE, replies.values[0])  # type: ignore[assignment]
+                        if 0 < answer.behind_s <= timeout_s:
+                            await asyncio.sleep(answer.behind_s)
+                            continue
+                        if answer.behind_s:
+                            raise Unconfirmed(
+                                f"{keyexpr} was not written: it was last written by a clock that "
+                                f"is {answer.behind_s:.3g} s ahead of the router's; set the clocks"
+                            )
+                        there = _replaced_sample(keyexpr, answer)
+                        # An answer that was lost may have been a yes.
+                        ours = answer.done or (lost and there is not None and there.data == data)
+                        return Replaced(ours, there)
+                    if replies.errors:
+                        raise Unconfirmed(f"{keyexpr} was not written: {replies.errors[0]}")
+                    if unanswered > 1 and not replies.timed_out and router.age_s >= SETTLE_S:
+                        return await self._replace_by_hand(key, keyexpr, data, expected)
+                    lost = True
+                    await asyncio.sleep(0.05)
+        except TimeoutError:
+            raise self._unconfirmed(keyexpr, timeout_s) from None
+
+    async def _replace_by_hand(
+        self, key: Key[Any, Any], keyexpr: str, data: bytes, expected: str
+    ) -> Replaced:
+        there = next(iter(await self._settled(keyexpr, ANSWER_S)), None)
+        if (text_of_stamp(there.stamp) if there is not None else "") != expected:
+            return Replaced(False, there)
+        put = Put(keyexpr, data, encoding_of(key), self._link.new_timestamp())
+        try:
+            await self._writes.confirmed(put)
+        except Overtaken:
+            return Replaced(False, next(iter(await self._settled(keyexpr, ANSWER_S)), None))
+        stamp = stamp_of_text(str(put.timestamp))
+        return Replaced(True, Sample(keyexpr, data, put.encoding, stamp, False))
 
     async def list(self, pattern: str, timeout_s: float) -> tuple[Sample, ...]:
         """The newest stored value of every key that `pattern` matches, undecoded.
@@ -161,10 +242,7 @@ class StoreClient:
             await asyncio.sleep(0.05)
 
     async def _newest(self, puts: Sequence[Put], timeout_s: float) -> tuple[str, ...] | None:
-        asked = StoreStampsQuery(
-            keys=tuple(put.keyexpr for put in puts),
-            timestamps=tuple(str(put.timestamp) for put in puts),
-        )
+        asked = StoreStampsQuery(keys=tuple(put.keyexpr for put in puts))
         replies = await self._ask(STORE_STAMPS, asked, timeout_s, puts)
         if not replies.values:
             return None
@@ -194,3 +272,10 @@ def _sample_of(value: StoredValue) -> Sample:
         stamp_of_text(value.timestamp),
         value.value is None,
     )
+
+
+def _replaced_sample(keyexpr: str, answer: StoreReplaced) -> Sample | None:
+    if answer.value is None:
+        return None
+    stamp = stamp_of_text(answer.timestamp)
+    return Sample(keyexpr, answer.value.encode(), answer.encoding, stamp, False)

@@ -22,25 +22,32 @@ from keyexpr_schema.payloads.system import (
     StoreStamps,
     StoreStampsQuery,
 )
-from keyexpr_schema.transport.samples import stamp_of_text, text_of_stamp
+from keyexpr_schema.transport.samples import text_of_stamp, time_s_of_stamp
 from keyexpr_schema.transport.store.storage import Store, Write, is_stored
 
 _MAX_REPLY = 10_000
 
 
-Arrived = Callable[[Callable[[], bool]], None]
 WriteIf = Callable[[str, str, bytes, Callable[[], bool]], bool]
+
+
+class ClockBehind(Exception):
+    """The store's clock has not reached the stamp of a value that is to be replaced yet."""
+
+    def __init__(self, there: int, now: int) -> None:
+        self.seconds = max(0.001, time_s_of_stamp(there) - time_s_of_stamp(now))
+        super().__init__(f"the store's clock is {self.seconds:.3g} s behind")
 
 
 class StoreQuestions:
     """Answers for `store`; `keys` are those that it serves, by key expression without realm.
 
-    `arrived` waits a moment for a condition on what is stored; `write` writes a key (with its
-    encoding and bytes) if a condition on what is stored holds, and says whether it did.
+    `write` writes a key (with its encoding and bytes) if a condition on what is stored holds, and
+    says whether it did.
     """
 
-    def __init__(self, store: Store, arrived: Arrived, write: WriteIf) -> None:
-        self._store, self._arrived, self._write = store, arrived, write
+    def __init__(self, store: Store, write: WriteIf) -> None:
+        self._store, self._write = store, write
         self._answers: dict[str, Callable[[str, Any], Payload]] = {
             STORE_JOURNAL.name: self._journal,
             STORE_STAMPS.name: self._stamps,
@@ -71,20 +78,7 @@ class StoreQuestions:
         return StoreJournal(entries=entries, last=last)
 
     def _stamps(self, realm: str, asked: StoreStampsQuery) -> StoreStamps:
-        keyexprs = [f"{realm}/{keyexpr}" for keyexpr in asked.keys]
-        try:
-            expected = [stamp_of_text(text) for text in asked.timestamps]
-        except ValueError as error:
-            raise SchemaError(f"store/stamps was asked for what is none: {error}") from None
-        found = self._store.newest(keyexprs)
-
-        def all_there() -> bool:
-            nonlocal found
-            found = self._store.newest(keyexprs)
-            return all(map(_reaches, found, expected))
-
-        if not all(map(_reaches, found, expected)):
-            self._arrived(all_there)
+        found = self._store.newest([f"{realm}/{keyexpr}" for keyexpr in asked.keys])
         return StoreStamps(
             timestamps=tuple(text_of_stamp(w.stamp) if w is not None else "" for w in found)
         )
@@ -102,7 +96,10 @@ class StoreQuestions:
             found = there()
             return (text_of_stamp(found.stamp) if found is not None else "") == asked.expected
 
-        done = self._write(keyexpr, asked.encoding, asked.value.encode(), as_expected)
+        try:
+            done = self._write(keyexpr, asked.encoding, asked.value.encode(), as_expected)
+        except ClockBehind as error:
+            return StoreReplaced(done=False, behind_s=error.seconds)
         if (now := there()) is None:
             return StoreReplaced(done=done)
         return StoreReplaced(
@@ -120,10 +117,6 @@ class StoreQuestions:
         return StoreChanges(
             values=values, position=found.position, whole=found.whole, more=found.more
         )
-
-
-def _reaches(newest: Write | None, stamp: int) -> bool:
-    return newest is not None and newest.stamp >= stamp
 
 
 def _stored_value(realm: str, write: Write) -> StoredValue:

@@ -2,8 +2,10 @@
 
 Values flow through: subscriber and queryable feed bounded channels; one thread applies what
 arrived in batches, one answers queries. A query is answered after what arrived before it was
-applied, so that a client usually reads its own write at once. Replies carry the exact stored stamp
-as text in their attachment, because Python cannot rebuild a `zenoh.Timestamp` exactly.
+applied: the answering thread sends a mark through the channel of the values and waits until the
+other one has come to it. So values are applied in the order in which they came, and a client reads
+its own writes. Replies carry the exact stored stamp as text in their attachment, because Python
+cannot rebuild a `zenoh.Timestamp` exactly.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import threading
+import uuid
 from collections.abc import Callable
 from typing import Any
 
@@ -27,14 +30,14 @@ from keyexpr_schema.transport.samples import (
     text_of_stamp,
     timestamp_of_stamp,
 )
-from keyexpr_schema.transport.store.questions import StoreQuestions
+from keyexpr_schema.transport.store.questions import ClockBehind, StoreQuestions
 from keyexpr_schema.transport.store.storage import Store, Write, is_stored
 from keyexpr_schema.transport.trace import Trace
 
 _log = logging.getLogger(__name__)
 CHANNEL = 10_000
-IN_HAND_S = 0.01
-"""How long an answer waits for a put that its asker has sent: the other thread may have it."""
+QUERIES = 64
+"""Queries that are answered after one mark, at most."""
 
 
 class StoreServer:
@@ -43,8 +46,12 @@ class StoreServer:
     def __init__(self, session: zenoh.Session, store: Store) -> None:
         self._session = session
         self._store = store
-        self._questions = StoreQuestions(store, self._arrived, self._write)
-        self._applying = threading.Condition()
+        self._questions = StoreQuestions(store, self._write)
+        self._applying = threading.Lock()
+        self._mark = f"mark-{uuid.uuid4().hex}"
+        self._marks = 0
+        self._reached = 0
+        self._at_mark = threading.Condition()
         self._subscriber = session.declare_subscriber("**", handlers.FifoChannel(CHANNEL))
         # Not complete: a complete queryable on `**` would take queries away from those that
         # serve a key.
@@ -52,55 +59,68 @@ class StoreServer:
         trace = Trace("store")
         for keyexpr, key in self._questions.keys.items():
             trace.note("serve", key, keyexpr)
-        self._threads = [
-            threading.Thread(target=self._write_for_ever, name="store-write"),
-            threading.Thread(target=self._reply_for_ever, name="store-answer"),
-        ]
-        for thread in self._threads:
-            thread.start()
+        self._writing = threading.Thread(target=self._write_for_ever, name="store-write")
+        self._answering = threading.Thread(target=self._reply_for_ever, name="store-answer")
+        self._writing.start()
+        self._answering.start()
 
     def close(self) -> None:
         """Apply what arrived, then end both threads."""
         self._queryable.undeclare()  # type: ignore[no-untyped-call]
+        self._answering.join()
         self._subscriber.undeclare()  # type: ignore[no-untyped-call]
-        for thread in self._threads:
-            thread.join()
+        self._writing.join()
 
     # --- writing ---------------------------------------------------------------------------------
 
     def _write_for_ever(self) -> None:
         while True:
             try:
-                sample = self._subscriber.handler.recv()
+                sample: zenoh.Sample | None = self._subscriber.handler.recv()
             except zenoh.ZError:
                 return
+            batch: list[Write] = []
+            mark = 0
+            for _ in range(CHANNEL):
+                if sample is None:
+                    break
+                try:
+                    mark = self._collect(sample, batch) or mark
+                except Exception:
+                    _log.exception("the store could not take in what is at %s", sample.key_expr)
+                try:
+                    sample = self._subscriber.handler.try_recv()
+                except zenoh.ZError:
+                    break
+            self._apply(batch)
+            if mark:
+                with self._at_mark:
+                    self._reached = mark
+                    self._at_mark.notify()
+
+    def _apply(self, batch: list[Write]) -> None:
+        """Apply `batch` in one transaction."""
+        try:
             with self._applying:
-                self._apply(sample)
-                self._applying.notify_all()
-
-    def _apply(self, sample: zenoh.Sample | None = None) -> None:
-        """Apply `sample` and everything else that arrived, in one transaction; with the lock."""
-        batch: list[Write] = []
-        for _ in range(CHANNEL):
-            if sample is not None:
-                self._collect(sample, batch)
-            try:
-                sample = self._subscriber.handler.try_recv()
-            except zenoh.ZError:
-                break
-            if sample is None:
-                break
-        if batch:
-            try:
                 self._store.apply(batch)
-            except Exception:
-                # Not applied means not confirmed: the writers try again.
-                _log.exception("the store could not apply %d writes", len(batch))
+        except Exception:
+            # Not applied means not confirmed: the writers try again.
+            _log.exception("the store could not apply %d writes", len(batch))
 
-    def _collect(self, sample: zenoh.Sample, batch: list[Write]) -> None:
+    def _wait_for_what_arrived(self) -> None:
+        """Return when everything is applied that came before this call."""
+        self._marks += 1
+        self._session.put(
+            self._mark, str(self._marks), allowed_destination=zenoh.Locality.SESSION_LOCAL
+        )
+        with self._at_mark:
+            self._at_mark.wait_for(lambda: self._reached >= self._marks)
+
+    def _collect(self, sample: zenoh.Sample, batch: list[Write]) -> int:
+        """Add `sample` to `batch` if it is to be stored; the number of a mark, if it is one."""
         keyexpr = str(sample.key_expr)
         if not is_stored(keyexpr):
-            return
+            return int(sample.payload.to_string()) if keyexpr == self._mark else 0
         timestamp = sample.timestamp or self._session.new_timestamp()
         batch.append(
             Write(
@@ -111,11 +131,7 @@ class StoreServer:
                 sample.payload.to_bytes(),
             )
         )
-
-    def _arrived(self, condition: Callable[[], bool]) -> None:
-        """Give what a condition waits for, and was put before the query that asks, a moment."""
-        with self._applying:
-            self._applying.wait_for(condition, IN_HAND_S)
+        return 0
 
     def _write(self, keyexpr: str, encoding: str, data: bytes, allowed: Callable[[], bool]) -> bool:
         """Write a key for somebody, if that is `allowed` when nothing else is written; whether.
@@ -123,21 +139,17 @@ class StoreServer:
         Every subscriber sees it as a put of this moment.
 
         Raises:
-            SchemaError: what was written there last is from a clock that is too far ahead.
+            ClockBehind: whoever wrote it last had a clock ahead of ours.
             Exception: the store could not write it.
         """
         with self._applying:
-            self._apply()
             if not allowed():
                 return False
             newest = self._store.newest([keyexpr])[0]
-            there = newest.stamp if newest is not None else 0
             timestamp = self._session.new_timestamp()
-            if (stamp := stamp_of_text(str(timestamp))) <= there:
-                raise SchemaError(
-                    f"{keyexpr.partition('/')[2]} was last written by a clock that is ahead of "
-                    f"the store's ({text_of_stamp(there)}); set the clocks right"
-                )
+            stamp = stamp_of_text(str(timestamp))
+            if newest is not None and newest.stamp >= stamp:
+                raise ClockBehind(newest.stamp, stamp)
             self._store.apply([Write(keyexpr, stamp, False, encoding, data)])
         # Without the lock, and not to ourselves: a full channel would never be emptied.
         self._session.put(
@@ -154,32 +166,36 @@ class StoreServer:
 
     def _reply_for_ever(self) -> None:
         while True:
+            queries: list[zenoh.Query] = []
             try:
-                query = self._queryable.handler.recv()
+                queries.append(self._queryable.handler.recv())
+                while len(queries) < QUERIES and (more := self._queryable.handler.try_recv()):
+                    queries.append(more)
             except zenoh.ZError:
-                return
-            with query:
-                try:
-                    self._reply(query)
-                except zenoh.ZError:
-                    _log.warning("a reply for %s could not be sent", query.key_expr)
-                except SchemaError as error:
-                    with contextlib.suppress(zenoh.ZError):
-                        query.reply_err(str(error).encode())
-                except Exception as error:
-                    _log.exception("the query for %s failed", query.key_expr)
-                    with contextlib.suppress(zenoh.ZError):
-                        query.reply_err(f"the store failed: {error}".encode())
+                if not queries:
+                    return
+            self._wait_for_what_arrived()
+            for query in queries:
+                with query:
+                    self._try_to_reply(query)
+
+    def _try_to_reply(self, query: zenoh.Query) -> None:
+        try:
+            self._reply(query)
+        except zenoh.ZError:
+            _log.warning("a reply for %s could not be sent", query.key_expr)
+        except SchemaError as error:
+            with contextlib.suppress(zenoh.ZError):
+                query.reply_err(str(error).encode())
+        except Exception as error:
+            _log.exception("the query for %s failed", query.key_expr)
+            with contextlib.suppress(zenoh.ZError):
+                query.reply_err(f"the store failed: {error}".encode())
 
     def _reply(self, query: zenoh.Query) -> None:
         keyexpr = str(query.key_expr)
         realm, _, rest = keyexpr.partition("/")
-        key = self._questions.keys.get(rest)
-        if key is None and "*" not in keyexpr and not is_stored(keyexpr):
-            return
-        with self._applying:
-            self._apply()
-        if key is not None:
+        if (key := self._questions.keys.get(rest)) is not None:
             self._answer(query, realm, key)
             return
         for write in self._store.select(keyexpr):

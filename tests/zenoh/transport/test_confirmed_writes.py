@@ -97,8 +97,7 @@ async def test_putting_again_with_the_same_stamp_changes_nothing(session_config)
 async def test_the_store_tells_what_is_not_there(session_config):
     async with open_session(session_config()) as session:
         await session.confirm(GOAL_SPEC, G1, goal("g1"))
-        later = str(session.link.new_timestamp())
-        asked = StoreStampsQuery(keys=(KEYEXPR, "goals/g9/spec"), timestamps=("1/1", later))
+        asked = StoreStampsQuery(keys=(KEYEXPR, "goals/g9/spec"))
         found = (await session.query(STORE_STAMPS, StoreAddress(), asked)).timestamps
         (stored,) = (await session.link.query(KEYEXPR, 5.0)).values
         assert [stamp_of_text(found[0]), found[1]] == [stored.stamp, ""]

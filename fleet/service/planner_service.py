@@ -55,6 +55,8 @@ from keyexpr_schema.transport.session import Narrowed, Session, TokenWatch, Watc
 SNAPSHOT_CHECK_S = 0.5
 
 log = logging.getLogger(__name__)
+CHARGE_S = 3600.0
+"""How long a planner that starts waits for a store."""
 
 
 class PlannerService:
@@ -147,13 +149,29 @@ class PlannerService:
         return self._clock.at()
 
     async def _take_charge(self) -> None:
+        """Take the next epoch: no two planners ever have the same, however they were started.
+
+        What is there that is no status counts for nothing: it must not keep a planner from
+        starting.
+        """
         parts = await self._pool.ready()
-        # Listed, not got: a value there that is none must not keep the planner from starting.
-        status = (await self._session.list(PLANNER_STATUS)).get(PlannerAddress())
-        epoch = 1 + max(self.state.epoch, status.epoch if status else 0)
+
+        def next_epoch(status: PlannerStatus | None) -> PlannerStatus:
+            return PlannerStatus(
+                epoch=1 + max(self.state.epoch, status.epoch if status else 0),
+                incarnation=self._incarnation,
+                planners=tuple(parts.planners_wait_s),
+                strategies=parts.strategies,
+                allocators=tuple(parts.allocators_wait_s),
+                skills=tuple(self._skills),
+            )
+
+        ours = await self._session.update(
+            PLANNER_STATUS, PlannerAddress(), next_epoch, timeout_s=CHARGE_S
+        )
         self._apply(
             events.PlannerStarted(
-                epoch=epoch,
+                epoch=ours.epoch,
                 incarnation=self._incarnation,
                 policy=self._policy,
                 skills=self._skills,
@@ -161,19 +179,6 @@ class PlannerService:
                 lineage=self._incarnation,
                 **self._at(),
             )
-        )
-        await self._session.confirm(
-            PLANNER_STATUS,
-            PlannerAddress(),
-            PlannerStatus(
-                epoch=epoch,
-                incarnation=self._incarnation,
-                planners=tuple(parts.planners_wait_s),
-                strategies=parts.strategies,
-                allocators=tuple(parts.allocators_wait_s),
-                skills=tuple(self._skills),
-            ),
-            timeout_s=3600.0,
         )
 
     async def _catch_up(

@@ -93,6 +93,12 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     perhaps_over_goals: tuple[str, ...] = ()
     """What may leave it in the event that is being handled."""
 
+    @property
+    def plans_while_acting(self) -> bool:
+        """Whether a plan is made again while it is carried out, as since logic 1 of the core. In
+        journals from before, it stood still, and of several reasons the last one counted."""
+        return self.logic >= 1
+
     def vocabulary(self) -> Vocabulary:
         """The names that sentences can use."""
         whereabouts = {

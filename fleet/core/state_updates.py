@@ -84,7 +84,7 @@ def mark_goals(
 def active_plan_of(state: State, goal: str) -> str | None:
     """The plan that works on a goal and has not ended."""
     for plan, entry in state.plans.items():
-        if goal in entry.plan.goals and not entry.ended:
+        if not entry.ended and goal in entry.wanted_goals:
             return plan
     return None
 
@@ -133,7 +133,15 @@ def cancel(state: State, entry: PlanEntry) -> State:
     name = entry.plan.plan
     waiting = entry.job.request if entry.job is not None else None
     state = answer(state, waiting, False, f"plan {name} was cancelled while it was made")
-    return set_entry(state, replace(entry, cancelling=True, job=None))
+    state = refuse_wishes(state, entry, f"plan {name} was cancelled")
+    return set_entry(state, replace(entry, cancelling=True, job=None, wishes=()))
+
+
+def refuse_wishes(state: State, entry: PlanEntry, reason: str) -> State:
+    """Answer whatever somebody still wants of a plan, which ends."""
+    for wish in entry.wishes:
+        state = answer(state, wish.request, False, reason, entry.plan.plan)
+    return state
 
 
 def with_waiting_cancelled(entry: PlanEntry, reason: str) -> Table[str, TaskRecord]:
@@ -150,11 +158,13 @@ def with_waiting_cancelled(entry: PlanEntry, reason: str) -> Table[str, TaskReco
 def give_up(state: State, entry: PlanEntry, reason: str, to: GoalState = GoalState.FAILED) -> State:
     """End a plan as failed, and with it those of its goals that are not reached; or, with `to`,
     have them wait for another."""
+    state = refuse_wishes(state, entry, f"plan {entry.plan.plan} failed: {reason}")
     entry = replace(
         entry,
         state=PlanState.FAILED,
         reason=reason,
-        replan=None,
+        reasons=(),
+        wishes=(),
         records=with_waiting_cancelled(entry, "the plan failed"),
         unwanted=tuple(record.task for record in entry.outstanding()),
         job=None,

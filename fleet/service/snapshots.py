@@ -17,10 +17,10 @@ import msgspec
 from fleet.core.state import State
 from fleet.core.table import Table, decode_table, encode_table
 
-SNAPSHOT_FORMAT = 3
+SNAPSHOT_FORMAT = 4
 """Counts up whenever a field of the state gets another name or meaning."""
-_READABLE = frozenset({2, SNAPSHOT_FORMAT})
-"""Formats that decode; in format 2 a state had no skills."""
+_READABLE = frozenset({2, 3, SNAPSHOT_FORMAT})
+"""Formats that decode; in format 2 a state had no skills, before format 4 no reasons and wishes."""
 KEPT = 2
 _PREFIX, _SUFFIX = "snapshot-", ".msgpack"
 _TABLE = 1
@@ -42,6 +42,10 @@ class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
     unconfirmed: tuple[str, ...] = ()
 
 
+class _Format(msgspec.Struct, frozen=True):
+    format: int
+
+
 def encode_snapshot(snapshot: Snapshot) -> bytes:
     """A snapshot in MessagePack; in a thread it holds others up for some milliseconds at most."""
     return msgspec.msgpack.encode(snapshot, enc_hook=_encode)
@@ -50,10 +54,14 @@ def encode_snapshot(snapshot: Snapshot) -> bytes:
 def decode_snapshot(data: bytes) -> Snapshot | None:
     """The snapshot in MessagePack, or None if this program cannot read it."""
     try:
-        snapshot = msgspec.msgpack.decode(data, type=Snapshot, dec_hook=_decode)
-    except msgspec.DecodeError:
+        found = msgspec.msgpack.decode(data, type=_Format).format
+        if found not in _READABLE:
+            return None
+        if found < SNAPSHOT_FORMAT:
+            return _of_earlier_format(msgspec.msgpack.decode(data))
+        return msgspec.msgpack.decode(data, type=Snapshot, dec_hook=_decode)
+    except (msgspec.DecodeError, LookupError, TypeError, AttributeError):
         return None
-    return snapshot if snapshot.format in _READABLE else None
 
 
 def _encode(value: Any) -> Any:
@@ -80,6 +88,32 @@ def _decode(kind: Any, value: Any) -> Any:
 @lru_cache(maxsize=64)
 def _decoder(key: Any, value: Any) -> msgspec.msgpack.Decoder[Any]:
     return msgspec.msgpack.Decoder(list[tuple[key, value]], dec_hook=_decode)
+
+
+def _of_earlier_format(read: Any) -> Snapshot:
+    state = read["state"]
+    plans = {plan: _with_reasons(entry) for plan, entry in state["plans"].items()}
+    read = {**read, "state": {**state, "plans": plans}}
+    return msgspec.convert(read, Snapshot, dec_hook=decode_table)
+
+
+def _with_reasons(entry: dict[str, Any]) -> dict[str, Any]:
+    """What was kept of a plan before format 4: one reason to make it again, and one task to add."""
+    job, replan, task = entry.get("job") or {}, entry.get("replan"), entry.get("amendment")
+    found = {reason["number"]: reason for reason in (job.get("reason"), replan) if reason}
+    wishes = []
+    if task is not None:
+        number = max(found)
+        del found[number]
+        wish = {"wish": "TaskAdded", "number": number, "request": entry["amendment_request"]}
+        args = {name: value for name, value in task["args"].items() if name != "robot"}
+        robot = entry["plan"]["pins"].get(task["actor"])
+        wishes.append(
+            {**wish, "skill": task["skill"], "args": args, "after": task["after"], "robot": robot}
+        )
+    if job.get("reason"):
+        job = {**job, "request": None, "takes_up": [job["reason"]["number"]]}
+    return {**entry, "job": job or None, "reasons": list(found.values()), "wishes": wishes}
 
 
 class SnapshotFiles:

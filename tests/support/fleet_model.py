@@ -89,6 +89,8 @@ class FleetModel:
 
     def receive(self, kind: type[Event], **fields: Any) -> None:
         """One event into the core; its effects are carried out."""
+        if kind is events.PlannerStarted:
+            fields.setdefault("logic", LOGIC)
         self.time_s += 1.0
         self.wall_s += 0.01
         self.apply(kind(time_s=self.time_s, wall_time_s=self.wall_s, **fields))
@@ -153,7 +155,8 @@ class FleetModel:
             assert entry.job is not None
             ended = [t for t in entry.job.under_way if entry.records[t].state not in OUTSTANDING]
             self.met["work ended meanwhile"] += bool(ended)
-            self.met["another reason meanwhile"] += entry.replan != entry.job.reason
+            new = [r for r in entry.open_reasons if r.number not in entry.job.takes_up]
+            self.met["another reason meanwhile"] += bool(new)
 
     def _check_order(self, order: Any) -> None:
         assert isinstance(order, Order)
@@ -288,6 +291,19 @@ class FleetModel:
             if self.answers:
                 self.answer()
             elif orders := [o for o in self.orders() if self.state.connected.get(o.robot)]:
+                self.succeed(orders[0])
+            else:
+                return
+        raise AssertionError("the plan does not come to an end")
+
+    def finish_cancelling(self, limit: int = 500) -> None:
+        """As `finish`, but what is cancelled is stopped and not carried out."""
+        for _ in range(limit):
+            if self.answers:
+                self.answer()
+            elif stopped := [order for order in self.orders() if order.cancelled]:
+                self.cancelled(stopped[0])
+            elif orders := self.orders():
                 self.succeed(orders[0])
             else:
                 return

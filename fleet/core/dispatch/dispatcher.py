@@ -5,13 +5,15 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core.dispatch.deadlock import break_deadlock
-from fleet.core.dispatch.delays import late_task, next_lateness
+from fleet.core.dispatch.delays import next_lateness
 from fleet.core.dispatch.lost_robots import give_up_work_of_lost_robots, lost, next_loss
 from fleet.core.dispatch.ready_tasks import by_priority, order_if_ready
-from fleet.core.dispatch.replan_triggers import new_robots, why_replan
+from fleet.core.dispatch.replan_triggers import unforeseen
+from fleet.core.dispatch.while_replanning import stands_still
 from fleet.core.handlers.goals import next_stage
 from fleet.core.handlers.requests import plan_waiting_goals
-from fleet.core.plan_entry import PlanEntry, ReplanScope
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.replan_reasons import ReplanScope
 from fleet.core.revision.replanning import start_replanning
 from fleet.core.state import State
 from fleet.core.state_updates import give_up, mark_goals, set_entry, with_waiting_cancelled
@@ -27,13 +29,13 @@ def advance(state: State) -> State:
         state = plan_waiting_goals(state)
     plans = by_priority(state)
     for plan in plans:
+        if state.plans[plan].state is PlanState.RUNNING:
+            state = _run(state, plan)
         entry = state.plans[plan]
         if entry.cancelling and not entry.ended:
             state = _cancel(state, entry)
         elif entry.job is None and entry.replan is not None and not entry.ended:
             state = start_replanning(state, entry)
-        elif entry.state is PlanState.RUNNING and entry.job is None:
-            state = _run(state, entry)
     moved = break_deadlock(state, plans)
     return state if moved is state else advance(moved)
 
@@ -56,7 +58,7 @@ def _cancel(state: State, entry: PlanEntry) -> State:
         cancelling=False,
         records=records,
         unwanted=unwanted,
-        replan=None,
+        reasons=(),
     )
     state = set_entry(state, entry)
     return mark_goals(
@@ -64,26 +66,23 @@ def _cancel(state: State, entry: PlanEntry) -> State:
     )
 
 
-def _run(state: State, entry: PlanEntry) -> State:
-    state = _mark_reached(state, entry)
-    entry = state.plans[entry.plan.plan]
-    if (reason := why_replan(state, entry)) is not None:
-        return advance(set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason)))
-    if (helpers := new_robots(state, entry)) is not None:
-        return advance(set_entry(state, helpers))
-    if (late := late_task(state, entry)) is not None:
-        reason = f"{late.robot} is late with {late.task} ({late.skill})"
-        entry = replace(entry, late=(*entry.late, late.task))
-        return advance(set_entry(state, entry.to_replan(ReplanScope.REALLOCATE, reason)))
-    if all(record.state is TaskState.SUCCEEDED for record in entry.current()):
-        return set_entry(state, replace(entry, state=PlanState.SUCCEEDED))
-    if any(record.state in (TaskState.FAILED, TaskState.CANCELLED) for record in entry.current()):
-        return give_up(state, entry, "a task of the plan was cancelled or failed")
+def _run(state: State, plan: str) -> State:
+    """What is reached is marked, what is done ends, and what is ready is ordered: also while the
+    plan is made again, as far as that does not touch it."""
+    if state.plans[plan].cancelling or stands_still(state, state.plans[plan]):
+        return state
+    state = _mark_reached(state, state.plans[plan])
+    entry = state.plans[plan]
+    if entry.job is None and entry.replan is None:
+        if (changed := unforeseen(state, entry)) is not None:
+            state = set_entry(state, changed)
+        elif all(record.state is TaskState.SUCCEEDED for record in entry.current()):
+            return set_entry(state, replace(entry, state=PlanState.SUCCEEDED))
+        elif any(r.state in (TaskState.FAILED, TaskState.CANCELLED) for r in entry.current()):
+            return give_up(state, entry, "a task of the plan was cancelled or failed")
     for record in list(entry.current()):
-        if record.state is TaskState.WAITING:
-            state = order_if_ready(state, entry.plan.plan, record)
-            if state.plans[entry.plan.plan].replan is not None:
-                return advance(state)
+        if record.state is TaskState.WAITING and not state.plans[plan].ended:
+            state = order_if_ready(state, plan, record)
     return state
 
 
@@ -106,7 +105,8 @@ def _mark_reached(state: State, entry: PlanEntry) -> State:
         if status.stage + 1 < len(status.stages):
             state = next_stage(state, goal)
             reason = f"goal {goal} goes on with its next step"
-            state = set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason))
+            entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=(goal,))
+            state = set_entry(state, entry)
         else:
             state = set_entry(state, entry)
             state = mark_goals(state, (goal,), GoalState.REACHED, entry.plan.plan)

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import set_entry
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
@@ -74,7 +75,8 @@ def _give_up(state: State, entry: PlanEntry, robot: str, reason: str) -> State:
         unwanted = (*entry.unwanted, *(record.task for record in given_up))
         entry = replace(entry, unwanted=unwanted)
     entry = replace(entry, records=entry.records.updated({r.task: r for r in given_up}))
-    return set_entry(state, entry.to_replan(ReplanScope.REALLOCATE, reason))
+    entry = entry.to_replan(ReplanScope.REALLOCATE, reason, robots=(robot,))
+    return set_entry(state, entry)
 
 
 def _write_off(state: State, robot: str, reason: str) -> State:

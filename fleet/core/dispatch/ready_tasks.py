@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
+from fleet.core.dispatch.while_replanning import waits_for_new_plan
 from fleet.core.model.preconditions import action_of, unmet_before
 from fleet.core.model.skills import Action
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import conditions_of, give_up, open_goals, set_entry, set_record
 from keyexpr_schema.facts import AT
@@ -43,13 +45,17 @@ def order_if_ready(state: State, plan: str, record: TaskRecord, reservations: bo
     if action is None:
         reason = f"{record.task} cannot start: there is no skill {record.skill} any more"
         return give_up(state, entry, reason)
+    if waits_for_new_plan(state, entry, record, action):
+        return state
     if not all(_is_free(state, robot, plan, reservations) for robot in action.participants):
         return state
     if _touches_unwanted_work(state, action):
         return state
     if (unmet := unmet_before(action, state.world())) is not None:
         reason = f"{record.task} ({record.skill}) cannot start: {unmet}"
-        return set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason))
+        goals, tasks = (record.goal,), (record.task,)
+        entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=goals, tasks=tasks)
+        return set_entry(state, entry)
     serial = state.attempts_made + 1
     state = replace(state, attempts_made=serial)
     ordered = replace(
@@ -61,6 +67,8 @@ def order_if_ready(state: State, plan: str, record: TaskRecord, reservations: bo
         ordered_s=state.time_s if record.ordered_s is None else record.ordered_s,
         way_s=_way_s(state, action),
     )
+    if entry.job is not None:
+        entry = replace(entry, given_out=entry.given_out.set(record.task, None))
     return set_record(state, entry, ordered)
 
 

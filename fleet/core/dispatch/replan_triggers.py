@@ -11,9 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from msgspec.structs import replace
+
+from fleet.core.dispatch.delays import late_task
 from fleet.core.model.preconditions import action_of
 from fleet.core.model.skills import Action
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import GoalState
@@ -21,10 +25,12 @@ from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact
 
 
-def contradiction(state: State, entry: PlanEntry, fact: Fact) -> str | None:
-    """Why a fact is against the plan: a task needs it otherwise, and nothing before it changes it.
+def contradicted(state: State, entry: PlanEntry, fact: Fact) -> PlanEntry | None:
+    """The entry with a fact against it as a reason to replan, if it is one: a task needs it
+    otherwise, and nothing before it changes it.
 
-    What a robot says of the work it is doing is part of that work.
+    What a robot says of the work it is doing is part of that work. So is what anybody says that
+    the work is just making true, and what was so before it began and is heard of only now.
     """
     known = fact.key
     unfinished = {
@@ -33,6 +39,10 @@ def contradiction(state: State, entry: PlanEntry, fact: Fact) -> str | None:
         if record.state not in ENDED_TASKS
         and (action := action_of(record, state.skills)) is not None
     }
+    under_way = [each for each in unfinished.values() if each[0].state in OUTSTANDING]
+    making = any(_is_of_its_making(record, action, fact) for record, action in under_way)
+    if making and state.plans_while_acting:
+        return None
     for record, action in unfinished.values():
         needed = [literal for literal in action.before if literal.variable == known]
         if not needed or needed[0].value == fact.value:
@@ -44,8 +54,25 @@ def contradiction(state: State, entry: PlanEntry, fact: Fact) -> str | None:
             for before in _before(record.task, unfinished)
             for literal in unfinished[before][1].after
         ):
-            return f"{record.task} needs {needed[0]}, and {fact.source} says otherwise"
+            sentence = f"{record.task} needs {needed[0]}, and {fact.source} says otherwise"
+            return entry.to_replan(
+                ReplanScope.REPAIR,
+                sentence,
+                goals=(record.goal,),
+                tasks=(record.task,),
+                variables=(known,),
+            )
     return None
+
+
+def _is_of_its_making(record: TaskRecord, action: Action, fact: Fact) -> bool:
+    """Whether a fact says what a task under way makes true, or is from before the task began."""
+    if fact.key not in action.variables:
+        return False
+    begun_s = record.ordered_s if record.started_s is None else record.started_s
+    return (begun_s is not None and fact.time_s < begun_s) or any(
+        literal == (fact.key, fact.value) for literal in action.after
+    )
 
 
 def _before(task: str, unfinished: Mapping[str, tuple[TaskRecord, Action]]) -> set[str]:
@@ -61,27 +88,32 @@ def _before(task: str, unfinished: Mapping[str, tuple[TaskRecord, Action]]) -> s
     return befores
 
 
-def why_replan(state: State, entry: PlanEntry) -> str | None:
-    """What has come up that the plan does not provide for."""
+def unforeseen(state: State, entry: PlanEntry) -> PlanEntry | None:
+    """The entry with what has come up that the plan does not provide for, if anything has."""
+    return _found_or_not_done(state, entry) or _new_robots(state, entry) or _late(state, entry)
+
+
+def _found_or_not_done(state: State, entry: PlanEntry) -> PlanEntry | None:
     world = state.world()
     for thing in entry.plan.seeks:
         where = world.value(AT, thing)
         if where is not None:
-            return f"{thing} was found: it is at {where}"
-    current = list(entry.current())
-    if all(record.state is TaskState.SUCCEEDED for record in current):
+            sentence = f"{thing} was found: it is at {where}"
+            return entry.to_replan(ReplanScope.REPAIR, sentence, whole=True)
+    if all(record.state is TaskState.SUCCEEDED for record in entry.current()):
         for goal in entry.plan.goals:
             status = state.goal_states.get(goal)
             if status is None or status.state is GoalState.REACHED:
                 continue
             unmet = [c for c in status.conditions if not world.holds(c)]
             if unmet:
-                return f"every task is done, and {unmet[0]} does not hold"
+                sentence = f"every task is done, and {unmet[0]} does not hold"
+                return entry.to_replan(ReplanScope.REPAIR, sentence, goals=(goal,))
     return None
 
 
-def new_robots(state: State, entry: PlanEntry) -> PlanEntry | None:
-    """The entry with robots that came since the plan was made as a reason to replan.
+def _new_robots(state: State, entry: PlanEntry) -> PlanEntry | None:
+    """With robots that came since the plan was made.
 
     More of a kind that is there already can share what is left. A new kind may help in ways that
     the plan knows nothing of, so that everything is planned again.
@@ -89,7 +121,17 @@ def new_robots(state: State, entry: PlanEntry) -> PlanEntry | None:
     new = sorted(set(state.team()) - set(entry.team))
     if not entry.team or not new or all(r.state is not TaskState.WAITING for r in entry.current()):
         return None
-    reason = f"{' and '.join(new)} can help now"
+    sentence = f"{' and '.join(new)} can help now"
     kinds = {state.robots[robot].model for robot in entry.team if robot in state.robots}
     of_known_kinds = all(state.robots[robot].model in kinds for robot in new)
-    return entry.to_replan(ReplanScope.REALLOCATE if of_known_kinds else ReplanScope.ANEW, reason)
+    return entry.to_replan(ReplanScope.REALLOCATE if of_known_kinds else ReplanScope.ANEW, sentence)
+
+
+def _late(state: State, entry: PlanEntry) -> PlanEntry | None:
+    late = late_task(state, entry)
+    if late is None:
+        return None
+    sentence = f"{late.robot} is late with {late.task} ({late.skill})"
+    entry = replace(entry, late=(*entry.late, late.task))
+    robots = () if late.robot is None else (late.robot,)
+    return entry.to_replan(ReplanScope.REALLOCATE, sentence, robots=robots)

@@ -7,7 +7,8 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.over import goal_taken_back
-from fleet.core.plan_entry import ReplanScope
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.replan_reasons import GoalsAdded, ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import cancel, conclude, set_entry, set_goal, without_goal
 from fleet.errors import NotUnderstood
@@ -35,12 +36,27 @@ def goal_deleted(state: State, event: events.GoalDeleted) -> State:
         return state
     state = goal_taken_back(state, event.goal)
     for entry in state.plans.values():
-        if event.goal in entry.plan.goals and not entry.ended:
-            rest = without_goal(state, entry.plan, event.goal)
-            entry = replace(entry, plan=rest)
-            entry = entry.to_replan(ReplanScope.REALLOCATE, f"goal {event.goal} was deleted")
-            state = set_entry(state, entry) if rest.goals else cancel(state, entry)
+        if not entry.ended and event.goal in entry.wanted_goals:
+            state = _goal_taken_out(state, entry, event.goal)
     return state
+
+
+def _goal_taken_out(state: State, entry: PlanEntry, goal: str) -> State:
+    """Work on the goal no more; a wish for nothing else is refused."""
+    sentence = f"goal {goal} was deleted"
+    for wish in [wish for wish in entry.wishes if goal in wish.goals]:
+        rest = tuple(other for other in wish.goals if other != goal)
+        if not rest and isinstance(wish, GoalsAdded):
+            entry = replace(entry, wishes=tuple(w for w in entry.wishes if w is not wish))
+        else:
+            smaller = replace(wish, goals=rest)
+            wishes = tuple(smaller if w is wish else w for w in entry.wishes)
+            entry = replace(entry, wishes=wishes)
+    in_work = entry.plan.goals if entry.job is None else (*entry.plan.goals, *entry.job.goals)
+    if goal in in_work:
+        entry = replace(entry, plan=without_goal(state, entry.plan, goal))
+        entry = entry.to_replan(ReplanScope.REALLOCATE, sentence, goals=(goal,))
+    return set_entry(state, entry) if entry.wanted_goals else cancel(state, entry)
 
 
 def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:

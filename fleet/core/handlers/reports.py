@@ -9,7 +9,8 @@ from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.model.durations import learn
 from fleet.core.model.preconditions import action_of, effects_hold, unmet_before
 from fleet.core.model.skills import Action
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
+from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import (
     believe,
@@ -144,7 +145,7 @@ def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) 
     if entry.ended or record.task in entry.unwanted:
         return set_record(state, entry, record)
     reason = f"{record.task} ({record.skill}) failed: {report.reason}"
-    entry = entry.to_replan(ReplanScope.REPAIR, reason)
+    entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=(record.goal,))
     if record.goal is not None and record.goal in entry.plan.goals:
         count = entry.failures.get(record.goal, 0) + 1
         entry = replace(entry, failures=entry.failures.set(record.goal, count))

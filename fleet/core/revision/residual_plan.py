@@ -27,7 +27,7 @@ def residual_plan(
     todo = [
         task
         for task in entry.plan.tasks
-        if (task.goal is None or task.goal in entry.plan.goals)
+        if entry.is_wanted(task)
         and (
             task.actor in anew
             or task.task not in entry.records

@@ -14,6 +14,7 @@ from benchmarks.scale.errands import Errands
 from fleet.core import events
 from fleet.core.effects import Effect, MakePlan, Publish
 from fleet.core.events import Event
+from fleet.core.planning_input import PlanningInput
 from fleet.core.state import LOGIC, State
 from fleet.core.step import step
 from fleet.service.skill_models import load_all_skills
@@ -45,7 +46,8 @@ class CoreRun:
         self.events = 0
         self.succeeded: Counter[str] = Counter()
         """Tasks of each plan reported as done."""
-        self.jobs: list[int] = []
+        self.given: list[PlanningInput] = []
+        """The planning jobs that were wanted."""
         self._seen: set[tuple[str, str, int]] = set()
         self._watched = watched
         self._time_s = 0.0
@@ -71,6 +73,10 @@ class CoreRun:
         self._time_s += 0.001
         return {"time_s": self._time_s, "wall_time_s": self._time_s}
 
+    def wait(self, seconds: float) -> None:
+        """Time passes."""
+        self._time_s += seconds
+
     def receive(self, kind: type[Event], **fields: Any) -> tuple[Effect, ...]:
         """An event into the core; what it came to."""
         return self.apply(kind(**self.at(), **fields))
@@ -86,7 +92,7 @@ class CoreRun:
             self.succeeded[event.report.plan] += event.report.state is ReportState.SUCCEEDED
         for effect in effects:
             if isinstance(effect, MakePlan):
-                self.jobs.append(effect.given.job.job)
+                self.given.append(effect.given)
             elif isinstance(effect, Publish):
                 self._heard(effect)
         return effects
@@ -134,7 +140,7 @@ class CoreRun:
         goals = tuple(f"g{number}" for number in wanted.numbers)
         request = PlanRequest(request=f"ask-{wanted.plan}", plan=wanted.plan, goals=goals)
         self.receive(events.PlanRequested, request=request)
-        return wanted.made(self.jobs[-1], self.at())
+        return wanted.made(self.given[-1].job.job, self.at())
 
     def begin(self, plan: str, numbers: Sequence[int]) -> Errands:
         """Everything up to a running plan; its first orders are given."""

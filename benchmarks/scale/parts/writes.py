@@ -10,17 +10,19 @@ import tempfile
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from benchmarks.scale.keys_run import AT_ONCE, at_once
 from benchmarks.scale.parts.dispatch import percentiles_ms
 from benchmarks.scale.processes import REALM, processes
 from benchmarks.scale.raw_link import raw_latencies
+from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.facts import AT
 from keyexpr_schema.keyspace import FACT, STORE_JOURNAL
 from keyexpr_schema.payloads.system import StoreAddress, StoreQuery
 from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from keyexpr_schema.transport.store.storage import Write
 
 CALLS = 1500
 WATCHED = 500
@@ -28,11 +30,14 @@ TOGETHER = 10_000
 PUTS = 20_000
 LISTED = 10_000
 ROUNDS = 3
+BATCHES, BATCH = 100, 500
+SYNCHRONOUS: tuple[Literal["NORMAL", "FULL"], ...] = ("NORMAL", "FULL")
 
 
 def measure(quick: bool) -> list[dict[str, Any]]:
     """Latencies in ms, and rates a second: the best of some rounds, and all of them."""
-    return asyncio.run(_measured(10 if quick else 1))
+    fraction = 10 if quick else 1
+    return [*asyncio.run(_measured(fraction)), *_store_alone(BATCHES // fraction)]
 
 
 async def _measured(fraction: int) -> list[dict[str, Any]]:
@@ -136,3 +141,32 @@ async def _listed(writer: Session, reader: Session, count: int) -> float:
     began_s = time.perf_counter()
     found = await reader.list(FACT, timeout_s=30.0)
     return len(found) / (time.perf_counter() - began_s)
+
+
+def _store_alone(batches: int) -> list[dict[str, Any]]:
+    """The store without Zenoh, by what of a power cut it outlives."""
+    return [
+        {"what": f"store alone, {synchronous}, batches of {BATCH}", "a_second": max(found),
+         "rounds": found}
+        for synchronous in SYNCHRONOUS
+        for found in ([_applied(synchronous, batches) for _ in range(ROUNDS)],)
+    ]  # fmt: skip
+
+
+def _applied(synchronous: Literal["NORMAL", "FULL"], batches: int) -> float:
+    keys = [f"{REALM}/{FACT.build(_at(f'c{i}'))}" for i in range(BATCH)]
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        SqliteStore(Path(folder), synchronous=synchronous) as store,
+    ):
+        began_s = time.perf_counter()
+        for batch in range(batches):
+            store.apply(
+                [
+                    Write(
+                        key, (batch * BATCH + i + 1) << 128, False, "application/json", b"x" * 120
+                    )
+                    for i, key in enumerate(keys)
+                ]
+            )
+        return batches * BATCH / (time.perf_counter() - began_s)

@@ -46,8 +46,8 @@ else:
             "ids": "Id actor_arg check_id slug",
             "key": "Address Component Delivery Key Payload",
             "keyspace": (
-                "GOAL_SPEC GOAL_STATUS FACT STATEMENT STATEMENT_STATUS PLACE OBJECT ROBOT_SPEC "
-                "ROBOT_STATE ROBOT_ALIVE ORDER REPORT DURATIONS PLAN_SPEC PLAN_PROPOSAL "
+                "GOAL_SPEC GOAL_STATUS FACT STATEMENT STATEMENT_STATUS PLACE OBJECT CLAIM "
+                "ROBOT_SPEC ROBOT_STATE ROBOT_ALIVE ORDER REPORT DURATIONS PLAN_SPEC PLAN_PROPOSAL "
                 "PLAN_STATUS TASK_RECORD PLAN_REQUEST REPLAN_REQUEST CONTROL_REQUEST ANSWER "
                 "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE DIAGNOSTIC STORE_JOURNAL STORE_STAMPS "
                 "STORE_REPLACE STORE_CHANGES "
@@ -83,8 +83,8 @@ else:
                 "TaskAddress TaskRecord TaskState Try"
             ),
             "payloads.world": (
-                "Fact FactAddress Object ObjectAddress Place PlaceAddress Statement "
-                "StatementAddress StatementStatus Surface"
+                "Claim ClaimAddress Fact FactAddress Object ObjectAddress Place PlaceAddress "
+                "Statement StatementAddress StatementStatus Surface"
             ),
             "transport.router": "run_router",
             "transport.session": (

@@ -70,6 +70,12 @@ OBJECT = Key(
     about="A thing that can be spoken about; where it is, is a fact.",
 )
 
+CLAIM = Key(
+    "claim", "world/claims/{of}/{name}", world.ClaimAddress, world.Claim,
+    delivery=STORED, writers=PERSON, readers=PERSON,
+    about="Which number or name is being given: two people at once do not get the same one.",
+)
+
 # --- robots --------------------------------------------------------------------------------------
 ROBOT_SPEC = Key(
     "robot_spec", "robots/{robot}/spec", robots.RobotAddress, robots.RobotSpec,

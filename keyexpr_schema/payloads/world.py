@@ -165,3 +165,21 @@ class Object(Payload, frozen=True, kw_only=True):
     home: Id | None = None
     categories: tuple[str, ...] = ()
     uses: tuple[str, ...] = ()
+
+
+class ClaimAddress(Address, frozen=True):
+    """What is claimed: a number of goals or of a kind of objects, or a name in the world."""
+
+    of: str
+    name: str
+
+
+class Claim(Payload, frozen=True, kw_only=True):
+    """What somebody is about to give a name or a number to, and when they said so (Unix seconds).
+
+    `number`: the last that was given out; `kind`: what the name is for.
+    """
+
+    wall_time_s: float
+    number: int = 0
+    kind: str = ""

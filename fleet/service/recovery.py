@@ -56,7 +56,7 @@ def recover(
     snapshot = journal.snapshot()
     state = snapshot.state
     if not state.skills:  # in journals of earlier versions no event brings them
-        state = replace(state, skills=dict(skills))
+        state = replace(state, skills=dict(skills)).reindexed()
     pending = Unconfirmed(snapshot.unconfirmed)
     replayed = 0
     on_effects([Archive(record) for record in state.over])

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import msgspec
+from msgspec.structs import replace
 
 from fleet.core.state import State
 from fleet.core.table import Table, decode_table, encode_table
@@ -48,7 +49,8 @@ class _Format(msgspec.Struct, frozen=True):
 
 def encode_snapshot(snapshot: Snapshot) -> bytes:
     """A snapshot in MessagePack; in a thread it holds others up for some milliseconds at most."""
-    return msgspec.msgpack.encode(snapshot, enc_hook=_encode)
+    bare = replace(snapshot, state=snapshot.state.bare())
+    return msgspec.msgpack.encode(bare, enc_hook=_encode)
 
 
 def decode_snapshot(data: bytes) -> Snapshot | None:
@@ -58,10 +60,12 @@ def decode_snapshot(data: bytes) -> Snapshot | None:
         if found not in _READABLE:
             return None
         if found < SNAPSHOT_FORMAT:
-            return _of_earlier_format(msgspec.msgpack.decode(data))
-        return msgspec.msgpack.decode(data, type=Snapshot, dec_hook=_decode)
+            bare = _of_earlier_format(msgspec.msgpack.decode(data))
+        else:
+            bare = msgspec.msgpack.decode(data, type=Snapshot, dec_hook=_decode)
     except (msgspec.DecodeError, LookupError, TypeError, AttributeError):
         return None
+    return replace(bare, state=bare.state.reindexed())
 
 
 def _encode(value: Any) -> Any:

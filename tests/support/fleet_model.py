@@ -13,7 +13,8 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.core import events
 from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_index import OUTSTANDING
 from fleet.core.planning_input import PlanningInput
 from fleet.core.state import LOGIC, Policy, State
 from fleet.core.step import step
@@ -26,6 +27,7 @@ from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskState
 from keyexpr_schema.payloads.world import Fact
+from tests.support.derived import check_derived
 from tests.support.household import PLACES, SKILLS, bring, carrier, cup, manipulator
 
 Answer = events.PlanningSucceeded | events.PlanningFailed
@@ -38,6 +40,9 @@ COMPOSITION: Composition = replace(
 
 
 BOTH = (bring(1, "hallway"), bring(2, "living_room"))
+
+CHECK_EVERY = 5
+"""Events between two looks at what the core keeps up: each derives everything anew."""
 
 
 class FleetModel:
@@ -102,6 +107,8 @@ class FleetModel:
         if self.state is before:
             assert effects == ()
             return
+        if len(self.journal) % CHECK_EVERY == 0:
+            check_derived(before, self.state, effects)
         self.journal.append(encode_event(event))
         for plan, entry in self.state.plans.items():
             old = before.plans.get(plan)

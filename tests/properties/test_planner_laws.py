@@ -108,7 +108,7 @@ class Undisturbed(RuleBasedStateMachine):
 
     @rule(robot=st.sampled_from(["hsr", "locobot", None]), after=st.booleans())
     def a_person_wants_one_more_task(self, robot: str | None, after: bool) -> None:
-        entry = self.model.state.plans.get("plan-1")
+        entry = self.model.plans.get("plan-1")
         request = ControlRequest(
             request=f"task-{len(self.model.journal)}",
             control=Control.ADD_TASK,

@@ -64,7 +64,7 @@ def test_what_a_running_task_is_just_making_true_is_no_news() -> None:
     assert not model.answers, "that is what the plan is about"
     model.succeed(order)
     assert model.goal_state("g1") is GoalState.REACHED
-    assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
+    assert model.plans["plan-1"].state is PlanState.SUCCEEDED
 
 
 def test_what_somebody_else_says_against_a_running_task_is_news() -> None:

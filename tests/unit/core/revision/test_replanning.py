@@ -84,25 +84,14 @@ def test_what_a_lost_robot_had_in_its_hand_makes_that_goal_wait_and_no_other() -
         model.succeed(order_of(model, "r1"))
     before = robot_of(model)
     model.lose("r1")
-<<<<<<< HEAD
-    (waits,) = [g for g, s in model.state.goal_states.items() if s.state is GoalState.WAITING]
+    (waits,) = [g for g, s in model.goal_states.items() if s.state is GoalState.WAITING]
     assert f"g{str(held).removeprefix('cup_')}" == waits
-    assert f"at({held})" in (model.state.goal_states[waits].reason or "")
+    assert f"at({held})" in (model.goal_states[waits].reason or "")
     assert any(f"goal {waits} is left out" in note for note in entry(model).outcome.notes)
     begun = {order.task: order.robot for order in model.orders()}
     assert begun.items() <= before.items()
     model.finish()
-    others = [s.state for g, s in model.state.goal_states.items() if g != waits]
-=======
-    (failed,) = [g for g, s in model.goal_states.items() if s.state is GoalState.FAILED]
-    assert f"g{str(held).removeprefix('cup_')}" == failed
-    assert f"at({held})" in (model.goal_states[failed].reason or "")
-    assert any(f"goal {failed} is left out" in note for note in entry(model).outcome.notes)
-    begun = {order.task: order.robot for order in model.orders()}
-    assert begun.items() <= before.items()
-    model.finish()
-    others = [s.state for g, s in model.goal_states.items() if g != failed]
->>>>>>> next
+    others = [s.state for g, s in model.goal_states.items() if g != waits]
     assert others == [GoalState.REACHED] * 5
     assert entry(model).state is PlanState.SUCCEEDED
     model.return_("r1")
@@ -229,13 +218,8 @@ def test_the_goal_of_a_lost_robot_that_had_nothing_else_to_do_waits_for_it() -> 
     undisturbed = order_of(model, other)
     model.lose(holder)
     assert order_of(model, other) == undisturbed
-<<<<<<< HEAD
-    states = sorted(status.state.value for status in model.state.goal_states.values())
-    assert states == ["running", "waiting"]
-=======
     states = sorted(status.state.value for status in model.goal_states.values())
-    assert states == ["failed", "running"]
->>>>>>> next
+    assert states == ["running", "waiting"]
     model.finish()
     assert entry(model).state is PlanState.SUCCEEDED
     assert all(record.robot == other for record in entry(model).current())

@@ -36,6 +36,9 @@ bench-planning: $(VENV)/development ## the suite of household missions; writes d
 bench-allocation: $(VENV)/development ## allocators and schedulers; writes docs/benchmarks/allocation.md
 	$(BIN)/python -m benchmarks.allocation.run --out docs/benchmarks
 
+bench-scale: $(VENV)/development ## events, orders, starts, idle hours by size and past; writes docs/benchmarks/scale.md
+	$(BIN)/python -m benchmarks.scale.run --out docs/benchmarks
+
 docs: $(VENV)/development ## write the generated pages under docs/
 	$(BIN)/python -m keyexpr_schema.document
 
@@ -75,4 +78,4 @@ $(VENV)/development: requirements-dev.lock pyproject.toml setup.py | $(VENV)/cre
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@ $(VENV)/runtime
 
-.PHONY: help demo test lint types imports check bench bench-planning bench-allocation docs screenshots lock clean
+.PHONY: help demo test lint types imports check bench bench-planning bench-allocation bench-scale docs screenshots lock clean

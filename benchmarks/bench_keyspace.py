@@ -25,7 +25,7 @@ from keyexpr_schema.keyspace import FACT, STORE_JOURNAL
 from keyexpr_schema.payloads.system import StoreAddress, StoreQuery
 from keyexpr_schema.payloads.world import Fact, FactAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
-from keyexpr_schema.transport.storage import Write
+from keyexpr_schema.transport.store.storage import Write
 
 CALLS = 1500
 WATCHED = 500

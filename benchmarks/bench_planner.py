@@ -21,6 +21,7 @@ from fleet.core.checker.plan_checker import check_plan
 from fleet.core.model.world import WorldModel
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.service.composition import Composition, compose
+from fleet.service.skill_models import load_all_skills
 from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan, Task
@@ -74,14 +75,14 @@ def main() -> None:
                 f"{both_s / base[1]:.2f}, {makespan_s / base[3]:.2f}",
             )
     console.print(table)
-    console.print(_checker_table(parts))
+    console.print(_checker_table())
 
 
 def _met(seconds: float, target_s: float) -> str:
     return "met" if seconds <= target_s else "missed"
 
 
-def household(goals: int, robots: int, parts: Composition) -> WorldModel:
+def household(goals: int, robots: int) -> WorldModel:
     """A row of rooms, a cup for every goal in some room, half the robots with hands, half with
     baskets.
     """
@@ -101,7 +102,7 @@ def household(goals: int, robots: int, parts: Composition) -> WorldModel:
     facts = [_fact(cup.object, AT, f"room_{i % PLACES}") for i, cup in enumerate(cups)]
     facts += [_fact(s.robot, AT, f"room_{i * 2 % PLACES}") for i, s in enumerate(specs)]
     facts += [_fact(s.robot, HOLDING, NOTHING) for s in specs if "grip" in s.capabilities]
-    return WorldModel.of(parts.skills, places, cups, specs, facts)
+    return WorldModel.of(load_all_skills(), places, cups, specs, facts)
 
 
 def _robot(number: int) -> RobotSpec:
@@ -147,7 +148,7 @@ def _planned(
 ) -> tuple[float, float, int, float]:
     """Planning [s], planning and allocation [s], number of tasks, predicted makespan [s]."""
     goals, robots = size
-    world = household(goals, robots, parts)
+    world = household(goals, robots)
     problem = PlanningProblem(plan="p", goals=goals_of(goals), world=world, strategy=strategy)
     made, planning_s = _timed(lambda: parts.planners["symbolic"].plan(problem))
     if isinstance(made, NoPlan):
@@ -158,8 +159,8 @@ def _planned(
     return planning_s, planning_s + allocating_s, len(made.plan.tasks), found.schedule.makespan_s
 
 
-def _checker_table(parts: Composition) -> Table:
-    plan, world = big_plan(CHECKED_TASKS, parts)
+def _checker_table() -> Table:
+    plan, world = big_plan(CHECKED_TASKS)
     table = Table("tasks", "edges", "check, median", "loosest order", title="plan checker")
     took_s = median(_timed(lambda: check_plan(plan, world))[1] for _ in range(REPEATS))
     checked = check_plan(plan, world)
@@ -181,10 +182,10 @@ def _checker_table(parts: Composition) -> Table:
     return table
 
 
-def big_plan(tasks: int, parts: Composition) -> tuple[Plan, WorldModel]:
+def big_plan(tasks: int) -> tuple[Plan, WorldModel]:
     """A valid plan of so many tasks: cups brought one by one, each by an actor of its own."""
     count = tasks // 4
-    world = household(count, 20, parts)
+    world = household(count, 20)
     rows: list[Task] = []
     for i in range(count):
         origin, target = f"room_{i % PLACES}", f"room_{(i + 1) % PLACES}"

@@ -18,14 +18,16 @@ from rich.console import Console
 from rich.table import Table
 
 from fleet.core import events
-from fleet.core.dispatch.delays import FACTOR, MARGIN_S
 from fleet.core.effects import MakePlan
 from fleet.core.events import PlanningSucceeded
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.model.durations import FACTOR, MARGIN_S
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_index import OUTSTANDING
 from fleet.core.state import Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
 from fleet.service.planning.planning_job import run_planning_job
+from fleet.service.skill_models import load_all_skills
 from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import PlanChange
@@ -93,7 +95,7 @@ class Running:
             events.PlannerStarted,
             epoch=1,
             incarnation="bench",
-            skills=dict(self.composition.skills),
+            skills=load_all_skills(),
         )
         for number in range(PLACES):
             ways = {f"room_{n}": abs(n - number) * STEP_M for n in range(PLACES) if n != number}

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 
 def machine() -> str:
@@ -30,3 +32,13 @@ def as_markdown(head: Sequence[str], rows: Sequence[tuple[str, ...]]) -> str:
     """A table."""
     lines = ["| " + " | ".join(head) + " |", "| " + " | ".join("---" for _ in head) + " |"]
     return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
+
+
+def as_json(measured: dict[str, Any]) -> str:
+    """A line a part, numbers to six digits."""
+    rounded = json.loads(json.dumps(measured), parse_float=lambda text: float(f"{float(text):.6g}"))
+    parts = (
+        f"{json.dumps(part)}: {json.dumps(about, separators=(',', ':'))}"
+        for part, about in rounded.items()
+    )
+    return "{\n" + ",\n".join(parts) + "\n}\n"

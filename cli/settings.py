@@ -17,18 +17,22 @@ DEFAULT_REALM = "robotfleet"
 _ENDPOINT = re.compile(r"^[a-z][a-z0-9_]*/\S+$")
 _REALM = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,62}", re.ASCII)
 _FIELDS = ("router", "realm", "planner")
+LEAST_PLANNING_LIMIT_S = 1.0
+"""Allocating alone takes as long."""
 
 
 @dataclass(frozen=True)
 class PlannerSettings:
     """How `robotctl planner` behaves where no flag says so; `None` and empty: it is not given.
 
-    Files are relative to the folder of the configuration file. `lost_after_s` is wall time [s].
+    Files are relative to the folder of the configuration file. `lost_after_s` and
+    `planning_limit_s` are wall time [s].
     """
 
     approval: bool | None = None
     auto_plan: bool | None = None
     lost_after_s: float | None = None
+    planning_limit_s: float | None = None
     llm_config: Path | None = None
     skills: tuple[Path, ...] = ()
 
@@ -154,10 +158,14 @@ def _planner(section: object, path: Path) -> PlannerSettings:
 
     for name in ("approval", "auto_plan"):
         check(name, isinstance(written.get(name), bool), "true or false")
-    lost = written.get("lost_after_s")
-    is_number = isinstance(lost, int | float) and not isinstance(lost, bool)
-    lost_s = float(lost or 0.0) if is_number else -1.0
-    check("lost_after_s", 0.0 <= lost_s < math.inf, "a number of seconds from 0 up")
+
+    def seconds(name: str, least_s: float) -> float | None:
+        value = written.get(name)
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        number = float(value or 0.0) if is_number else -math.inf
+        check(name, least_s <= number < math.inf, f"a number of seconds from {least_s:g} up")
+        return None if value is None else number
+
     check("llm_config", isinstance(written.get("llm_config"), str), "the name of a file")
     skills = written.get("skills") or []
     skills = [skills] if isinstance(skills, str) else skills
@@ -167,7 +175,8 @@ def _planner(section: object, path: Path) -> PlannerSettings:
     return PlannerSettings(
         approval=written.get("approval"),
         auto_plan=written.get("auto_plan"),
-        lost_after_s=None if lost is None else lost_s,
+        lost_after_s=seconds("lost_after_s", 0.0),
+        planning_limit_s=seconds("planning_limit_s", LEAST_PLANNING_LIMIT_S),
         llm_config=None if llm is None else path.parent / Path(llm).expanduser(),
         skills=tuple(path.parent / Path(each).expanduser() for each in skills),
     )

@@ -35,7 +35,8 @@ else:
         __name__,
         {
             "errors": (
-                "CannotListen SchemaError ForeignKey InvalidId NoReply NoConfigFile Unconfirmed "
+                "CannotListen SchemaError ForeignKey InvalidId NoReply NoConfigFile Overtaken "
+                "Unconfirmed "
                 "UndecodablePayload Unreachable"
             ),
             "facts": (
@@ -45,10 +46,11 @@ else:
             "ids": "Id actor_arg check_id slug",
             "key": "Address Component Delivery Key Payload",
             "keyspace": (
-                "GOAL_SPEC GOAL_STATUS FACT STATEMENT STATEMENT_STATUS PLACE OBJECT ROBOT_SPEC "
-                "ROBOT_STATE ROBOT_ALIVE ORDER REPORT DURATIONS PLAN_SPEC PLAN_PROPOSAL "
+                "GOAL_SPEC GOAL_STATUS FACT STATEMENT STATEMENT_STATUS PLACE OBJECT CLAIM "
+                "ROBOT_SPEC ROBOT_STATE ROBOT_ALIVE ORDER REPORT DURATIONS PLAN_SPEC PLAN_PROPOSAL "
                 "PLAN_STATUS TASK_RECORD PLAN_REQUEST REPLAN_REQUEST CONTROL_REQUEST ANSWER "
-                "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE STORE_JOURNAL STORE_CHANGES "
+                "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE STORE_JOURNAL STORE_STAMPS STORE_REPLACE "
+                "STORE_CHANGES "
                 "SIM_MOTION SIM_SENSES SIM_CLOCK SIM_FRAMES SIM_SCENE SIM_TRUTH SIM_CONTACTS "
                 "KEYSPACE key_of"
             ),
@@ -68,8 +70,9 @@ else:
             ),
             "payloads.system": (
                 "JournalEntry PlannerAddress PlannerAliveAddress PlannerStatus StoreAddress "
-                "StoreChanges StoreChangesQuery StoreJournal StoreQuery StoredValue "
-                "UndecodableAddress UndecodableValue"
+                "StoreChanges StoreChangesQuery StoreJournal StoreQuery StoreReplaced "
+                "StoreReplaceQuery StoreStamps "
+                "StoreStampsQuery StoredValue UndecodableAddress UndecodableValue"
             ),
             "payloads.simulation": (
                 "Body ContactCount Frame Frames MotionCall QuaternionWxyz Scene Shape ShapeKind "
@@ -80,8 +83,8 @@ else:
                 "TaskAddress TaskRecord TaskState Try"
             ),
             "payloads.world": (
-                "Fact FactAddress Object ObjectAddress Place PlaceAddress Statement "
-                "StatementAddress StatementStatus Surface"
+                "Claim ClaimAddress Fact FactAddress Object ObjectAddress Place PlaceAddress "
+                "Statement StatementAddress StatementStatus Surface"
             ),
             "transport.router": "run_router",
             "transport.session": (

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from keyexpr_schema.key import Component
-from keyexpr_schema.keyspace import KEYSPACE
+from keyexpr_schema.keyspace import KEY_TREES, KEYSPACE
 
 _PREAMBLE = """\
 <!-- Written by `python -m keyexpr_schema.document` from keyexpr_schema/keyspace.py. -->
@@ -53,6 +53,10 @@ def document() -> str:
             f"| `{key.template}` | {payload} | {_named(key.writers)} | {_named(key.readers)} "
             f"| {key.delivery.value} |"
         )
+    lines.append("\nWhen what they are about has been over for long, the planner deletes keys,")
+    lines.append("whoever wrote them, by wildcards:\n\n```text")
+    lines += [tree.template for tree in KEY_TREES]
+    lines.append("```")
     lines.append("\n## Keys\n")
     lines += [f"- `{key.template}` (`{key.schema}`): {key.about}" for key in KEYSPACE]
     lines.append("\n## Payloads")

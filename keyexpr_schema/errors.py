@@ -50,5 +50,9 @@ class Unconfirmed(SchemaError):
     """A write that must last was not read back from storage before its deadline."""
 
 
+class Overtaken(SchemaError):
+    """A write did not hold, because somebody else has written the same key with a later stamp."""
+
+
 class NoReply(SchemaError):
     """A query ended without a reply: nobody serves the key, or the server was too slow."""

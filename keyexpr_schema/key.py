@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum, Flag, auto
 from functools import cached_property
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import msgspec
 
@@ -180,6 +180,22 @@ class Key(Generic[A, P]):
             UndecodablePayload: it is not one; the message names the field and what it should be.
         """
         return decode_payload(self.payload, data, keyexpr or self.template)
+
+
+@dataclass(frozen=True)
+class KeyTree:
+    """Keys that are deleted together, by one message with a wildcard."""
+
+    template: str
+    keys: tuple[Key[Any, Any], ...]
+
+    def build(self, name: str) -> str:
+        """The key expression of all keys about `name`.
+
+        Raises:
+            InvalidId: the name cannot be a chunk.
+        """
+        return re.sub(r"\{(\w+)\}", lambda field: check_id(name, field[1]), self.template)
 
 
 def decode_payload(kind: type[P], data: bytes, where: str) -> P:

@@ -9,10 +9,11 @@ from __future__ import annotations
 from typing import Any
 
 from keyexpr_schema.errors import ForeignKey
-from keyexpr_schema.key import Component, Delivery, Key
+from keyexpr_schema.key import Component, Delivery, Key, KeyTree
 from keyexpr_schema.payloads import (
     durations,
     goals,
+    history,
     motions,
     plans,
     requests,
@@ -55,7 +56,7 @@ STATEMENT = Key(
 STATEMENT_STATUS = Key(
     "statement_status", "world/statements/{statement}/status",
     world.StatementAddress, world.StatementStatus,
-    delivery=STORED, writers=PLANNER, readers=PERSON,
+    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
     about="The facts that the planner read out of a statement, or why it read none.",
 )
 PLACE = Key(
@@ -67,6 +68,12 @@ OBJECT = Key(
     "object", "world/objects/{object}", world.ObjectAddress, world.Object,
     delivery=STORED, writers=PERSON, readers=PLANNER | WORKER | PERSON,
     about="A thing that can be spoken about; where it is, is a fact.",
+)
+
+CLAIM = Key(
+    "claim", "world/claims/{of}/{name}", world.ClaimAddress, world.Claim,
+    delivery=STORED, writers=PERSON, readers=PERSON,
+    about="Which number or name is being given: two people at once do not get the same one.",
 )
 
 # --- robots --------------------------------------------------------------------------------------
@@ -163,11 +170,41 @@ UNDECODABLE = Key(
     delivery=STORED, writers=ANYONE, readers=PERSON | RECORDER,
     about="A value that is not what its key promises: which key, why, how often.",
 )
+HISTORY = Key(
+    "history", "planner/history", system.PlannerAddress, history.HistoryQuery,
+    delivery=QUERY, writers=PERSON, readers=PLANNER,
+    about="What is over: what was wanted, what came of it, who did it, how long it took.",
+    reply=history.HistoryPage,
+)
+HISTORY_STATS = Key(
+    "history_stats", "planner/history/stats", system.PlannerAddress, history.HistoryStatsQuery,
+    delivery=QUERY, writers=PERSON, readers=PLANNER,
+    about="The history, added up by day.",
+    reply=history.HistoryStats,
+)
+RETIREMENT = Key(
+    "retirement", "planner/retirement", system.PlannerAddress, history.RetireQuery,
+    delivery=QUERY, writers=PERSON, readers=PLANNER,
+    about="Deletes the keys of what is over at once; the history keeps it.",
+    reply=history.Retired,
+)
 STORE_JOURNAL = Key(
     "store_journal", "store/journal", system.StoreAddress, system.StoreQuery,
     delivery=QUERY, writers=ANYONE, readers=STORE,
     about="What changed in the key-space, in the order in which the store applied it.",
     reply=system.StoreJournal,
+)
+STORE_STAMPS = Key(
+    "store_stamps", "store/stamps", system.StoreAddress, system.StoreStampsQuery,
+    delivery=QUERY, writers=ANYONE, readers=STORE,
+    about="Whether writes have arrived and are on disk: the timestamp that each key holds.",
+    reply=system.StoreStamps,
+)
+STORE_REPLACE = Key(
+    "store_replace", "store/replace", system.StoreAddress, system.StoreReplaceQuery,
+    delivery=QUERY, writers=ANYONE, readers=STORE,
+    about="Compare and set: writes a key unless somebody else has written it since it was seen.",
+    reply=system.StoreReplaced,
 )
 STORE_CHANGES = Key(
     "store_changes", "store/changes", system.StoreAddress, system.StoreChangesQuery,
@@ -200,7 +237,7 @@ SIM_FRAMES = Key(
 )
 SIM_SCENE = Key(
     "sim_scene", "sim/scene", simulation.SimAddress, simulation.Scene,
-    delivery=STORED, writers=SIMULATION, readers=SIMULATION | PERSON | RECORDER,
+    delivery=STORED, writers=SIMULATION, readers=PLANNER | SIMULATION | PERSON | RECORDER,
     about="The shapes of every body, and where the fixed ones stand.",
 )
 SIM_TRUTH = Key(
@@ -220,6 +257,25 @@ KEYSPACE: tuple[Key[Any, Any], ...] = tuple(
 )
 """Every key, in the order of this file."""
 
+PLAN_TREE = KeyTree("plans/{plan}/**", (PLAN_SPEC, PLAN_PROPOSAL, PLAN_STATUS, TASK_RECORD))
+REPORT_TREE = KeyTree("robots/*/reports/{plan}/**", (REPORT,))
+GOAL_TREE = KeyTree("goals/{goal}/*", (GOAL_SPEC, GOAL_STATUS))
+REQUEST_TREE = KeyTree("requests/*/{request}", (PLAN_REQUEST, REPLAN_REQUEST, CONTROL_REQUEST))
+ANSWER_TREE = KeyTree("answers/{request}", (ANSWER,))
+KEY_TREES = (PLAN_TREE, REPORT_TREE, GOAL_TREE, REQUEST_TREE, ANSWER_TREE)
+"""What the planner deletes, whoever wrote it, when what it is about has been over for long."""
+
+
+def _shape(template: str) -> tuple[str, int]:
+    return template.partition("/")[0], template.count("/")
+
+
+_BY_SHAPE = {
+    shape: tuple(key for key in KEYSPACE if _shape(key.template) == shape)
+    for shape in {_shape(key.template) for key in KEYSPACE}
+}
+"""Keys by first chunk and length, so that `key_of` tries few of them."""
+
 
 def key_of(keyexpr: str) -> Key[Any, Any]:
     """The row of the table that a key expression without wildcards belongs to.
@@ -227,7 +283,7 @@ def key_of(keyexpr: str) -> Key[Any, Any]:
     Raises:
         ForeignKey: it belongs to none.
     """
-    for key in KEYSPACE:
+    for key in _BY_SHAPE.get(_shape(keyexpr), ()):
         try:
             key.parse(keyexpr)
         except ForeignKey:

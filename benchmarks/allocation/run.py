@@ -21,7 +21,7 @@ from typing import Any
 from rich.console import Console
 
 from benchmarks.allocation import bench_balanced, bench_household, bench_makespan, report
-from benchmarks.tables import machine
+from benchmarks.tables import as_json, machine
 from fleet.allocators.makespan import DEADLINE_S
 
 QUICK_SEEDS = 3
@@ -63,16 +63,6 @@ def main() -> None:
             known.write_text(as_json(measured), encoding="utf-8")
     if given.out is not None:
         report.write(given.out, measured)
-
-
-def as_json(measured: dict[str, Any]) -> str:
-    """A line a part, numbers to six digits."""
-    rounded = json.loads(json.dumps(measured), parse_float=lambda text: float(f"{float(text):.6g}"))
-    parts = (
-        f"{json.dumps(part)}: {json.dumps(about, separators=(',', ':'))}"
-        for part, about in rounded.items()
-    )
-    return "{\n" + ",\n".join(parts) + "\n}\n"
 
 
 def _runs(given: argparse.Namespace, console: Console) -> dict[str, Callable[[], Any]]:

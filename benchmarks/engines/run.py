@@ -86,7 +86,7 @@ def main() -> None:
 
 
 def _own(size: tuple[int, int], parts: Composition) -> list[Row]:
-    world, goals = household(*size, parts), goals_of(size[0])
+    world, goals = household(*size), goals_of(size[0])
     problem = PlanningProblem(plan="p", goals=goals, world=world, strategy="big-dag")
     began_s = time.process_time()
     planned = parts.planners["symbolic"].plan(problem)
@@ -101,7 +101,7 @@ def _own(size: tuple[int, int], parts: Composition) -> list[Row]:
 def _engine(
     size: tuple[int, int], engine: str, parts: Composition, python: str, timeout_s: float
 ) -> Row:
-    world, goals = household(*size, parts), goals_of(size[0])
+    world, goals = household(*size), goals_of(size[0])
     answer = _solve(engine, world, goals, python, timeout_s)
     if answer["status"] != "solved":
         return Row(size, engine, answer.get("why") or answer["status"])

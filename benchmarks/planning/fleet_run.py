@@ -22,6 +22,7 @@ from fleet.core.step import step
 from fleet.planners import LlmInterpreter
 from fleet.service.composition import Composition
 from fleet.service.planning.planning_job import run_planning_job
+from fleet.service.skill_models import load_all_skills
 from keyexpr_schema.facts import AT, ON
 from keyexpr_schema.keyspace import FACT, OBJECT, ORDER, PLACE, ROBOT_SPEC, ROBOT_STATE
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal
@@ -204,7 +205,7 @@ class FleetRun:
             epoch=1,
             incarnation=INCARNATION,
             policy=policy,
-            skills=dict(self._composition.skills),
+            skills=load_all_skills(),
         )
         for place in self._places.values():
             self._world.apply(Change(PLACE, PlaceAddress(place.place), place, ""))

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Iterable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from cli.client.names import TakenMeanwhile, free_name, next_number, put_if_unchanged
 from cli.errors import BadArgument, check_known
-from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.facts import AT, parse_value
-from keyexpr_schema.ids import slug
 from keyexpr_schema.keyspace import (
     FACT,
     GOAL_SPEC,
@@ -40,39 +38,34 @@ CLOCK_S = 0.6
 """How long to listen for a simulation's clock [s, wall]; it ticks several times as often."""
 
 
-def free_name(text: str, taken: Iterable[str], kind: str) -> str:
-    """A name made from the words of `text` that is not one of `taken`.
-
-    Where no letter of it can stand in a name, as of Chinese, the name is `kind`.
-    """
-    used = set(taken)
-    try:
-        base = slug(text)
-    except InvalidId:
-        base = kind
-    number = 1
-    name = base
-    while name in used:
-        number += 1
-        name = f"{base}-{number}"
-    return name
-
-
 async def put_statement(session: Session, text: str, name: str | None = None) -> Statement:
     """Store a sentence, confirmed, under `name` or one made from its words.
 
     Raises:
-        BadArgument: it has no words.
+        BadArgument: it has no words, or somebody else took the name in the same moment.
     """
     if not text.strip():
         raise BadArgument("say something, such as “The first cup is in the kitchen.”")
-    if name is None:
-        stored = await session.list(STATEMENT)
-        same = [a.statement for a, known in stored.items() if known.text == text]
-        name = same[0] if same else free_name(text, (a.statement for a in stored), "statement")
-    statement = Statement(statement=name, text=text)
-    await session.confirm(STATEMENT, StatementAddress(name), statement)
-    return statement
+    said_s = await fleet_time_s(session)
+    stored = {a.statement: known for a, known in (await session.list(STATEMENT)).items()}
+    same = [known for known, statement in stored.items() if statement.text == text]
+    while True:
+        chosen = name or next(iter(same), None) or free_name(text, stored, "statement")
+        statement = Statement(statement=chosen, text=text, said_s=said_s)
+        try:
+            await put_if_unchanged(
+                session, STATEMENT, StatementAddress(chosen), statement, stored.get(chosen)
+            )
+        except TakenMeanwhile as taken:
+            if name is not None:
+                raise BadArgument(
+                    f"somebody else has just said something as {name}: “{taken.by.text}”; "
+                    "say it again to replace that, or use another --id"
+                ) from None
+            stored[chosen] = taken.by
+            same = [chosen] if taken.by.text == text else []
+        else:
+            return statement
 
 
 async def put_fact(session: Session, relation: str, subject: str, written: str) -> Fact:
@@ -107,20 +100,13 @@ async def fleet_time_s(session: Session) -> float:
     A realm that has a simulated scene whose clock is not heard has stopped; then the time is the
     latest that a robot has reported: Unix time would outdate whatever the simulation says later.
     """
-    heard: float | None = None
-    simulated = False
-    async with session.watch(SIM_CLOCK, SIM_SCENE) as watch:
-        with suppress(TimeoutError):
-            async with asyncio.timeout(CLOCK_S):
-                async for change in watch:
-                    if change.key is SIM_CLOCK and change.value is not None:
-                        heard = change.value.time_s
-                        break
-                    simulated = simulated or change.value is not None
-    if heard is not None:
-        return heard
-    if not simulated:
+    if not await session.list(SIM_SCENE):
         return time.time()
+    with suppress(TimeoutError):
+        async with session.watch(SIM_CLOCK) as watch, asyncio.timeout(CLOCK_S):
+            async for change in watch:
+                if change.value is not None:
+                    return float(change.value.time_s)
     states = (await session.list(ROBOT_STATE)).values()
     return max((state.time_s for state in states), default=0.0)
 
@@ -141,16 +127,27 @@ async def put_goal(
         raise BadArgument("say what you want, such as “Bring the first cup to the hallway.”")
     stored = {address.goal: spec for address, spec in (await session.list(GOAL_SPEC)).items()}
     ended = [address.goal for address in await session.list(GOAL_STATUS)]
-    if name in stored:
-        raise BadArgument(
-            f"there is a goal {name!r} already: “{stored[name].text}”; use another --id"
-        )
-    spec = Goal(
-        goal=name if name is not None else free_name(text, [*stored, *ended], "goal"),
-        text=text,
-        priority=priority,
-        due_s=None if within_s is None else await fleet_time_s(session) + within_s,
-        ordinal=1 + max((each.ordinal for each in stored.values()), default=0),
+    taken = {*stored, *ended}
+    said_s = await fleet_time_s(session)
+    ordinal = await next_number(
+        session, "goals", "all", max((each.ordinal for each in stored.values()), default=0)
     )
-    await session.confirm(GOAL_SPEC, GoalAddress(spec.goal), spec)
-    return spec
+    while True:
+        spec = Goal(
+            goal=name if name is not None else free_name(text, taken, "goal"),
+            text=text,
+            priority=priority,
+            due_s=None if within_s is None else said_s + within_s,
+            ordinal=ordinal,
+            said_s=said_s,
+        )
+        address = GoalAddress(spec.goal)
+        if spec.goal not in stored and await session.create(GOAL_SPEC, address, spec):
+            return spec
+        if name is not None:
+            there = await session.get(GOAL_SPEC, address)
+            raise BadArgument(
+                f"there is a goal {name!r} already: “{there.text if there else '?'}”; "
+                "use another --id"
+            )
+        taken.add(spec.goal)

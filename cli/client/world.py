@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
+from cli.client.names import claim_name, next_number
 from cli.errors import BadArgument, check_known
 from keyexpr_schema.ids import check_id
 from keyexpr_schema.keyspace import OBJECT, PLACE, ROBOT_SPEC
@@ -45,6 +46,7 @@ async def put_object(
     """
     check_id(name, "object")
     check_id(kind, "kind")
+    await claim_name(session, name, "object")
     places = [address.place for address in await session.list(PLACE)]
     if home is not None:
         check_known("place", home, places)
@@ -52,18 +54,27 @@ async def put_object(
     _check_free(name, "robot", [address.robot for address in await session.list(ROBOT_SPEC)])
     objects = {a.object: thing for a, thing in (await session.list(OBJECT)).items()}
     old = objects.get(name)
-    ordinal = 1 + max((o.ordinal for o in objects.values() if o.kind == kind), default=0)
-    if old is None or old.kind != kind:
-        old = Object(object=name, kind=kind, label=_in_words(name), ordinal=ordinal)
-    thing = replace(
-        old,
-        label=label or old.label,
-        aliases=aliases or old.aliases,
-        home=home or old.home,
-        mass_kg=old.mass_kg if mass_kg is None else mass_kg,
-    )
-    await session.confirm(OBJECT, ObjectAddress(name), thing)
-    return thing
+    number = None if old is None or old.kind != kind else old.ordinal
+    if number is None:
+        highest = max((o.ordinal for o in objects.values() if o.kind == kind), default=0)
+        number = await next_number(session, "objects", kind, highest)
+
+    def changed(now: Object | None) -> Object:
+        if now is None or now.kind != kind:
+            if now is not None and now != old:
+                raise BadArgument(
+                    f"somebody else has just stored {name} as a {now.kind}; choose another name"
+                )
+            now = Object(object=name, kind=kind, label=_in_words(name), ordinal=number)
+        return replace(
+            now,
+            label=label or now.label,
+            aliases=aliases or now.aliases,
+            home=home or now.home,
+            mass_kg=now.mass_kg if mass_kg is None else mass_kg,
+        )
+
+    return await session.update(OBJECT, ObjectAddress(name), changed)
 
 
 async def put_place(
@@ -86,24 +97,36 @@ async def put_place(
     check_id(name, "place")
     region_m = tuple(_rectangle(written) for written in regions)
     travel_m = dict(_distance(written) for written in distances)
+    await claim_name(session, name, "place")
     places = {a.place: place for a, place in (await session.list(PLACE)).items()}
     for other in travel_m:
         check_known("place", other, [p for p in places if p != name])
     _check_free(name, "object", [address.object for address in await session.list(OBJECT)])
     _check_free(name, "robot", [address.robot for address in await session.list(ROBOT_SPEC)])
-    old = places.get(name) or Place(place=name, label=_in_words(name))
-    place = replace(
-        old,
-        label=label or old.label,
-        aliases=aliases or old.aliases,
-        region_m=region_m or old.region_m,
-        travel_m={**old.travel_m, **travel_m},
-    )
-    await session.confirm(PLACE, PlaceAddress(name), place)
+
+    def changed(now: Place | None) -> Place:
+        now = now or Place(place=name, label=_in_words(name))
+        return replace(
+            now,
+            label=label or now.label,
+            aliases=aliases or now.aliases,
+            region_m=region_m or now.region_m,
+            travel_m={**now.travel_m, **travel_m},
+        )
+
+    place = await session.update(PLACE, PlaceAddress(name), changed)
     for other, metres in travel_m.items():
-        back = replace(places[other], travel_m={**places[other].travel_m, name: metres})
-        await session.confirm(PLACE, PlaceAddress(other), back)
+        back = _with_distance(places[other], name, metres)
+        await session.update(PLACE, PlaceAddress(other), back)
     return place
+
+
+def _with_distance(before: Place, to: str, metres: float) -> Callable[[Place | None], Place]:
+    def changed(now: Place | None) -> Place:
+        now = now or before
+        return replace(now, travel_m={**now.travel_m, to: metres})
+
+    return changed
 
 
 def _check_free(name: str, kind: str, taken: Iterable[str]) -> None:

@@ -60,7 +60,7 @@ async def check(
     from cli.plans.files import read_plan
     from cli.plans.worlds import world_of_files, world_of_fleet
     from fleet.core.checker.plan_checker import check_plan
-    from fleet.service.composition import load_all_skills
+    from fleet.service.skill_models import load_all_skills
 
     _only_with_world(world, connected, robots, facts)
     plan = read_plan(file)
@@ -141,6 +141,7 @@ async def propose(
     from msgspec.structs import replace
 
     from cli.client.fleet_view import fleet_view
+    from cli.client.names import TakenMeanwhile, put_if_unchanged
     from cli.client.planner_requests import check_planner
     from cli.errors import BadArgument, Refused
     from cli.plans.files import read_plan
@@ -158,13 +159,20 @@ async def propose(
     )
     if not plan.tasks:
         raise BadArgument(f"{file}: the plan has no tasks")
-    of = {"plan": plan.plan}
+    of, address = {"plan": plan.plan}, PlanAddress(plan.plan)
     async with call.session() as session:
         await check_planner(session)
+        left = await session.get(PLAN_PROPOSAL, address)
         async with fleet_view(session, (PLAN_SPEC, of), (PLAN_STATUS, of)) as view:
             if view.plans or view.plan_status:
                 raise BadArgument(f"there is a plan {plan.plan} already; give yours another --id")
-            await session.confirm(PLAN_PROPOSAL, PlanAddress(plan.plan), plan)
+            # A proposal that no plan was made of may lie there still; one that is new may not.
+            try:
+                await put_if_unchanged(session, PLAN_PROPOSAL, address, plan, left)
+            except TakenMeanwhile:
+                raise BadArgument(
+                    f"somebody else has just proposed a plan {plan.plan}; give yours another --id"
+                ) from None
             await view.until(
                 lambda: (
                     plan.plan in view.plan_status

@@ -12,6 +12,7 @@ from typing import Annotated, TypeVar
 import typer
 
 from cli.command import Call, single
+from cli.settings import LEAST_PLANNING_LIMIT_S
 
 T = TypeVar("T")
 SIM = "sim"
@@ -95,6 +96,15 @@ def planner(
             help="A robot whose worker is gone for longer is lost; else 30.",
         ),
     ] = None,
+    planning_limit_s: Annotated[
+        float | None,
+        typer.Option(
+            "--planning-limit",
+            metavar="SECONDS",
+            min=LEAST_PLANNING_LIMIT_S,
+            help="A plan is made within that time; goals that take longer wait. Else 120.",
+        ),
+    ] = None,
 ) -> None:
     """Run the planner: it turns goals into plans and has them carried out.
 
@@ -116,6 +126,9 @@ def planner(
             approval=_first(approval, settings.approval, default.approval),
             auto_plan=_first(auto_plan, settings.auto_plan, default.auto_plan),
             lost_after_s=_first(lost_after_s, settings.lost_after_s, default.lost_after_s),
+            planning_limit_s=_first(
+                planning_limit_s, settings.planning_limit_s, default.planning_limit_s
+            ),
         ),
     )
 

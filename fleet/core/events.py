@@ -18,17 +18,22 @@ from keyexpr_schema.payloads.plans import Plan, Violation
 from keyexpr_schema.payloads.requests import Answer, ControlRequest, PlanRequest, ReplanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Report
-from keyexpr_schema.payloads.world import Fact, Object, Place, Statement
+from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
 At = Mapping[str, Any]
-"""When an event happened, as its fields `time_s` and `wall_time_s`."""
+"""When an event happened, as its fields `time_s`, `wall_time_s` and `monotonic_s`."""
 
 
 class Event(msgspec.Struct, frozen=True, kw_only=True, tag_field="event", tag=True):
-    """Base of every event: when it happened on the fleet's clock [s] and in Unix time [s]."""
+    """Base of every event: when it happened on the fleet's clock [s] and in Unix time [s].
+
+    `monotonic_s` is a clock of the planner's host that nobody sets [s]; it begins anew with each
+    run of the planner. `None` in journals of before: there Unix time stands in for it.
+    """
 
     time_s: float
     wall_time_s: float
+    monotonic_s: float | None = None
 
 
 class PlannerStarted(Event, frozen=True, kw_only=True):
@@ -220,6 +225,8 @@ class PriorStateLoaded(Event, frozen=True, kw_only=True):
     answers: tuple[Answer, ...] = ()
     goals: tuple[GoalStatus, ...] = ()
     plans: tuple[str, ...] = ()
+    statements: tuple[StatementStatus, ...] = ()
+    """What an earlier planner had read out of statements; only what is said anew is read again."""
     durations: tuple[Durations, ...] = ()
 
 

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import msgspec
+from msgspec.structs import replace
 
+from fleet.core.fact_views import FactValues, Resting, Whereabouts
+from fleet.core.fleet_index import NO_FLEET, FleetIndex, index_of
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import PlanEntry, PlanningJob
+from fleet.core.plan_index import EMPTY_INDEX
 from fleet.core.table import Table
+from fleet.core.touches import UNTOUCHED, Touches
 from fleet.language import Vocabulary
 from fleet.language.vocabulary import SkillPhrase
-from keyexpr_schema.facts import AT, HOLDING, ON, FactKey
+from keyexpr_schema.facts import HOLDING, FactKey
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.history import Ended
@@ -40,7 +45,7 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     skill_phrases: tuple[SkillPhrase, ...] = msgspec.field(default=(), name="deeds")
 
 
-class State(msgspec.Struct, frozen=True, kw_only=True):
+class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """What the planner knows."""
 
     skills: dict[str, SkillModel] = {}
@@ -50,8 +55,12 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     """Names the journal that this state comes from; attempts of another planner have another."""
     epoch: int = 0
     incarnation: str = "none"
+    era: int = 0
+    """Counts up when the fleet's clock is set back; times of different eras do not compare."""
     time_s: float = 0.0
     wall_time_s: float = 0.0
+    monotonic_s: float = 0.0
+    """On a clock that nobody sets; see `Event.monotonic_s`."""
     goals: Table[str, Goal] = Table()
     goal_states: Table[str, GoalStatus] = Table()
     statements: Table[str, Statement] = Table()
@@ -60,6 +69,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     objects: Table[str, Object] = Table()
     robots: Table[str, RobotSpec] = Table()
     facts: Table[FactKey, Fact] = Table()
+    older_facts: Table[FactKey, None] = Table()
+    """Variables whose fact was said in an earlier era."""
     concluded: Table[FactKey, Fact] = Table()
     """What the planner itself concluded last of each variable, whatever is believed of it now."""
     durations: dict[str, Durations] = {}
@@ -67,9 +78,13 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     connected: Table[str, tuple[str, ...]] = Table()
     """The runs of each robot's worker that are connected."""
     gone_since: Table[str, float] = Table()
-    """Unix time [s] at which the last worker of a robot went away."""
+    """When the last worker of a robot went away, on the clock of `monotonic_s`."""
     plans: Table[str, PlanEntry] = Table()
     past_plans: tuple[str, ...] = ()
+    plans_made: int = 0
+    """The highest number that a plan `plan-N` has had; names that the planner gives go on there."""
+    attempts_made: int = 0
+    """The serial of the latest attempt that was ordered."""
     answers: Table[str, Answer] = Table()
     jobs: int = 0
     previews: Table[str, PlanningJob] = Table()
@@ -79,44 +94,42 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     policy: Policy = Policy()
     over: tuple[Ended, ...] = ()
     """What left the state in the latest event, because it is over."""
-    perhaps_over_plans: tuple[str, ...] = ()
-    perhaps_over_goals: tuple[str, ...] = ()
-    """What may leave it in the event that is being handled."""
+    index: FleetIndex = NO_FLEET
+    touches: Touches = UNTOUCHED
+    """What the event under way has changed so far; empty between two events."""
+
+    @property
+    def plans_while_acting(self) -> bool:
+        """Whether a plan is made again while it is carried out, as since logic 1 of the core. In
+        journals from before, it stood still, and of several reasons the last one counted."""
+        return self.logic >= 1
 
     def vocabulary(self) -> Vocabulary:
         """The names that sentences can use."""
-        whereabouts = {
-            fact.subject: fact.value
-            for fact in self.facts.values()
-            if fact.relation == AT and isinstance(fact.value, str)
-        }
-        rooms = {s.surface: p.place for p in self.places.values() for s in p.surfaces}
-        rests: dict[str, str] = {}
-        for fact in self.facts.values():
-            where = whereabouts.get(fact.subject)
-            # What it lay on says nothing any more once it was taken to another place.
-            if fact.relation != ON or where not in self.places:
-                continue
-            if isinstance(fact.value, str) and rooms.get(fact.value, where) == where:
-                rests[fact.subject] = fact.value
-        phrases = self.policy.skill_phrases
-        return Vocabulary(self.places, self.objects, self.robots, whereabouts, rests, phrases)
+        return Vocabulary(
+            self.places,
+            self.objects,
+            self.robots,
+            Whereabouts(self.facts),
+            Resting(self.facts, self.places),
+            self.policy.skill_phrases,
+        )
 
     def world(self) -> WorldModel:
-        """The world as believed now."""
-        return WorldModel.of(
-            self.skills,
-            self.places.values(),
-            self.objects.values(),
-            self.robots.values(),
-            self.facts.values(),
-            available=self.team(),
+        """The world as believed now: a view, which costs nothing to make."""
+        return WorldModel(
+            skills=self.skills,
+            places=self.places,
+            objects=self.objects,
+            robots=self.robots,
+            available=frozenset(self.index.team),
+            facts=FactValues(self.facts),
             durations=self.durations,
         )
 
     def team(self) -> tuple[str, ...]:
         """The robots that can be planned with, in a fixed order."""
-        return tuple(sorted(robot for robot in self.connected if self.ready(robot)))
+        return self.index.team
 
     def ready(self, robot: str) -> bool:
         """Whether a robot can be planned with: connected, and what its hand holds is known."""
@@ -128,3 +141,19 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     def fact(self, relation: str, subject: str) -> Fact | None:
         """The fact about a variable, if there is one."""
         return self.facts.get(FactKey(relation, subject))
+
+    def bare(self) -> State:
+        """The state without what is derived: what is kept of it. `reindexed` is the way back."""
+        plans = Table(
+            {plan: replace(entry, index=EMPTY_INDEX) for plan, entry in self.plans.items()}
+        )
+        return replace(self, plans=plans, index=NO_FLEET, touches=UNTOUCHED)
+
+    def reindexed(self) -> State:
+        """The state with everything derived anew, as after it was read or got other skills."""
+        plans = Table(
+            {plan: entry.indexed(None, self.skills) for plan, entry in self.plans.items()}
+        )
+        team = sorted(robot for robot in self.connected if self.ready(robot))
+        index = index_of(plans, self.goals, self.goal_states, self.facts, team)
+        return replace(self, plans=plans, index=index)

@@ -26,6 +26,7 @@ from keyexpr_schema.payloads.history import (
     GoalRecord,
     HistoryOutcome,
     PastEntry,
+    PastGoal,
     PlanRecord,
     RequestRecord,
 )
@@ -217,16 +218,23 @@ class Archive:
         ).fetchone()
         return None if row is None else _entry(*row)
 
-    def has_keys(self, plan: str) -> bool:
-        """Whether a plan that is over still has keys."""
-        return self._one("SELECT 1 FROM ended WHERE kind = ? AND name = ? AND live", PLAN, plan)
-
     def goal(self, goal: str) -> Goal | None:
         """A goal that is over and still has keys, as it was wanted."""
         row = self._db.execute(
             "SELECT spec FROM goals WHERE goal = ? AND live ORDER BY number DESC", (goal,)
         ).fetchone()
         return None if row is None else msgspec.json.decode(row[0], type=Goal)
+
+    def past_goal(self, goal: str) -> PastGoal | None:
+        """What came of the latest goal of this name that is over."""
+        row = self._db.execute(
+            "SELECT number, outcome, reason FROM goals WHERE goal = ? AND outcome != ? "
+            "ORDER BY number DESC",
+            (goal, HistoryOutcome.OPEN.value),
+        ).fetchone()
+        if row is None:
+            return None
+        return PastGoal(goal=goal, text="", outcome=HistoryOutcome(row[1]), reason=row[2])
 
     def _one(self, query: str, *values: object) -> bool:
         return self._db.execute(f"{query} LIMIT 1", values).fetchone() is not None

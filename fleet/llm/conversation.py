@@ -113,7 +113,8 @@ class LanguageModel:
         except Exception as error:
             # What a model says must never stop the fleet, whatever it is.
             log.exception("asking the language model")
-            return GivenUp(f"asking the language model failed: {error or type(error).__name__}")
+            said = str(error) or type(error).__name__
+            return GivenUp(f"asking the language model failed: {said}")
 
     def _converse(
         self,

@@ -17,6 +17,7 @@ from keyexpr_schema.keyspace import (
     ORDER,
     PLAN_SPEC,
     PLAN_STATUS,
+    STATEMENT_STATUS,
     TASK_RECORD,
 )
 from keyexpr_schema.transport.session import Session, TokenWatch, Watch
@@ -31,10 +32,12 @@ async def prior_state(session: Session, at: At) -> PriorStateLoaded:
     goals = await session.list(GOAL_STATUS)
     plans = await session.list(PLAN_STATUS)
     durations = await session.list(DURATIONS)
+    statements = await session.list(STATEMENT_STATUS)
     return PriorStateLoaded(
         answers=tuple(answers.values()),
         goals=tuple(goals.values()),
         plans=tuple(address.plan for address in plans),
+        statements=tuple(statements.values()),
         durations=tuple(durations.values()),
         **at,
     )

@@ -11,7 +11,7 @@ import fcntl
 import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import msgspec
 
@@ -20,10 +20,10 @@ from fleet.core.state import State
 from fleet.core.table import decode_table, encode_table
 from fleet.errors import FleetError
 
-SNAPSHOT_FORMAT = 3
+SNAPSHOT_FORMAT = 4
 """Counts up whenever a field of the state gets another name or meaning."""
-_READABLE = frozenset({2, SNAPSHOT_FORMAT})
-"""Formats that decode; in format 2 a state had no skills."""
+_READABLE = frozenset({2, 3, SNAPSHOT_FORMAT})
+"""Formats that decode; in format 2 a state had no skills, before format 4 no reasons and wishes."""
 SNAPSHOT_EVERY = 2000
 """Events between two snapshots; replaying this many takes well under a second."""
 
@@ -84,7 +84,7 @@ class EventJournal:
         self._since_snapshot += 1
         if self._since_snapshot >= SNAPSHOT_EVERY:
             self._since_snapshot = 0
-            kept = _Snapshot(format=SNAPSHOT_FORMAT, state=state)
+            kept = _Snapshot(format=SNAPSHOT_FORMAT, state=state.bare())
             self._db.execute("BEGIN")
             self._db.execute("DELETE FROM snapshots")
             self._db.execute(
@@ -107,10 +107,15 @@ class EventJournal:
         if row is None:
             return 0, State()
         try:
-            kept = msgspec.msgpack.decode(row[1], type=_Snapshot, dec_hook=decode_table)
-        except msgspec.DecodeError:
+            read = msgspec.msgpack.decode(row[1])
+            if read["format"] < SNAPSHOT_FORMAT:
+                read["state"]["plans"] = {
+                    plan: _with_reasons(entry) for plan, entry in read["state"]["plans"].items()
+                }
+            kept = msgspec.convert(read, _Snapshot, dec_hook=decode_table)
+        except (msgspec.DecodeError, LookupError, TypeError, AttributeError):
             return 0, State()
-        return (int(row[0]), kept.state) if kept.format in _READABLE else (0, State())
+        return (int(row[0]), kept.state.reindexed()) if kept.format in _READABLE else (0, State())
 
     def events(self, after: int = 0) -> Iterator[Event]:
         """Every event with a higher number than `after`, in order."""
@@ -118,3 +123,22 @@ class EventJournal:
             "SELECT event FROM events WHERE number > ? ORDER BY number", (after,)
         ):
             yield decode_event(data)
+
+
+def _with_reasons(entry: dict[str, Any]) -> dict[str, Any]:
+    """What was kept of a plan before format 4: one reason to make it again, and one task to add."""
+    job, replan, task = entry.get("job") or {}, entry.get("replan"), entry.get("amendment")
+    found = {reason["number"]: reason for reason in (job.get("reason"), replan) if reason}
+    wishes = []
+    if task is not None:
+        number = max(found)
+        del found[number]
+        wish = {"wish": "TaskAdded", "number": number, "request": entry["amendment_request"]}
+        args = {name: value for name, value in task["args"].items() if name != "robot"}
+        robot = entry["plan"]["pins"].get(task["actor"])
+        wishes.append(
+            {**wish, "skill": task["skill"], "args": args, "after": task["after"], "robot": robot}
+        )
+    if job.get("reason"):
+        job = {**job, "request": None, "takes_up": [job["reason"]["number"]]}
+    return {**entry, "job": job or None, "reasons": list(found.values()), "wishes": wishes}

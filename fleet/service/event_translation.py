@@ -68,6 +68,7 @@ def missed_deletions(state: State, seen: set[str], at: At) -> list[Event]:
     known: list[tuple[Key[Any, Any], Any]] = [
         *((GOAL_SPEC, GOAL_SPEC.address(goal)) for goal in state.goals),
         *((STATEMENT, STATEMENT.address(name)) for name in state.statements),
+        *((STATEMENT, STATEMENT.address(name)) for name in state.statement_states),
         *((PLACE, PLACE.address(place)) for place in state.places),
         *((OBJECT, OBJECT.address(thing)) for thing in state.objects),
         *((ROBOT_SPEC, ROBOT_SPEC.address(robot)) for robot in state.robots),

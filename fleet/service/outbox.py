@@ -28,9 +28,9 @@ class Outbox:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._wanted: dict[str, Publish | Retract] = {}
-        self._busy: set[str] = set()
+        self._busy: dict[str, asyncio.Task[None]] = {}
+        """Keys that are being written, or are about to be."""
         self._room = asyncio.Semaphore(IN_FLIGHT)
-        self._tasks: set[asyncio.Task[None]] = set()
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[Outbox]:
@@ -38,9 +38,10 @@ class Outbox:
         try:
             yield self
         finally:
-            for task in self._tasks:
+            tasks = list(self._busy.values())
+            for task in tasks:
                 task.cancel()
-            await asyncio.gather(*self._tasks, return_exceptions=True)
+            await asyncio.gather(*tasks, return_exceptions=True)
 
     def send(self, effects: Iterable[Publish | Retract]) -> None:
         """Want these values at their keys."""
@@ -48,10 +49,13 @@ class Outbox:
             keyexpr = effect.key.build(effect.address)
             self._wanted[keyexpr] = effect
             if keyexpr not in self._busy:
-                self._busy.add(keyexpr)
-                task = asyncio.create_task(self._write(keyexpr))
-                self._tasks.add(task)
-                task.add_done_callback(self._tasks.discard)
+                self._busy[keyexpr] = asyncio.create_task(self._write(keyexpr))
+
+    async def written(self, keyexprs: Iterable[str]) -> None:
+        """Return when nothing is left to be written at these keys."""
+        for keyexpr in keyexprs:
+            while (task := self._busy.get(keyexpr)) is not None:
+                await asyncio.shield(task)
 
     async def _write(self, keyexpr: str) -> None:
         async with self._room:
@@ -69,4 +73,4 @@ class Outbox:
                     log.warning("%s", error)
                     self._wanted.setdefault(keyexpr, effect)
                     await asyncio.sleep(_RETRY_S)
-        self._busy.discard(keyexpr)
+        del self._busy[keyexpr]

@@ -6,38 +6,43 @@ import asyncio
 import logging
 import time
 import uuid
-from collections.abc import Coroutine, Sequence
+from collections.abc import Sequence
 from contextlib import AsyncExitStack
 from typing import Any
 
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.dispatch.delays import SAME_CLOCK_S
 from fleet.core.dispatch.dispatcher import next_timer
-from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract, effects_of
+from fleet.core.effects import Archive as ToArchive
+from fleet.core.effects import DropJob, Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import At, Event
-from fleet.core.model.skills import phrases_of
-from fleet.core.planning_input import InterpretationInput, PlanningInput
+from fleet.core.model.skills import Skills, phrases_of
 from fleet.core.state import LOGIC, Policy, State
-from fleet.core.step import replay, step
+from fleet.core.step import step
 from fleet.errors import Superseded
+from fleet.history.archive import Archive
+from fleet.history.retention import Retention
 from fleet.service.catch_up import prior_state, stale_documents, until_synced
-from fleet.service.composition import Composition
 from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, event_of, missed_deletions
+from fleet.service.fleet_clock import FleetClock
 from fleet.service.outbox import Outbox
-from fleet.service.planning.planning_job import run_interpretation, run_planning_job
+from fleet.service.past import Past
+from fleet.service.planning.pool import PlanningPool
 from keyexpr_schema.keyspace import (
     PLANNER_ALIVE,
     PLANNER_STATUS,
     ROBOT_ALIVE,
     SIM_CLOCK,
+    SIM_SCENE,
 )
 from keyexpr_schema.payloads.system import PlannerAddress, PlannerAliveAddress, PlannerStatus
 from keyexpr_schema.transport.session import Session, TokenWatch, Watch
 
 log = logging.getLogger(__name__)
+CHARGE_S = 3600.0
+"""How long a planner that starts waits for a store."""
 
 
 class PlannerService:
@@ -47,23 +52,26 @@ class PlannerService:
         self,
         session: Session,
         journal: EventJournal,
-        composition: Composition,
-        policy: Policy | None = None,
+        pool: PlanningPool,
+        skills: Skills,
+        archive: Archive,
+        policy: Policy,
+        retention: Retention | None = None,
     ) -> None:
+        """`pool` is running; `skills` are the models that are planned with."""
         self._session = session
         self._journal = journal
-        self._composition = composition
-        self._policy = replace(
-            policy or Policy(),
-            interpreter=composition.language_model.configured,
-            skill_phrases=phrases_of(composition.skills),
-        )
+        self._pool = pool
+        self._skills = dict(skills)
+        self._policy = replace(policy, skill_phrases=phrases_of(skills))
         self._incarnation = uuid.uuid4().hex[:12]
         self._state = State()
-        self._time_s = 0.0
+        self._clock = FleetClock()
         self._outbox = Outbox(session)
+        self._past = Past(
+            session, archive, self._outbox, retention or Retention(), lambda: self._state
+        )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
-        self._planning: set[asyncio.Task[None]] = set()
         self._held: list[Effect] | None = []
         """Effects held back until everything stored is known; afterwards `None`."""
 
@@ -80,15 +88,18 @@ class PlannerService:
         """
         number, snapshot = self._journal.snapshot()
         if not snapshot.skills:  # in journals of earlier versions no event brings them
-            snapshot = replace(snapshot, skills=dict(self._composition.skills))
+            snapshot = replace(snapshot, skills=self._skills)
         first_run = self._journal.empty
-        self._state = replay(self._journal.events(number), snapshot)
+        self._state = self._replayed(number, snapshot)
         async with AsyncExitStack() as stack:
             watch = await stack.enter_async_context(
                 self._session.watch(*WATCHED, SIM_CLOCK, PLANNER_STATUS)
             )
             tokens = await stack.enter_async_context(self._session.watch_tokens(ROBOT_ALIVE))
             await stack.enter_async_context(self._outbox.running())
+            await stack.enter_async_context(self._past.running())
+            scenes = await self._session.list(SIM_SCENE)
+            self._clock.resume(self._state.time_s, bool(scenes))
             if first_run:
                 self._apply(await prior_state(self._session, self._at()))
             await self._take_charge()
@@ -106,45 +117,55 @@ class PlannerService:
                     tasks.create_task(self._listen(watch))
                     tasks.create_task(self._watch_workers(tokens))
                     tasks.create_task(self._take_events())
+                    tasks.create_task(self._take_answers())
+                    tasks.create_task(self._past.delete_keys_in_time())
             except* Superseded as group:
                 raise group.exceptions[0] from None
-            finally:
-                for task in self._planning:
-                    task.cancel()
+
+    def _replayed(self, number: int, snapshot: State) -> State:
+        """The state after all that is journaled; what became over on the way is archived, if an
+        earlier run was killed before it could."""
+        state = snapshot
+        self._past.keep(ToArchive(record) for record in snapshot.over)
+        for event in self._journal.events(number):
+            state, effects = step(state, event)
+            self._past.keep(effects)
+        return state
 
     def _at(self) -> At:
-        now_s = time.time()
-        if abs(now_s - self._time_s) < SAME_CLOCK_S:
-            self._time_s = now_s  # no simulation: the fleet's clock goes on without messages, too
-        return {"time_s": self._time_s, "wall_time_s": now_s}
+        return self._clock.at()
 
     async def _take_charge(self) -> None:
-        # Listed, not got: a value there that is none must not keep the planner from starting.
-        status = (await self._session.list(PLANNER_STATUS)).get(PlannerAddress())
-        epoch = 1 + max(self._state.epoch, status.epoch if status else 0)
+        """Take the next epoch: no two planners ever have the same, however they were started.
+
+        What is there that is no status counts for nothing: it must not keep a planner from
+        starting.
+        """
+        parts = await self._pool.ready()
+
+        def next_epoch(status: PlannerStatus | None) -> PlannerStatus:
+            return PlannerStatus(
+                epoch=1 + max(self._state.epoch, status.epoch if status else 0),
+                incarnation=self._incarnation,
+                planners=tuple(parts.planners_wait_s),
+                strategies=parts.strategies,
+                allocators=tuple(parts.allocators_wait_s),
+                skills=tuple(self._skills),
+            )
+
+        ours = await self._session.update(
+            PLANNER_STATUS, PlannerAddress(), next_epoch, timeout_s=CHARGE_S
+        )
         self._apply(
             events.PlannerStarted(
-                epoch=epoch,
+                epoch=ours.epoch,
                 incarnation=self._incarnation,
                 policy=self._policy,
-                skills=dict(self._composition.skills),
+                skills=self._skills,
                 logic=LOGIC,
                 lineage=self._incarnation,
                 **self._at(),
             )
-        )
-        await self._session.confirm(
-            PLANNER_STATUS,
-            PlannerAddress(),
-            PlannerStatus(
-                epoch=epoch,
-                incarnation=self._incarnation,
-                planners=tuple(self._composition.planners),
-                strategies=self._composition.strategies,
-                allocators=tuple(self._composition.allocators),
-                skills=tuple(self._composition.skills),
-            ),
-            timeout_s=3600.0,
         )
 
     async def _catch_up(self, watch: Watch, tokens: TokenWatch[Any]) -> None:
@@ -177,6 +198,7 @@ class PlannerService:
         """
         held = [e for e in self._held or () if isinstance(e, Publish | Retract)]
         self._held = None
+        self._past.publish_unsettled()
         self._carry_out((*held, *effects_of(self._state)))
 
     async def _listen(self, watch: Watch) -> None:
@@ -185,7 +207,8 @@ class PlannerService:
 
     def _on_change(self, change: Any) -> None:
         if change.key is SIM_CLOCK:
-            self._time_s = change.value.time_s
+            if change.value is not None:
+                self._clock.ticked(change.value.time_s)
         elif change.key is PLANNER_STATUS:
             other = change.value
             if other is not None and other.epoch > self._state.epoch:
@@ -194,7 +217,9 @@ class PlannerService:
                     f"{self._session.config.realm} (epoch {other.epoch}); this one stops"
                 )
         elif (event := event_of(change, self._at())) is not None:
-            self._time_s = max(self._time_s, _report_time_s(event))
+            if self._held is None and isinstance(event, events.ReportReceived):
+                report = event.report
+                self._clock.reported(report.ended_s or report.started_s or 0.0)
             self._inbox.put_nowait(event)
 
     async def _watch_workers(self, tokens: TokenWatch[Any]) -> None:
@@ -211,17 +236,20 @@ class PlannerService:
         while True:
             timer = next_timer(self._state)
             try:
-                async with asyncio.timeout(None if timer is None else timer - time.time()):
+                async with asyncio.timeout(None if timer is None else timer - time.monotonic()):
                     event = await self._inbox.get()
             except TimeoutError:
                 event = events.TimerFired(**self._at())
             self._apply(event)
 
     def _apply(self, event: Event) -> None:
-        state, effects = step(self._state, event)
+        if (news := self._past.news(event)) is None:
+            return
+        state, effects = step(self._state, news)
         if state is self._state:
             return
-        self._journal.append(event, state)
+        self._journal.append(news, state)
+        self._past.keep(effects)
         self._state = state
         self._carry_out(effects)
 
@@ -230,36 +258,15 @@ class PlannerService:
             self._held.extend(effects)
             return
         self._outbox.send(e for e in effects if isinstance(e, Publish | Retract))
+        self._past.sent(effects)
         for effect in effects:
-            if isinstance(effect, MakePlan):
-                self._in_background(self._make_plan(effect.given))
-            elif isinstance(effect, Interpret):
-                self._in_background(self._interpret(effect.given))
+            if isinstance(effect, MakePlan | Interpret):
+                self._pool.submit(effect.given)
+            elif isinstance(effect, DropJob):
+                self._pool.drop(effect.job)
 
-    def _in_background(self, work: Coroutine[Any, Any, None]) -> None:
-        task = asyncio.create_task(work)
-        self._planning.add(task)
-        task.add_done_callback(self._planning.discard)
-
-    async def _make_plan(self, given: PlanningInput) -> None:
-        try:
-            event: Event = await asyncio.to_thread(run_planning_job, given, self._composition)
-        except Exception as error:
-            log.exception("planning job %d", given.job.job)
-            event = events.PlanningFailed(
-                job=given.job.job,
-                reason=f"the planner failed: {error or type(error).__name__}",
-                postponed=True,
-                **self._at(),
-            )
-        self._inbox.put_nowait(replace(event, **self._at()))
-
-    async def _interpret(self, given: InterpretationInput) -> None:
-        event = await asyncio.to_thread(run_interpretation, given, self._composition)
-        self._inbox.put_nowait(replace(event, **self._at()))
-
-
-def _report_time_s(event: Event) -> float:
-    if isinstance(event, events.ReportReceived):
-        return event.report.ended_s or event.report.started_s or 0.0
-    return 0.0
+    async def _take_answers(self) -> None:
+        """Answers of planning jobs are events of the moment at which they come."""
+        while True:
+            answer = await self._pool.answers.get()
+            self._inbox.put_nowait(replace(answer, **self._at()))

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any
 
-from keyexpr_schema.transport.storage import Write
+from keyexpr_schema.transport.store.storage import Write
 
 _DEPTH = 4
 """Chunks that lead to a bucket: the realm, and what tells one kind of key from another."""
@@ -48,19 +48,19 @@ def matcher(*patterns: str) -> re.Pattern[str]:
 class Index:
     """The newest write of every key, deletions included, in buckets by the first chunks.
 
-    A pattern looks only into the buckets that it can match, so that the orders of all robots are
-    found without a look at their reports. `last` is the number of the newest change.
+    A pattern looks only into the buckets of keys that it can match, so that the orders of all
+    robots are found without a look at their reports. `last` is the number of the newest change.
     """
 
     def __init__(self, last: int = 0) -> None:
+        self._entries: dict[str, Numbered] = {}
         self._root: dict[str, Any] = {}
         self._numbers: list[int] = []
         self._keys: list[str] = []
-        self._count = 0
         self.last = last
 
     def __len__(self) -> int:
-        return self._count
+        return len(self._entries)
 
     @property
     def remembered(self) -> int:
@@ -69,33 +69,34 @@ class Index:
 
     def get(self, keyexpr: str) -> Write | None:
         """The newest write of a key: its value, or its tombstone."""
-        found = self._bucket(keyexpr).get(keyexpr)
+        found = self._entries.get(keyexpr)
         return found[1] if found is not None else None
 
     def set(self, number: int, write: Write) -> None:
         """Keep `write`, the change of that number, as the newest of its key."""
         keyexpr = write.keyexpr
-        node = self._root
-        for chunk in _path(keyexpr):
-            node = node.setdefault(chunk, {})
-        if keyexpr not in node:
-            self._count += 1
-        node[keyexpr] = (number, write)
+        if keyexpr not in self._entries:
+            node = self._root
+            for chunk in _path(keyexpr):
+                node = node.setdefault(chunk, {})
+            node[keyexpr] = None
+        self._entries[keyexpr] = (number, write)
         self._numbers.append(number)
         self._keys.append(keyexpr)
         self.last = number
-        if len(self._numbers) > 2 * self._count + _WORTH_TIDYING:
+        if len(self._numbers) > 2 * len(self._entries) + _WORTH_TIDYING:
             self._tidy()
 
     def forget(self, keyexpr: str) -> None:
         """Know nothing of a key any more."""
-        nodes = [self._root]
-        for chunk in _path(keyexpr):
-            nodes.append(nodes[-1].get(chunk, {}))
-        if nodes[-1].pop(keyexpr, None) is None:
+        if self._entries.pop(keyexpr, None) is None:
             return
-        self._count -= 1
-        for node, chunk in zip(nodes[-2::-1], _path(keyexpr)[::-1], strict=True):
+        path = _path(keyexpr)
+        nodes = [self._root]
+        for chunk in path:
+            nodes.append(nodes[-1][chunk])
+        del nodes[-1][keyexpr]
+        for node, chunk in zip(nodes[-2::-1], reversed(path), strict=True):
             if node[chunk]:
                 break
             del node[chunk]
@@ -106,13 +107,8 @@ class Index:
             found = self.get(pattern)
             return [found] if found is not None and not found.deleted else []
         fits = matcher(pattern).fullmatch
-        found_ = [
-            write
-            for bucket in self._buckets(pattern)
-            for keyexpr, (_, write) in bucket.items()
-            if not write.deleted and fits("/" + keyexpr)
-        ]
-        return sorted(found_, key=lambda write: write.keyexpr)
+        keys = (k for bucket in self._buckets(pattern) for k in bucket if fits("/" + k))
+        return [write for key in sorted(keys) if not (write := self._entries[key][1]).deleted]
 
     def since(
         self, patterns: Sequence[str], after: int, limit: int, ignored: int
@@ -141,27 +137,14 @@ class Index:
         if len(self._numbers) - start <= 2 * sum(map(len, buckets)):
             for at in range(start, len(self._numbers)):
                 keyexpr = self._keys[at]
-                found = self._bucket(keyexpr).get(keyexpr)
+                found = self._entries.get(keyexpr)
                 if found is not None and found[0] == self._numbers[at] and fits("/" + keyexpr):
                     yield found
             return
-        yield from sorted(
-            (
-                found
-                for bucket in buckets
-                for keyexpr, found in bucket.items()
-                if found[0] > after and fits("/" + keyexpr)
-            ),
-            key=lambda found: found[0],
-        )
+        entries = (self._entries[key] for b in buckets for key in b if fits("/" + key))
+        yield from sorted((e for e in entries if e[0] > after), key=lambda entry: entry[0])
 
-    def _bucket(self, keyexpr: str) -> dict[str, Numbered]:
-        node = self._root
-        for chunk in _path(keyexpr):
-            node = node.get(chunk, _NOTHING)
-        return node
-
-    def _buckets(self, pattern: str) -> list[dict[str, Numbered]]:
+    def _buckets(self, pattern: str) -> list[dict[str, None]]:
         chunks = pattern.split("/")
         nodes = [self._root]
         for depth in range(_DEPTH):
@@ -179,13 +162,10 @@ class Index:
         kept = [
             (number, keyexpr)
             for number, keyexpr in zip(self._numbers, self._keys, strict=True)
-            if (self._bucket(keyexpr).get(keyexpr) or (0,))[0] == number
+            if keyexpr in self._entries and self._entries[keyexpr][0] == number
         ]
         self._numbers = [number for number, _ in kept]
         self._keys = [keyexpr for _, keyexpr in kept]
-
-
-_NOTHING: dict[str, Any] = {}
 
 
 def _path(keyexpr: str) -> list[str]:

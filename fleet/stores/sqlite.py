@@ -14,13 +14,13 @@ from typing import Literal, Self
 from fleet.errors import StoreError
 from fleet.stores.index import Index
 from fleet.stores.state_file import STAMP_BYTES, identity_of, open_file, take_lock
-from keyexpr_schema.transport.storage import AppliedWrite, Changes, Write, is_journaled
+from keyexpr_schema.transport.store.storage import AppliedWrite, Changes, Write, is_journaled
 
 _PRUNE_EVERY = 1000
 
 
 class SqliteStore:
-    """A `transport.storage.Store` in the directory `data_dir`, which one process uses at a time.
+    """The `Store` of a router in the directory `data_dir`, which one process uses at a time.
 
     `synchronous`: `NORMAL` outlives the end of the process at any moment; `FULL` also a power cut,
     at about half the speed. `journal_limit`: how many changes the journal remembers.
@@ -153,6 +153,10 @@ class SqliteStore:
     def select(self, pattern: str) -> list[Write]:
         with self._lock:
             return self._index.matching(pattern)
+
+    def newest(self, keyexprs: Sequence[str]) -> list[Write | None]:
+        with self._lock:
+            return [self._index.get(keyexpr) for keyexpr in keyexprs]
 
     def changes(self, patterns: Sequence[str], position: str, limit: int) -> Changes:
         with self._lock:

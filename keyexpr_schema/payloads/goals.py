@@ -43,7 +43,9 @@ class Goal(Payload, frozen=True, kw_only=True):
     """A sentence, and the facts that must hold when it is done.
 
     With no `conditions` the planner reads them out of `text`. `due_s` is when it should be done, on
-    the fleet's clock [s]; plans are made so that goals are as little late as can be.
+    the fleet's clock [s]; plans are made so that goals are as little late as can be. `said_s` is
+    when it was said, on the same clock; 0: it does not say. The same words said again later, after
+    the goal was deleted, are another wish.
     """
 
     goal: Id
@@ -53,6 +55,7 @@ class Goal(Payload, frozen=True, kw_only=True):
     ordinal: int = 0
     """Order in which goals were given; ties in priority go to the lower one."""
     due_s: float | None = None
+    said_s: float = 0.0
 
 
 class GoalState(str, Enum):

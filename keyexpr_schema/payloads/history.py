@@ -185,14 +185,21 @@ class HistoryStats(Payload, frozen=True, kw_only=True):
     days: tuple[PeriodStats, ...] = msgspec.field(default=())
 
 
-class RetireRequest(Payload, frozen=True, kw_only=True):
+class RetireQuery(Payload, frozen=True, kw_only=True):
     """Delete the keys of what is over now, and not only after the retention.
 
     `plans`: ended plans, with their tasks, reports and reached or failed goals. `goals`: goals that
     were reached, failed or rejected. `older_than_s`: only what ended that long ago [s].
     """
 
-    request: Id
     plans: bool = False
     goals: bool = False
     older_than_s: float = 0.0
+
+
+class Retired(Payload, frozen=True, kw_only=True):
+    """How many plans and goals have no keys any more; `left`: there are more of them."""
+
+    plans: int = 0
+    goals: int = 0
+    left: bool = False

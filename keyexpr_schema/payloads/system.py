@@ -72,6 +72,44 @@ class StoreJournal(Payload, frozen=True, kw_only=True):
     last: int
 
 
+class StoreStampsQuery(Payload, frozen=True, kw_only=True):
+    """Asks the store for the newest write of each of these keys."""
+
+    keys: tuple[str, ...]
+
+
+class StoreStamps(Payload, frozen=True, kw_only=True):
+    """The timestamp of each key's newest write, deletions included; empty: there is none."""
+
+    timestamps: tuple[str, ...]
+
+
+class StoreReplaceQuery(Payload, frozen=True, kw_only=True):
+    """Asks the store to write a key if it holds what the asker has seen there, and not otherwise.
+
+    `expected`: the timestamp of the value that the asker has seen; empty: none.
+    """
+
+    keyexpr: str
+    value: str
+    encoding: str = ""
+    expected: str = ""
+
+
+class StoreReplaced(Payload, frozen=True, kw_only=True):
+    """Whether the store has written the key, and what it holds now (`value` missing: nothing).
+
+    `behind_s` [s]: it could not, because whoever wrote the key last had a clock that far ahead;
+    ask again after that time.
+    """
+
+    done: bool
+    behind_s: float = 0.0
+    timestamp: str = ""
+    value: str | None = None
+    encoding: str = ""
+
+
 class StoreChangesQuery(Payload, frozen=True, kw_only=True):
     """Asks the store for what changed since `position`, which an earlier answer gave.
 

@@ -83,6 +83,8 @@ class TaskRecord(Payload, frozen=True, kw_only=True):
     """Tasks that its robot has to do first, because of the allocation."""
     goal: Id | None = None
     attempt: int = 0
+    serial: int = 0
+    """That of the latest attempt's order."""
     tries: tuple[Try, ...] = ()
     reason: str | None = None
     duration_s: float = 0.0

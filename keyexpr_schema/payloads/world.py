@@ -79,19 +79,25 @@ class Fact(Payload, frozen=True, kw_only=True):
 
 
 class Statement(Payload, frozen=True, kw_only=True):
-    """A sentence about the world, kept as it was written."""
+    """A sentence about the world, kept as it was written.
+
+    `said_s` is when it was said, on the fleet's clock [s]; 0: it does not say. The same sentence
+    said again is news, and its facts are believed as of then.
+    """
 
     statement: Id
     text: str
     source: str = "person"
+    said_s: float = 0.0
 
 
 class StatementStatus(Payload, frozen=True, kw_only=True):
-    """What the planner read out of a statement: facts, or why none."""
+    """What the planner read out of a statement: facts, or why none; `said_s` is the statement's."""
 
     statement: Id
     facts: tuple[Fact, ...] = ()
     reason: str | None = None
+    said_s: float = 0.0
 
 
 class Surface(Payload, frozen=True, kw_only=True):
@@ -159,3 +165,21 @@ class Object(Payload, frozen=True, kw_only=True):
     home: Id | None = None
     categories: tuple[str, ...] = ()
     uses: tuple[str, ...] = ()
+
+
+class ClaimAddress(Address, frozen=True):
+    """What is claimed: a number of goals or of a kind of objects, or a name in the world."""
+
+    of: str
+    name: str
+
+
+class Claim(Payload, frozen=True, kw_only=True):
+    """What somebody is about to give a name or a number to, and when they said so (Unix seconds).
+
+    `number`: the last that was given out; `kind`: what the name is for.
+    """
+
+    wall_time_s: float
+    number: int = 0
+    kind: str = ""

@@ -10,11 +10,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import zenoh
 from zenoh import handlers
@@ -47,6 +47,15 @@ class Replies:
                 self.timed_out = True
             else:
                 self.errors.append(data.decode(errors="replace"))
+
+
+class Put(NamedTuple):
+    """A value for a key, or with `data` None its deletion."""
+
+    keyexpr: str
+    data: bytes | None
+    encoding: str
+    timestamp: zenoh.Timestamp
 
 
 @dataclass(frozen=True)
@@ -122,18 +131,15 @@ class Link:
             )
             return
         stamp = self.new_timestamp()
-        future = self._executor.submit(self._send, keyexpr, data, encoding, stamp)
+        future = self._executor.submit(self._send, Put(keyexpr, data, encoding, stamp))
         future.add_done_callback(_log_failure)
 
-    async def send(
-        self, keyexpr: str, data: bytes | None, encoding: str, timestamp: zenoh.Timestamp
-    ) -> None:
-        """Put (`data` None: delete) and wait until it is on the link, not until it is stored."""
-        await self.call(self._send, keyexpr, data, encoding, timestamp)
+    async def send(self, put: Put) -> None:
+        """Put and wait until it is on the link, not until it is stored."""
+        await self.call(self._send, put)
 
-    def _send(
-        self, keyexpr: str, data: bytes | None, encoding: str, timestamp: zenoh.Timestamp
-    ) -> None:
+    def _send(self, put: Put) -> None:
+        keyexpr, data, encoding, timestamp = put
         block = zenoh.CongestionControl.BLOCK
         if data is None:
             self._session.delete(keyexpr, timestamp=timestamp, congestion_control=block)
@@ -150,14 +156,18 @@ class Link:
         encoding: str | None = None,
         *,
         first: bool = False,
+        after: Sequence[Put] = (),
     ) -> Replies:
-        """Query everyone who replies for `keyexpr`; `first`: return with the first value."""
+        """Query everyone who replies for `keyexpr`; `first`: return with the first value.
+
+        The puts of `after` go down the link before it.
+        """
         replies = Replies()
         done: asyncio.Future[None] = self._loop.create_future()
 
-        def finish() -> None:
+        def finish(error: Exception | None = None) -> None:
             if not done.done():
-                done.set_result(None)
+                done.set_result(None) if error is None else done.set_exception(error)
 
         def on_reply(reply: zenoh.Reply) -> None:
             replies.add(reply)
@@ -165,19 +175,24 @@ class Link:
                 self._call_soon(finish)
 
         def get() -> None:
-            self._session.get(
-                keyexpr,
-                handlers.Callback(on_reply, lambda: self._call_soon(finish), indirect=False),
-                target=zenoh.QueryTarget.ALL,
-                consolidation=zenoh.ConsolidationMode.NONE,
-                timeout=timeout_s,
-                payload=data,
-                encoding=encoding,
-                congestion_control=zenoh.CongestionControl.BLOCK,
-            )
+            try:
+                for put in after:
+                    self._send(put)
+                self._session.get(
+                    keyexpr,
+                    handlers.Callback(on_reply, lambda: self._call_soon(finish), indirect=False),
+                    target=zenoh.QueryTarget.ALL,
+                    consolidation=zenoh.ConsolidationMode.NONE,
+                    timeout=timeout_s,
+                    payload=data,
+                    encoding=encoding,
+                    congestion_control=zenoh.CongestionControl.BLOCK,
+                )
+            except Exception as error:
+                self._call_soon(finish, error)
 
         started_s = self._loop.time()
-        await self.call(get)
+        self._executor.submit(get)
         await done
         # The router's own clock may end a query first, and then without an error reply.
         if not replies.values and self._loop.time() - started_s >= 0.9 * timeout_s:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import zenoh
@@ -27,15 +28,22 @@ def stamp_of_text(text: str) -> int:
         ValueError: `text` is not such a timestamp.
     """
     time, _, source = text.partition("/")
-    try:
-        return int(time) << _ID_BITS | _swap(int(source, 16))
-    except OverflowError:
-        raise ValueError(f"{text!r} is not a timestamp") from None
+    return int(time) << _ID_BITS | _source_number(source)
 
 
 def text_of_stamp(stamp: int) -> str:
     """The timestamp whose integer is `stamp`, as Zenoh prints it."""
-    return f"{stamp >> _ID_BITS}/{_swap(stamp & _ID_MASK):x}"
+    return f"{stamp >> _ID_BITS}/{_source_text(stamp & _ID_MASK)}"
+
+
+def source_of_stamp(stamp: int) -> int:
+    """Which session's clock it is from."""
+    return stamp & _ID_MASK
+
+
+def time_s_of_stamp(stamp: int) -> float:
+    """Seconds since 1970 by the clock of its writer."""
+    return (stamp >> _ID_BITS) / (1 << 32)
 
 
 def timestamp_of_stamp(stamp: int) -> zenoh.Timestamp:
@@ -49,6 +57,20 @@ def timestamp_of_stamp(stamp: int) -> zenoh.Timestamp:
     seconds, fraction = time >> 32, time & 0xFFFF_FFFF
     nanos = max(0, fraction * 1_000_000_000 // (1 << 32) - 1)
     return zenoh.Timestamp(zenoh.NTP64(seconds, nanos), (stamp & _ID_MASK or 1).to_bytes(16, "big"))
+
+
+# There are many stamps of few sources.
+@lru_cache(maxsize=4096)
+def _source_number(text: str) -> int:
+    try:
+        return _swap(int(text, 16))
+    except OverflowError:
+        raise ValueError(f"{text!r} is not the source of a timestamp") from None
+
+
+@lru_cache(maxsize=4096)
+def _source_text(source: int) -> str:
+    return f"{_swap(source):x}"
 
 
 def _swap(source: int) -> int:

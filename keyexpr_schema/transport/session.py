@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
 from keyexpr_schema.errors import ForeignKey, UndecodablePayload, Unreachable
 from keyexpr_schema.ids import check_id
-from keyexpr_schema.key import A, Address, Delivery, Key, P, Payload
+from keyexpr_schema.key import A, Address, Delivery, Key, KeyTree, P, Payload
 from keyexpr_schema.transport.connecting import open_link
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.liveliness import TokenChange, TokenWatch
 from keyexpr_schema.transport.queries import QueryServer, send_query
 from keyexpr_schema.transport.samples import Sample, decode_value, encoding_of
-from keyexpr_schema.transport.store_client import StoreClient
-from keyexpr_schema.transport.trace import Trace
+from keyexpr_schema.transport.store.client import StoreClient
+from keyexpr_schema.transport.trace import Operation, Trace
 from keyexpr_schema.transport.undecodable import UndecodableReports
 from keyexpr_schema.transport.watch import Change, Narrowed, Watch
 
@@ -119,31 +119,88 @@ class Session:
     async def confirm(
         self, key: Key[A, P], address: A, payload: P, timeout_s: float = 10.0
     ) -> None:
-        """Put, and return when the store holds this value or a newer one.
+        """Put, and return when the store holds exactly this value, or a later one of this session.
 
-        The put is repeated with the same timestamp, so repeating it does no harm.
+        The put is repeated with the same timestamp, so repeating it does no harm. Calls that wait
+        at the same time are confirmed by one question to the store.
 
         Raises:
-            Unconfirmed: it was not read back within `timeout_s`; it may still arrive.
+            Overtaken: somebody else's value has a later timestamp; this one is not stored.
+            Unconfirmed: it was not confirmed within `timeout_s`; it may still arrive.
             UndecodablePayload: no reader could read it, so it is not put at all.
         """
         await self._confirm(key, address, key.check(payload, address), timeout_s)
 
     async def delete(self, key: Key[A, P], address: A, timeout_s: float = 10.0) -> None:
-        """Delete, and return when the store has no value of this key, or a newer one.
+        """Delete, and return when the store has done so.
 
         Raises:
-            Unconfirmed: the old value was still there after `timeout_s`.
+            Overtaken: somebody else's value has a later timestamp; it is still there.
+            Unconfirmed: it was not confirmed within `timeout_s`; it may still be carried out.
         """
         await self._confirm(key, address, None, timeout_s)
+
+    async def delete_tree(self, tree: KeyTree, name: str, timeout_s: float = 10.0) -> None:
+        """Delete every value about `name`, and return when the store has none, or newer ones.
+
+        Raises:
+            Unconfirmed: there were old values after `timeout_s`.
+        """
+        keyexpr = tree.build(name)
+        for key in tree.keys:
+            self._trace.note("delete", key, keyexpr)
+        await self._store.write(tree.keys[0], keyexpr, None, timeout_s)
+
+    async def create(self, key: Key[A, P], address: A, payload: P, timeout_s: float = 10.0) -> bool:
+        """Put if there is no value yet; whether it was put. Of several at once one succeeds.
+
+        With a zenohd storage, which cannot compare and set, that is not certain.
+
+        Raises:
+            Unconfirmed: it was not known within `timeout_s`; it may have been put.
+            UndecodablePayload: no reader could read it, so it is not put at all.
+        """
+        keyexpr, data = self._noted("put", key, address), key.check(payload, address)
+        return (await self._store.replace(key, keyexpr, data, None, timeout_s)).done
+
+    async def update(
+        self, key: Key[A, P], address: A, change: Callable[[P | None], P], timeout_s: float = 10.0
+    ) -> P:
+        """Put `change` of the value there (None: none, or one that does not decode), and return it.
+
+        Nobody else's value is overwritten unseen: when somebody has written in the meantime,
+        `change` is called again. With a zenohd storage that is not certain.
+
+        Raises:
+            Unconfirmed: it was not known within `timeout_s`; it may have been put.
+            Unreachable: no router and store could be asked within `timeout_s`.
+        """
+        keyexpr = self._noted("put", key, address)
+        seen = next(iter(await self._read(key, keyexpr, timeout_s)), None)
+        while True:
+            value = None
+            if seen is not None:
+                with suppress(UndecodablePayload):
+                    value = decode_value(key, seen)
+            changed = change(value)
+            data = key.check(changed, address)
+            replaced = await self._store.replace(key, keyexpr, data, seen, timeout_s)
+            if replaced.done:
+                return changed
+            seen = replaced.there
+
+    def _noted(self, operation: Operation, key: Key[A, Any], address: A) -> str:
+        """The key expression of what is about to be written."""
+        if not key.stored:
+            raise TypeError(f"{key.name} is {key.delivery.value}: it cannot be confirmed")
+        keyexpr = key.build(address)
+        self._trace.note(operation, key, keyexpr)
+        return keyexpr
 
     async def _confirm(
         self, key: Key[A, Any], address: A, data: bytes | None, timeout_s: float
     ) -> None:
-        if not key.stored:
-            raise TypeError(f"{key.name} is {key.delivery.value}: it cannot be confirmed")
-        keyexpr = key.build(address)
-        self._trace.note("delete" if data is None else "put", key, keyexpr)
+        keyexpr = self._noted("delete" if data is None else "put", key, address)
         await self._store.write(key, keyexpr, data, timeout_s)
 
     # --- reading ---------------------------------------------------------------------------------

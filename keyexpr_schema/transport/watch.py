@@ -26,7 +26,7 @@ from keyexpr_schema.key import Address, Delivery, Key
 from keyexpr_schema.transport.change_stream import ChangeStream
 from keyexpr_schema.transport.link import Link
 from keyexpr_schema.transport.selection import Change, Narrowed, Selection
-from keyexpr_schema.transport.store_client import SETTLE_S, StoreClient
+from keyexpr_schema.transport.store.client import SETTLE_S, StoreClient
 from keyexpr_schema.transport.undecodable import UndecodableReports
 
 __all__ = ["RELIST_S", "Change", "Narrowed", "Watch"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 
 from keyexpr_schema.errors import SchemaError
@@ -126,7 +127,10 @@ class WorldPublisher:
             try:
                 await self._session.confirm(SIM_SCENE, SimAddress(), scene)
             except SchemaError:
-                continue  # no store there yet: without one there is nothing to look at, either
+                # No store there yet: without one there is nothing to look at, either. Or the clock
+                # of this host is behind that of an earlier run: it will have passed it some time.
+                await asyncio.sleep(REPEAT_WALL_S)
+                continue
             await self._session.wait_reconnected(connections)
 
 

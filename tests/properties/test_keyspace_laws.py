@@ -15,7 +15,7 @@ from keyexpr_schema.errors import ForeignKey, InvalidId
 from keyexpr_schema.ids import ID_PATTERN, check_id, slug
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import KEYSPACE, key_of
-from keyexpr_schema.transport.storage import is_stored
+from keyexpr_schema.transport.store.storage import is_stored
 from tests.support.reached import reaches
 
 IDS = st.from_regex(ID_PATTERN.rstrip("$") + r"\Z")

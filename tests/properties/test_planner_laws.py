@@ -54,8 +54,8 @@ class Undisturbed(RuleBasedStateMachine):
         self.away: set[str] = set()
         self.a_plan_was_cancelled = False
         self.finished: set[tuple[str, str]] = set()
-        self.promised: set[str] = set()
-        """Goals that the plan was said to take in."""
+        self.asked: dict[str, tuple[str, ...]] = {}
+        """Requests, and goals that they want taken in."""
         goals = [bring(n, rooms[n - 1]) for n in range(1, cups + 1)]
         for share in [goals] if together else [[goal] for goal in goals]:
             self.model.plan(*share)
@@ -100,9 +100,26 @@ class Undisturbed(RuleBasedStateMachine):
 
     @rule()
     def a_person_wants_another_plan(self) -> None:
-        number = len(self.model.state.answers)
-        request = ReplanRequest(request=f"again-{number}", plan="plan-1", reason="because")
+        request = ReplanRequest(
+            request=f"again-{len(self.model.journal)}", plan="plan-1", reason="because"
+        )
+        self.asked[request.request] = ()
         self.model.receive(events.ReplanRequested, request=request)
+
+    @rule(robot=st.sampled_from(["hsr", "locobot", None]), after=st.booleans())
+    def a_person_wants_one_more_task(self, robot: str | None, after: bool) -> None:
+        entry = self.model.state.plans.get("plan-1")
+        request = ControlRequest(
+            request=f"task-{len(self.model.journal)}",
+            control=Control.ADD_TASK,
+            plan="plan-1",
+            skill="navigate",
+            args={"to": "kitchen"},
+            after=tuple(entry.records)[-1:] if entry is not None and after else (),
+            robot=robot,
+        )
+        self.asked[request.request] = ()
+        self.model.receive(events.ControlRequested, request=request)
 
     @rule(plan=st.sampled_from(["plan-1", "plan-2", "plan-3"]))
     def a_person_cancels_a_plan_that_is_being_made(self, plan: str) -> None:
@@ -125,16 +142,15 @@ class Undisturbed(RuleBasedStateMachine):
     @precondition(lambda self: len(self.model.state.goals) < MOST_GOALS)
     @rule(room=st.sampled_from(["kitchen", "hallway", "living_room"]))
     def a_goal_comes_up_in_the_middle(self, room: str) -> None:
-        number = len(self.model.state.answers)
+        number = len(self.model.journal)
         wanted = Condition(relation="searched", subject=room, value=True)
         goal = Goal(goal=f"look-{number}", text="", conditions=(wanted,), ordinal=100 + number)
         self.model.receive(events.GoalPut, goal=goal)
         request = ReplanRequest(
             request=f"more-{number}", plan="plan-1", reason="more", goals=(goal.goal,)
         )
+        self.asked[request.request] = (goal.goal,)
         self.model.receive(events.ReplanRequested, request=request)
-        if self.model.state.answers[request.request].accepted:
-            self.promised.add(goal.goal)
 
     @precondition(lambda self: len(self.model.state.goals) > 1)
     @rule(pick=PICK)
@@ -162,9 +178,13 @@ class Undisturbed(RuleBasedStateMachine):
         for entry in state.plans.values():
             assert entry.state in ENDED_PLANS, f"{entry.plan.plan} is {entry.state}: it never ends"
             assert not entry.outstanding()
+        for request in self.asked:
+            assert request in state.answers, f"{request} was never answered"
+        met = [goals for request, goals in self.asked.items() if state.answers[request].accepted]
+        promised = {goal for goals in met for goal in goals}
         for goal, status in state.goal_states.items():
             assert (
-                goal not in self.promised
+                goal not in promised
                 or self.a_plan_was_cancelled
                 or any(goal in entry.plan.goals for entry in state.plans.values())
             ), f"{goal} was asked for while a plan was being made, and is in none"

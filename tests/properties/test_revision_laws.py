@@ -13,8 +13,10 @@ from hypothesis import strategies as st
 
 from fleet.core import events
 from fleet.core.events import Event
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry, PlanningJob, ReplanScope
+from fleet.core.plan_entry import PlanEntry, PlanningJob
+from fleet.core.plan_index import OUTSTANDING
 from fleet.core.planning_input import PlanningInput
+from fleet.core.replan_reasons import ReplanScope
 from fleet.core.revision.reconcile import Revision, reconcile
 from fleet.core.revision.residual_plan import residual_plan
 from keyexpr_schema.facts import HOLDING, NOTHING
@@ -47,9 +49,8 @@ class Watched(FleetModel):
         if isinstance(event, events.PlanningSucceeded):
             entry = self.state.plans.get(event.plan.plan)
             if entry is not None and entry.job is not None and entry.job.job == event.job:
-                started = frozenset(entry.job.under_way)
-                world = self.state.world()
-                check_reconciled(entry, event, reconcile(entry, event, world, started), self.met)
+                revision = reconcile(entry, event, self.state.world())
+                check_reconciled(entry, event, revision, self.met)
         super().apply(event)
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from fleet.stores.index import matcher
 from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.transport.samples import stamp_of_text, text_of_stamp, timestamp_of_stamp
-from keyexpr_schema.transport.storage import Write
+from keyexpr_schema.transport.store.storage import Write
 from tests.support.reached import reaches
 
 KEYS = st.sampled_from([f"north/world/facts/{name}/at" for name in "abc"])

@@ -13,9 +13,10 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.core import events
 from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_index import OUTSTANDING
 from fleet.core.planning_input import PlanningInput
-from fleet.core.state import Policy, State
+from fleet.core.state import LOGIC, Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose
 from fleet.service.planning.planning_job import run_planning_job
@@ -26,6 +27,7 @@ from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskState
 from keyexpr_schema.payloads.world import Fact
+from tests.support.derived import check_derived
 from tests.support.household import PLACES, SKILLS, bring, carrier, cup, manipulator
 
 Answer = events.PlanningSucceeded | events.PlanningFailed
@@ -38,6 +40,9 @@ COMPOSITION: Composition = replace(
 
 
 BOTH = (bring(1, "hallway"), bring(2, "living_room"))
+
+CHECK_EVERY = 5
+"""Events between two looks at what the core keeps up: each derives everything anew."""
 
 
 class FleetModel:
@@ -64,7 +69,7 @@ class FleetModel:
         """When each attempt was started."""
         self.reports: list[Report] = []
         self._truth: dict[tuple[str, str], Value] = {}
-        self.receive(events.PlannerStarted, epoch=1, incarnation="one", skills=dict(SKILLS))
+        self._start(epoch=1, incarnation="one")
         for place in PLACES:
             self.receive(events.PlacePut, place=place)
         for number in range(1, cups + 1):
@@ -75,10 +80,22 @@ class FleetModel:
             self.receive(events.WorkerConnected, robot=spec.robot, incarnation="i1")
             self.learn(spec.robot, "holding", "nothing")
 
+    def _start(self, epoch: int, incarnation: str) -> None:
+        self.receive(
+            events.PlannerStarted,
+            epoch=epoch,
+            incarnation=incarnation,
+            skills=dict(SKILLS),
+            logic=LOGIC,
+            lineage=incarnation,
+        )
+
     # --- what happens to the planner -------------------------------------------------------------
 
     def receive(self, kind: type[Event], **fields: Any) -> None:
         """One event into the core; its effects are carried out."""
+        if kind is events.PlannerStarted:
+            fields.setdefault("logic", LOGIC)
         self.time_s += 1.0
         self.wall_s += 0.01
         self.apply(kind(time_s=self.time_s, wall_time_s=self.wall_s, **fields))
@@ -90,6 +107,8 @@ class FleetModel:
         if self.state is before:
             assert effects == ()
             return
+        if len(self.journal) % CHECK_EVERY == 0:
+            check_derived(before, self.state, effects)
         self.journal.append(encode_event(event))
         for plan, entry in self.state.plans.items():
             old = before.plans.get(plan)
@@ -143,7 +162,8 @@ class FleetModel:
             assert entry.job is not None
             ended = [t for t in entry.job.under_way if entry.records[t].state not in OUTSTANDING]
             self.met["work ended meanwhile"] += bool(ended)
-            self.met["another reason meanwhile"] += entry.replan != entry.job.reason
+            new = [r for r in entry.open_reasons if r.number not in entry.job.takes_up]
+            self.met["another reason meanwhile"] += bool(new)
 
     def _check_order(self, order: Any) -> None:
         assert isinstance(order, Order)
@@ -190,12 +210,17 @@ class FleetModel:
         """Orders that stand, in a fixed order."""
         return [d for _, d in sorted(self.documents.items()) if isinstance(d, Order)]
 
+    def wanted(self) -> list[Order]:
+        """Orders that stand and are not cancelled."""
+        return [order for order in self.orders() if not order.cancelled]
+
     def goal_state(self, goal: str) -> GoalState:
         """How a goal stands."""
         return self.state.goal_states[goal].state
 
     def report(self, order: Order, state: ReportState, **more: Any) -> None:
         """A worker reports on an order."""
+        more = {"planner": order.planner, **more}
         report = Report(
             robot=order.robot,
             plan=order.plan,
@@ -268,10 +293,23 @@ class FleetModel:
         self.receive(events.WorkerConnected, robot=robot, incarnation="i1")
 
     def finish(self, limit: int = 500) -> None:
-        """Jobs are answered and orders carried out, until there are none left."""
+        """Jobs are answered and orders carried out, until there are none left for robots there."""
         for _ in range(limit):
             if self.answers:
                 self.answer()
+            elif orders := [o for o in self.orders() if self.state.connected.get(o.robot)]:
+                self.succeed(orders[0])
+            else:
+                return
+        raise AssertionError("the plan does not come to an end")
+
+    def finish_cancelling(self, limit: int = 500) -> None:
+        """As `finish`, but what is cancelled is stopped and not carried out."""
+        for _ in range(limit):
+            if self.answers:
+                self.answer()
+            elif stopped := [order for order in self.orders() if order.cancelled]:
+                self.cancelled(stopped[0])
             elif orders := self.orders():
                 self.succeed(orders[0])
             else:
@@ -288,7 +326,7 @@ class FleetModel:
             state, _ = step(state, decode_event(line))
         assert state == self.state, "the journal replays to another state"
         self.state = state
-        self.receive(events.PlannerStarted, epoch=state.epoch + 1, incarnation="again")
+        self._start(epoch=state.epoch + 1, incarnation="again")
         self._take(effects_of(self.state))
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
-from fleet.service.composition import load_skills
+from fleet.service.skill_models import load_skills
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan, Task

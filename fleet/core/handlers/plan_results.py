@@ -7,11 +7,22 @@ from collections.abc import Sized
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.dispatch.replan_triggers import contradicted
 from fleet.core.effects import status_of
-from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanReason
+from fleet.core.plan_entry import PlanEntry, PlanningJob
+from fleet.core.replan_reasons import ReplanReason, Wish
 from fleet.core.revision.reconcile import reconcile
 from fleet.core.state import State
-from fleet.core.state_updates import answer, give_up, mark_goals, set_entry, without_goal
+from fleet.core.state_updates import (
+    answer,
+    give_up,
+    mark_goals,
+    put_answer,
+    set_entry,
+    touch,
+    without_goal,
+)
+from fleet.core.touches import Part, Touch
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Answer
@@ -26,75 +37,98 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     if entry is None or entry.job is None or entry.job.job != event.job:
         return state
     job = entry.job
-    first = event.plan.revision == 1
     team = state.team()
-    newer = _newer_reason(entry, job)
+    rest, reasons, wishes = entry.job_ended()
     if _as_it_was(entry, job, event):
-        return set_entry(state, replace(entry, job=None, replan=newer, team=team))
+        return set_entry(state, replace(rest, team=team, discarded=0))
+    event = replace(event, plan=_for_goals_of_now(state, entry, event))
+    revision = reconcile(entry, event, state.world())
+    if revision.missed:
+        return set_entry(state, replace(entry, job=None, discarded=entry.discarded + 1))
     for goal, reason in event.left_out.items():
         state = mark_goals(state, (goal,), GoalState.FAILED, entry.plan.plan, reason)
     for goal, reason in event.postponed.items():
         state = mark_goals(state, (goal,), GoalState.WAITING, None, reason)
-    event = replace(event, plan=_for_goals_of_now(state, entry, job, event))
-    revision = reconcile(entry, event, state.world(), frozenset(job.under_way))
-    added = (goal for goal in entry.plan.goals if goal not in job.goals)
+    first = event.plan.revision == 1
     to = entry.state
     if first:
         to = PlanState.PROPOSED if state.policy.approval else PlanState.READY
     if to is PlanState.READY and entry.start:
         to = PlanState.RUNNING
+    fruitless = bool(reasons) and not (event.repaired and job.reallocation)
     entry = replace(
-        entry,
-        plan=replace(revision.plan, goals=(*revision.plan.goals, *added)),
+        rest,
+        plan=revision.plan,
         outcome=event.outcome,
         state=to,
         records=entry.records.updated(revision.records),
         unwanted=tuple(dict.fromkeys([*entry.unwanted, *revision.unwanted])),
         change=None if first else revision.change,
-        job=None,
-        replan=newer,
-        amendment=None,
-        amendment_request=None,
+        discarded=0,
         team=team,
-        fruitless_replans=entry.fruitless_replans
-        + (not first and not (event.repaired and job.reallocation)),
+        fruitless_replans=entry.fruitless_replans + fruitless,
         reason=None,
         violations=(),
     )
-    state = set_entry(state, entry)
+    state = set_entry(state, _without_moot_reasons(state, entry))
     goal_state = GoalState.RUNNING if to is PlanState.RUNNING else GoalState.PLANNED
     state = mark_goals(state, event.plan.goals, goal_state, entry.plan.plan)
-    return answer(state, job.request, True, _made_sentence(event), entry.plan.plan)
+    state = answer(state, job.request, True, _made_sentence(event), entry.plan.plan)
+    for wish in wishes:
+        state = _answer_wish(state, wish, event)
+    return state
 
 
-def _for_goals_of_now(
-    state: State, entry: PlanEntry, job: PlanningJob, event: events.PlanningSucceeded
-) -> Plan:
-    """The plan without goals that were taken out of it while it was being made."""
+def _for_goals_of_now(state: State, entry: PlanEntry, event: events.PlanningSucceeded) -> Plan:
+    """The plan without goals that were taken back while it was being made."""
     plan = replace(event.plan, autostart=entry.start)
+    wanted = frozenset(entry.wanted_goals)
     for goal in event.plan.goals:
-        if goal in job.goals and goal not in entry.plan.goals:
+        if goal not in wanted:
             plan = without_goal(state, plan, goal)
     return plan
 
 
 def _as_it_was(entry: PlanEntry, job: PlanningJob, event: events.PlanningSucceeded) -> bool:
-    """Whether another allocation of what is left has turned out to be the one there is."""
-    current = list(entry.current())
+    """Whether another allocation of what was left has turned out to be the one there is."""
     return (
         event.repaired
         and job.reallocation
+        and job.residual is not None
         and not event.left_out
         and not event.postponed
         and event.allocation.items() <= job.previous_allocation.items()
-        and all(record.state not in (TaskState.FAILED, TaskState.CANCELLED) for record in current)
-        and len(event.plan.tasks) == sum(record.state not in ENDED_TASKS for record in current)
+        and len(event.plan.tasks) == len(job.residual.tasks)
+        and not any(
+            record.state in (TaskState.FAILED, TaskState.CANCELLED)
+            or record.task in entry.unwanted
+            or (record.state is not TaskState.SUCCEEDED and not entry.is_wanted(record))
+            for record in entry.current()
+        )
     )
 
 
-def _newer_reason(entry: PlanEntry, job: PlanningJob) -> ReplanReason | None:
-    """What came up while the plan was being made is a reason to make it again."""
-    return None if entry.replan == job.reason else entry.replan
+def _without_moot_reasons(state: State, entry: PlanEntry) -> PlanEntry:
+    """The entry without reasons that came up meanwhile and say nothing against its new plan: about
+    facts that it counts with, and tasks that it does without."""
+    ahead = {record.task for record in entry.current() if record.state not in ENDED_TASKS}
+
+    def holds(reason: ReplanReason) -> bool:
+        if not state.plans_while_acting:
+            return True
+        if reason.variables:
+            facts = (state.facts.get(variable) for variable in reason.variables)
+            return any(f is not None and contradicted(state, entry, f) is not None for f in facts)
+        return not reason.tasks or not ahead.isdisjoint(reason.tasks)
+
+    return replace(entry, reasons=tuple(reason for reason in entry.reasons if holds(reason)))
+
+
+def _answer_wish(state: State, wish: Wish, event: events.PlanningSucceeded) -> State:
+    """Met; or refused, if the plan is made and has nothing of what was wanted in it."""
+    missing = {**event.left_out, **event.postponed}
+    refused = bool(wish.goals) and all(goal in missing for goal in wish.goals)
+    return answer(state, wish.request, not refused, _made_sentence(event), event.plan.plan)
 
 
 def _made_sentence(event: events.PlanningSucceeded) -> str:
@@ -126,41 +160,53 @@ def _show(state: State, job: PlanningJob, event: events.PlanningSucceeded) -> St
         preview=event.plan,
         preview_status=status_of(entry),
     )
-    return replace(
-        state,
-        previews=state.previews.without(job.request),
-        answers=state.answers.set(job.request, reply),
-    )
+    return put_answer(_without_preview(state, job.request), reply)
+
+
+def _without_preview(state: State, request: str) -> State:
+    state = replace(state, previews=state.previews.without(request))
+    return touch(state, Touch(Part.PREVIEW, request))
 
 
 def planning_failed(state: State, event: events.PlanningFailed) -> State:
     """A job failed: a first plan is rejected, a running one goes on or is given up."""
     if (preview := _preview_of(state, event.job)) is not None:
         assert preview.request is not None
-        state = replace(state, previews=state.previews.without(preview.request))
+        state = _without_preview(state, preview.request)
         return answer(state, preview.request, False, event.reason, violations=event.violations)
     entry = next(
         (b for b in state.plans.values() if b.job is not None and b.job.job == event.job), None
     )
     if entry is None or entry.job is None:
         return state
-    request, newer = entry.job.request, _newer_reason(entry, entry.job)
-    entry = replace(
+    job, first = entry.job, entry.plan.revision == 1 and not entry.records
+    entry, reasons, wishes = replace(
         entry,
-        job=None,
         violations=event.violations,
         outcome=replace(entry.outcome, planning_time_s=event.planning_time_s),
-    )
-    if entry.amendment is not None:
-        # The plan as it was still stands; only the addition is refused.
-        entry = replace(entry, amendment=None, amendment_request=None, replan=newer)
-        state = set_entry(state, entry)
-        sentence = f"the task was not added: {event.reason}"
-        return answer(state, request, False, sentence, entry.plan.plan, event.violations)
-    if entry.plan.revision == 1 and not entry.records:
+        discarded=0,
+    ).job_ended()
+    if first and entry.reasons:  # a goal was taken back: without it, there may be a plan
+        job = replace(job, job=state.jobs + 1, goals=entry.plan.goals)
+        return set_entry(replace(state, jobs=job.job), replace(entry, job=job, reasons=()))
+    if first:
         entry = replace(entry, state=PlanState.REJECTED, reason=event.reason)
         state = set_entry(state, entry)
         state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None, event.reason)
-        return answer(state, request, False, event.reason, entry.plan.plan, event.violations)
+        return answer(state, job.request, False, event.reason, entry.plan.plan, event.violations)
+    for wish in wishes:
+        sentence = f"{wish.refusal}: {event.reason}"
+        plan = entry.plan.plan
+        state = answer(state, wish.request, False, sentence, plan, event.violations)
+        state = mark_goals(state, wish.goals, GoalState.WAITING, None, event.reason)
+    if not reasons:
+        return set_entry(state, entry)  # the plan as it was still stands
+    if wishes or (entry.replan is not None and state.plans_while_acting):
+        again = replace(
+            entry,
+            reasons=(*reasons, *entry.reasons),
+            fruitless_replans=entry.fruitless_replans + 1,
+        )
+        return set_entry(state, again)
     to = GoalState.WAITING if event.postponed else GoalState.FAILED
     return give_up(state, entry, event.reason, to)

@@ -9,17 +9,21 @@ from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.model.durations import learn
 from fleet.core.model.preconditions import action_of, effects_hold, unmet_before
 from fleet.core.model.skills import Action
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry, ReplanScope
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_index import OUTSTANDING
+from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import (
-    believe_if_newer,
+    believe,
     conclude,
     give_up,
     mark_goals,
     open_goals,
     set_record,
+    touch,
     without_goal,
 )
+from fleet.core.touches import Part, Touch
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.tasks import Report, ReportState, TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact
@@ -31,15 +35,16 @@ MAX_ATTEMPTS = 3
 
 
 def report_received(state: State, event: events.ReportReceived) -> State:
-    """A report of an attempt that is not current only brings facts."""
+    """A report of an attempt that is not current, or of another planner's, only brings facts."""
     report = event.report
     for fact in report.facts:
-        state = believe_if_newer(state, fact)
+        state = believe(state, fact)
     entry = state.plans.get(report.plan)
     record = entry.records.get(report.task) if entry else None
     if (
         entry is None
         or record is None
+        or report.planner not in (None, entry.lineage)
         or record.state not in OUTSTANDING
         or (report.robot, report.attempt) != (record.robot, record.attempt)
     ):
@@ -59,6 +64,8 @@ def report_received(state: State, event: events.ReportReceived) -> State:
         case ReportState.INTERRUPTED:
             return _interrupted(state, entry, record, report)
         case ReportState.REFUSED:
+            if entry.ended or record.task in entry.unwanted:
+                return set_record(state, entry, _ended(record, report, TaskState.CANCELLED))
             if report.retryable and record.attempt < MAX_ATTEMPTS:
                 return set_record(state, entry, _again(record, report))
             return _failed(state, entry, record, report)
@@ -92,7 +99,23 @@ def _succeeded(state: State, entry: PlanEntry, record: TaskRecord, report: Repor
         if literal.variable not in reported:
             time_s = report.ended_s or state.time_s
             state = conclude(state, Fact.of(literal, PLANNER_SOURCE, time_s))
-    return set_record(state, entry, _ended(record, report, TaskState.SUCCEEDED))
+    state = set_record(state, entry, _ended(record, report, TaskState.SUCCEEDED))
+    if record.task in entry.unwanted:
+        entry = state.plans[entry.plan.plan]
+        if (again := _wanted_again(entry, record)) is not None:
+            state = set_record(state, entry, again)
+    return state
+
+
+def _wanted_again(entry: PlanEntry, done: TaskRecord) -> TaskRecord | None:
+    """What was done after it had been given up need not be done again, if it is still wanted."""
+    for record in entry.current():
+        if (record.skill, record.args) == (done.skill, done.args) and not entry.index.open.get(
+            record.task, 1
+        ):
+            reason = f"{done.robot} had done it as {done.task}"
+            return replace(record, state=TaskState.SUCCEEDED, reason=reason)
+    return None
 
 
 def _learned(state: State, record: TaskRecord, report: Report, action: Action | None) -> State:
@@ -108,7 +131,9 @@ def _learned(state: State, record: TaskRecord, report: Report, action: Action | 
         return state
     took_s = report.ended_s - report.started_s
     known = learn(state.durations, spec.model, action.skill, took_s, record.way_s, report.ended_s)
-    return state if known is state.durations else replace(state, durations=dict(known))
+    if known is state.durations:
+        return state
+    return touch(replace(state, durations=dict(known)), Touch(Part.DURATIONS, spec.model))
 
 
 def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) -> State:
@@ -116,7 +141,7 @@ def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) 
     if entry.ended or record.task in entry.unwanted:
         return set_record(state, entry, record)
     reason = f"{record.task} ({record.skill}) failed: {report.reason}"
-    entry = entry.to_replan(ReplanScope.REPAIR, reason)
+    entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=(record.goal,))
     if record.goal is not None and record.goal in entry.plan.goals:
         count = entry.failures.get(record.goal, 0) + 1
         entry = replace(entry, failures=entry.failures.set(record.goal, count))

@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.plan_entry import PlanEntry, PlanningJob, ReplanScope
+from fleet.core.plan_entry import PlanEntry, PlanningJob
+from fleet.core.replan_reasons import GoalsAdded, ReplanAsked, TaskAdded
 from fleet.core.state import State
-from fleet.core.state_updates import active_plan_of, answer, cancel, mark_goals, set_entry
-from keyexpr_schema.ids import actor_arg
+from fleet.core.state_updates import (
+    active_plan_of,
+    answer,
+    cancel,
+    forget_entry,
+    mark_goals,
+    refuse_wishes,
+    set_entry,
+    touch,
+)
+from fleet.core.touches import Part, Touch
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
-from keyexpr_schema.payloads.plans import Plan, PlanState, Task
+from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest, ReplanRequest
+
+_NUMBERED = re.compile("plan-([1-9][0-9]{0,14})")
 
 
 def plan_requested(state: State, event: events.PlanRequested) -> State:
@@ -23,31 +36,22 @@ def plan_requested(state: State, event: events.PlanRequested) -> State:
 
 def plan_waiting_goals(state: State) -> State:
     """Goals that wait go into the running plan, or, where none runs, into a new one."""
+    active = [state.plans[plan] for plan in state.index.active]
+    if any(entry.state is PlanState.PLANNING for entry in active):
+        return state  # what comes meanwhile goes into the plan that is being made
     waiting = tuple(g for g in _waiting_goals(state) if state.goal_states[g].reason is None)
     if not waiting:
         return state
-    if any(entry.state is PlanState.PLANNING for entry in state.plans.values()):
-        return state  # what comes meanwhile goes into the plan that is being made
-    for entry in state.plans.values():
+    for entry in active:
         if entry.state is PlanState.RUNNING and not entry.cancelling:
-            goals = (*entry.plan.goals, *waiting)
-            entry = replace(entry, plan=replace(entry.plan, goals=goals))
-            reason = f"{', '.join(waiting)} came up"
-            return set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason))
+            return set_entry(state, entry.wishing(GoalsAdded(goals=waiting)))
     plan = Plan(plan=_new_plan_name(state), goals=waiting, conditions=(), tasks=())
     job = PlanningJob.of(state.jobs + 1, plan, "symbolic")
     return _planning(state, plan, replace(job, partial=True))
 
 
 def _start_planning(state: State, ask: PlanRequest) -> State:
-    if (
-        ask.request in state.answers
-        or ask.request in state.previews
-        or any(
-            entry.job is not None and entry.job.request == ask.request
-            for entry in state.plans.values()
-        )
-    ):
+    if _is_known(state, ask.request):
         return state
     goals = ask.goals or tuple(_waiting_goals(state))
     if reason := _why_not_plan(state, ask.plan, goals):
@@ -65,8 +69,23 @@ def _start_planning(state: State, ask: PlanRequest) -> State:
     job = PlanningJob.of(state.jobs + 1, plan, ask.planner)
     job = replace(job, request=ask.request, dry_run=ask.dry_run)
     if ask.dry_run:
-        return replace(state, jobs=job.job, previews=state.previews.set(ask.request, job))
+        previews = state.previews.set(ask.request, job)
+        state = replace(state, jobs=job.job, previews=previews)
+        return touch(state, Touch(Part.PREVIEW, ask.request))
     return _planning(state, plan, job)
+
+
+def _is_known(state: State, request: str) -> bool:
+    """Whether a request was answered, or is in work."""
+    return (
+        request in state.answers
+        or request in state.previews
+        or any(
+            (entry.job is not None and entry.job.request == request)
+            or any(wish.request == request for wish in entry.wishes)
+            for entry in state.plans.values()
+        )
+    )
 
 
 def _planning(state: State, plan: Plan, job: PlanningJob) -> State:
@@ -75,11 +94,13 @@ def _planning(state: State, plan: Plan, job: PlanningJob) -> State:
         state=PlanState.PLANNING,
         planner=job.planner,
         start=plan.autostart,
+        lineage=state.lineage or None,
         job=job,
         begun_s=state.time_s,
         begun_wall_s=state.wall_time_s,
     )
-    return set_entry(replace(state, jobs=job.job), entry)
+    made = max(state.plans_made, _plan_number(plan.plan))
+    return set_entry(replace(state, jobs=job.job, plans_made=made), entry)
 
 
 def _why_not_plan(state: State, plan: str | None, goals: tuple[str, ...]) -> str | None:
@@ -105,13 +126,20 @@ def _why_not_plan(state: State, plan: str | None, goals: tuple[str, ...]) -> str
 
 def _waiting_goals(state: State) -> Iterator[str]:
     """Goals that no plan works on, in their order."""
-    for goal in sorted(state.goals, key=lambda g: (state.goals[g].ordinal, g)):
-        if state.goal_states[goal].state is GoalState.WAITING and not active_plan_of(state, goal):
+    waiting = (g for g in state.index.in_state.get(GoalState.WAITING, ()) if g in state.goals)
+    for goal in sorted(waiting, key=lambda g: (state.goals[g].ordinal, g)):
+        if not active_plan_of(state, goal):
             yield goal
 
 
+def _plan_number(plan: str) -> int:
+    """`N` where the plan is called `plan-N`, else 0."""
+    named = _NUMBERED.fullmatch(plan)
+    return 0 if named is None else int(named[1])
+
+
 def _new_plan_name(state: State) -> str:
-    number = 1
+    number = state.plans_made + 1 if state.logic else 1
     while f"plan-{number}" in state.plans or f"plan-{number}" in state.past_plans:
         number += 1
     return f"plan-{number}"
@@ -127,18 +155,16 @@ def plan_proposed(state: State, event: events.PlanProposed) -> State:
 
 
 def replan_requested(state: State, event: events.ReplanRequested) -> State:
-    """Plan again from what is known now."""
+    """Plan again from what is known now; answered when that is done."""
     ask = event.request
-    if ask.request in state.answers:
+    if _is_known(state, ask.request):
         return state
     entry = _entry_to_replan(state, ask)
     if isinstance(entry, str):
         return answer(state, ask.request, False, entry)
-    goals = tuple(dict.fromkeys([*entry.plan.goals, *ask.goals]))
+    wish = ReplanAsked(request=ask.request, sentence=ask.reason, goals=ask.goals)
     # What a person asks for is no sign that the world does not go along: counting begins anew.
-    entry = replace(entry, plan=replace(entry.plan, goals=goals), fruitless_replans=0)
-    state = set_entry(state, entry.to_replan(ReplanScope.ANEW, ask.reason))
-    return answer(state, ask.request, True, f"plan {ask.plan} is made again", ask.plan)
+    return set_entry(state, replace(entry.wishing(wish), fruitless_replans=0))
 
 
 def _entry_to_replan(state: State, ask: ReplanRequest) -> PlanEntry | str:
@@ -160,9 +186,7 @@ def _no_plan(state: State, plan: str) -> str:
 def control_requested(state: State, event: events.ControlRequested) -> State:
     """Start, approve, cancel, delete or extend a plan, or say why not."""
     ask = event.request
-    if ask.request in state.answers or any(
-        entry.amendment_request == ask.request for entry in state.plans.values()
-    ):
+    if _is_known(state, ask.request):
         return state
     entry = state.plans.get(ask.plan)
     done = _no_plan(state, ask.plan) if entry is None else _CONTROLS[ask.control](state, entry, ask)
@@ -199,8 +223,14 @@ def _cancel(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
 def _delete(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
     if not entry.ended and entry.state not in (PlanState.READY, PlanState.PROPOSED):
         return f"plan {ask.plan} is {entry.state.value}; cancel it before deleting it"
+    if working := [f"{r.robot} with {r.task}" for r in entry.outstanding()]:
+        return (
+            f"plan {ask.plan} has orders that may still be carried out: {', '.join(working)}; "
+            "delete it when those robots have reported; unregister one that does not come back"
+        )
     state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None)
-    state = replace(state, plans=state.plans.without(ask.plan))
+    state = refuse_wishes(state, entry, f"plan {ask.plan} was deleted")
+    state = forget_entry(state, ask.plan)
     return answer(state, ask.request, True, f"plan {ask.plan} is deleted")
 
 
@@ -209,7 +239,9 @@ def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State | st
         return f"plan {ask.plan} is {entry.state.value}; tasks go to ready or running plans"
     if ask.skill is None:
         return "the request names no skill for the new task"
-    if entry.amendment is not None or entry.job is not None:
+    if entry.cancelling:
+        return f"plan {ask.plan} is being cancelled"
+    if entry.job is not None and not state.plans_while_acting:
         return f"plan {ask.plan} is being changed; add the task when that is done"
     for before in ask.after:
         if before not in entry.records:
@@ -218,18 +250,10 @@ def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State | st
     if "robot" in ask.args:
         robot = ask.args["robot"]
         return f"name the robot that does it as the request's robot, not as robot={robot}"
-    number = entry.next_task_number
-    task = Task(
-        task=f"t{number}",
-        skill=ask.skill,
-        args={"robot": actor_arg(f"x{number}"), **ask.args},
-        actor=f"x{number}",
-        after=ask.after,
+    wish = TaskAdded(
+        request=ask.request, skill=ask.skill, args=ask.args, after=ask.after, robot=ask.robot
     )
-    pins = {**entry.plan.pins, task.actor: ask.robot} if ask.robot else entry.plan.pins
-    plan = replace(entry.plan, pins=pins)
-    entry = replace(entry, plan=plan, amendment=task, amendment_request=ask.request)
-    return set_entry(state, entry.to_replan(ReplanScope.REPAIR, f"task {task.task} is added"))
+    return set_entry(state, entry.wishing(wish))
 
 
 _CONTROLS = {

@@ -7,53 +7,68 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.state import State
-from fleet.core.state_updates import conclude
+from fleet.core.state_updates import conclude, touch
+from fleet.core.touches import Part, Touch
 from fleet.errors import NotUnderstood
 from fleet.language import statement_facts
-from keyexpr_schema.payloads.world import Fact, StatementStatus
+from keyexpr_schema.payloads.world import Fact, Statement, StatementStatus
 
 
 def statement_put(state: State, event: events.StatementPut) -> State:
-    """Keep the statement, and believe the facts that can be read out of it."""
+    """Keep the statement, and believe the facts that can be read out of it.
+
+    What was said once is read once: also by a planner without its journal, which finds what an
+    earlier one has read.
+    """
     statement = event.statement
-    if state.statements.get(statement.statement) == statement:
+    known = state.statements.get(statement.statement)
+    if known == statement:
         return state
     state = replace(state, statements=state.statements.set(statement.statement, statement))
-    return _read_statement(state, statement.statement)
+    status = state.statement_states.get(statement.statement)
+    if known is None and status is not None and status.said_s == statement.said_s:
+        return state
+    return _read_statement(state, statement)
 
 
 def statement_deleted(state: State, event: events.StatementDeleted) -> State:
     """Drop the statement. Facts once read out of it stay: they may have been confirmed since."""
-    if event.statement not in state.statements:
+    if event.statement not in state.statements and event.statement not in state.statement_states:
         return state
-    return replace(
+    state = replace(
         state,
         statements=state.statements.without(event.statement),
         statement_states=state.statement_states.without(event.statement),
     )
+    return touch(state, Touch(Part.STATEMENT, event.statement))
 
 
 def understand_again(state: State) -> State:
     """Read the statements again that were not understood, now that there are other names."""
     for name, status in state.statement_states.items():
-        if status.reason is not None:
-            state = _read_statement(state, name)
+        statement = state.statements.get(name)
+        if status.reason is not None and statement is not None:
+            state = _read_statement(state, statement)
     return state
 
 
-def _read_statement(state: State, name: str) -> State:
+def _read_statement(state: State, statement: Statement) -> State:
+    name, said_s = statement.statement, statement.said_s
     try:
-        read = statement_facts(state.statements[name].text, state.vocabulary())
+        read = statement_facts(statement.text, state.vocabulary())
     except NotUnderstood as error:
-        return _set_status(state, StatementStatus(statement=name, reason=str(error)))
+        status = StatementStatus(statement=name, reason=str(error), said_s=said_s)
+        return _set_status(state, status)
     source = f"{PLANNER_SOURCE}:{name}"
-    facts = tuple(Fact.of(literal, source, state.time_s) for literal in read)
+    facts = tuple(Fact.of(literal, source, said_s or state.time_s) for literal in read)
     for fact in facts:
         state = conclude(state, fact)
-    return _set_status(state, StatementStatus(statement=name, facts=facts))
+    return _set_status(state, StatementStatus(statement=name, facts=facts, said_s=said_s))
 
 
 def _set_status(state: State, status: StatementStatus) -> State:
     if state.statement_states.get(status.statement) == status:
         return state
-    return replace(state, statement_states=state.statement_states.set(status.statement, status))
+    statement_states = state.statement_states.set(status.statement, status)
+    state = replace(state, statement_states=statement_states)
+    return touch(state, Touch(Part.STATEMENT, status.statement))

@@ -5,34 +5,37 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.dispatch.replan_triggers import contradiction
+from fleet.core.dispatch.replan_triggers import contradicted
+from fleet.core.dispatch.while_replanning import stands_still
 from fleet.core.handlers import goals, statements
-from fleet.core.plan_entry import ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import believe, set_entry
+from fleet.core.state_updates import believe, forget_fact, set_entry
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.payloads.plans import PlanState
 
 
 def fact_put(state: State, event: events.FactPut) -> State:
     """Believe the fact: its key holds the latest word. A plan that it contradicts is repaired."""
-    fact = event.fact
+    fact, known = event.fact, state.facts.get(event.fact.key)
     changed = believe(state, fact)
     if changed is state:
         return state
     state = changed
-    for entry in state.plans.values():
-        if entry.state is PlanState.RUNNING and entry.replan is None:
-            reason = contradiction(state, entry, fact)
-            if reason is not None:
-                state = set_entry(state, entry.to_replan(ReplanScope.REPAIR, reason))
+    for plan in state.index.active:
+        entry = state.plans[plan]
+        if entry.state is not PlanState.RUNNING or stands_still(state, entry):
+            continue
+        said_again = known is not None and known.value == fact.value
+        if said_again and any(fact.key in reason.variables for reason in entry.reasons):
+            continue  # it is being seen to
+        if (against := contradicted(state, entry, fact)) is not None:
+            state = set_entry(state, against)
     return state
 
 
 def fact_deleted(state: State, event: events.FactDeleted) -> State:
     """No longer believe anything of that variable."""
-    key = FactKey(event.relation, event.subject)
-    return replace(state, facts=state.facts.without(key)) if key in state.facts else state
+    return forget_fact(state, FactKey(event.relation, event.subject))
 
 
 def place_put(state: State, event: events.PlacePut) -> State:

@@ -9,7 +9,7 @@ starts before that is confirmed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from msgspec.structs import replace
@@ -18,7 +18,8 @@ from fleet.core import events
 from fleet.core.model.preconditions import effects_hold
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_index import OUTSTANDING
 from keyexpr_schema.ids import bound
 from keyexpr_schema.payloads.plans import Plan, PlanChange, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -34,15 +35,15 @@ class Revision:
     plan: Plan
     records: dict[str, TaskRecord]
     unwanted: tuple[str, ...]
+    missed: tuple[str, ...]
+    """Tasks given out since the plan was asked for that it does without."""
     change: PlanChange
 
 
-def reconcile(
-    entry: PlanEntry, event: events.PlanningSucceeded, world: WorldModel, started: frozenset[str]
-) -> Revision:
-    """Take over the plan in `event`; `started` were under way when it was being made."""
+def reconcile(entry: PlanEntry, event: events.PlanningSucceeded, world: WorldModel) -> Revision:
+    """Take over the plan in `event`, which the entry's present job has made."""
     calls = {task.task: _call(task, event.allocation) for task in event.plan.tasks}
-    going_on, skipped = _going_on(entry, event, calls, world, started)
+    going_on, skipped = _going_on(entry, event, calls, world)
     names = {**_same_waiting(entry, calls, going_on), **going_on}
     plan = _renamed(event.plan, names)
     records = dict(entry.records)
@@ -64,9 +65,21 @@ def reconcile(
     # A task that is so already may have been waiting: then it is kept, and counts once.
     added = sum(task.task not in {*names, *skipped} for task in event.plan.tasks)
     dropped = len(unwanted) + len(waiting)
-    return Revision(
-        plan, records, unwanted, PlanChange(kept=len(names), dropped=dropped, added=added)
-    )
+    found = set(going_on.values())
+    # What was under way when the job began, the new plan is without on purpose.
+    new = entry.given_out.keys() - set(entry.job.under_way if entry.job else ())
+    missed = tuple(name for name in _under_way(entry, sorted(new)) if name not in found)
+    change = PlanChange(kept=len(names), dropped=dropped, added=added)
+    return Revision(plan, records, unwanted, missed, change)
+
+
+def _under_way(entry: PlanEntry, started: Iterable[str]) -> Iterator[str]:
+    """Those of the tasks that a new plan can go on with: they are done, or being done, and not
+    being cancelled."""
+    for name in started:
+        state = entry.records[name].state
+        if state in {*OUTSTANDING, TaskState.SUCCEEDED} and name not in entry.unwanted:
+            yield name
 
 
 def _call(task: Task, allocation: Mapping[str, str]) -> Call:
@@ -84,7 +97,6 @@ def _going_on(
     event: events.PlanningSucceeded,
     calls: Mapping[str, Call],
     world: WorldModel,
-    started: frozenset[str],
 ) -> tuple[dict[str, str], frozenset[str]]:
     """New tasks that are already under way, with their old names; and what need not be done again.
 
@@ -97,20 +109,20 @@ def _going_on(
             for task in event.plan.tasks
         }
     )
-    under_way = {
-        _call_of(record): name
-        for name, record in entry.records.items()
-        if name in started and record.state in {*OUTSTANDING, TaskState.SUCCEEDED}
-    }
+    under_way: dict[Call, list[str]] = {}
+    job = entry.job
+    started = dict.fromkeys((*(job.under_way if job else ()), *entry.given_out))
+    for name in _under_way(entry, started):
+        under_way.setdefault(_call_of(entry.records[name]), []).append(name)
     names: dict[str, str] = {}
     skipped: set[str] = set()
     for task in graph.order:
-        old = under_way.get(calls[task])
-        if old is None or old in names.values():
+        if not under_way.get(calls[task]):
             continue
         before = {name for name in graph.order if graph.precedes(name, task)} - names.keys()
         if all(_holds_already(calls[name], world) for name in before):
-            names[task] = old
+            # The same call twice: in the order in which they were given out.
+            names[task] = under_way[calls[task]].pop(0)
             skipped |= before
     return names, frozenset(skipped)
 

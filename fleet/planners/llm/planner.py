@@ -56,7 +56,7 @@ class LlmPlanner(Planner):
         except Exception as error:
             # What a model says must never stop the fleet, whatever it is.
             log.exception("planning by language model")
-            made = GivenUp(f"reading the answer failed: {error or type(error).__name__}")
+            made = GivenUp(f"reading the answer failed: {str(error) or type(error).__name__}")
         if isinstance(made, CheckedPlan):
             return made.with_making(budget.making(self.name), problem.strategy)
         return self._fall_back(problem, made, budget)

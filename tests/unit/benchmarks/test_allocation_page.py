@@ -9,7 +9,7 @@ from benchmarks.allocation import report
 from benchmarks.allocation.bench_household import Run
 from benchmarks.allocation.bench_makespan import Public, Rescheduling, Size
 from benchmarks.allocation.household import CLOCKS, STRATEGIES, scenarios
-from benchmarks.allocation.run import as_json
+from benchmarks.tables import as_json
 
 RUNS = [
     Run(scenario, seed, strategy, clock, name, 110.0, 100.0, 0.2, 0.12, 0.1)

@@ -9,6 +9,7 @@ import pytest
 from cli.commands.processes import data_folder
 from cli.errors import BadSettings
 from cli.settings import DEFAULT_REALM, DEFAULT_ROUTER, PlannerSettings, load_settings
+from fleet.core.state import Policy
 
 A, B, C = "tcp/127.0.0.1:1", "tcp/127.0.0.1:2", "tls/[::1]:3"
 
@@ -56,6 +57,8 @@ def test_which_file(tmp_path: Path) -> None:
         ("planner: {approval: 1}\n", "planner.approval: 1 is not true or false"),
         ("planner: {lost_after_s: .inf}\n", "planner.lost_after_s: inf is not a number"),
         ("planner: {lost_after_s: -1}\n", "planner.lost_after_s: -1 is not a number"),
+        ("planner: {lost_after_s: soon}\n", "planner.lost_after_s: 'soon' is not a number"),
+        ("planner: {planning_limit_s: 0.5}\n", "planner.planning_limit_s: 0.5 is not a number"),
         ("planner: {skills: [1]}\n", "planner.skills: [1] is not the name of a file"),
         ("router: localhost\n", "'localhost' is not a Zenoh endpoint"),
         ("router: {a: 1}\n", "must be an endpoint or a list"),
@@ -86,13 +89,14 @@ def test_a_bad_flag_or_variable_is_named() -> None:
 def test_the_planner_is_told_its_ways_in_the_file(tmp_path: Path) -> None:
     assert load_settings(None, None, False, {}, tmp_path).planner == PlannerSettings()
     (tmp_path / "robotctl.yaml").write_text(
-        "planner: {approval: true, lost_after_s: 5, llm_config: llm.yaml, "
-        "skills: [a.yaml, /b.yaml]}"
+        "planner: {approval: true, lost_after_s: 5, planning_limit_s: 7.5, "
+        "llm_config: llm.yaml, skills: [a.yaml, /b.yaml]}"
     )
     assert load_settings(None, None, False, {}, tmp_path).planner == PlannerSettings(
         approval=True,
         auto_plan=None,
         lost_after_s=5.0,
+        planning_limit_s=7.5,
         llm_config=tmp_path / "llm.yaml",
         skills=(tmp_path / "a.yaml", Path("/b.yaml")),
     )
@@ -105,6 +109,7 @@ def test_the_file_to_copy_is_right_with_every_comment_taken_away(tmp_path: Path)
     )
     told = load_settings(None, None, False, {}, tmp_path).planner
     assert (told.approval, told.auto_plan, told.lost_after_s) == (True, True, 30.0)
+    assert told.planning_limit_s == Policy().planning_limit_s
     assert told.llm_config == tmp_path / "planner.yaml"
 
 

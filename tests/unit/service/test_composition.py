@@ -8,6 +8,8 @@ import pytest
 
 from fleet.errors import BadSkillFile
 from fleet.service.composition import compose
+from fleet.service.skill_models import load_all_skills
+from tests.support.plug_in_site import plug_in_site
 
 CODE = """
 from pathlib import Path
@@ -37,34 +39,25 @@ class OneWord(Lazy):
 FILE = Path(__file__).with_name("wave.yaml")
 AGAIN = {"skills": {"wave": {"parameters": {"robot": "robot"}}}}
 """
-ENTRIES = """
-[robotfleet.planners]
-lazy = theirs:Lazy
-needy = theirs:Needy
-turns = theirs:Turns
-impostor = theirs:Impostor
-one-word = theirs:OneWord
-[robotfleet.allocators]
-turns = theirs:Turns
-lazy = theirs:Lazy
-nameless = theirs:Nameless
-[robotfleet.skill_models]
-wave = theirs:FILE
-again = theirs:AGAIN
-"""
+ENTRIES = {
+    "robotfleet.planners": {
+        "lazy": "Lazy",
+        "needy": "Needy",
+        "turns": "Turns",
+        "impostor": "Impostor",
+        "one-word": "OneWord",
+    },
+    "robotfleet.allocators": {"turns": "Turns", "lazy": "Lazy", "nameless": "Nameless"},
+    "robotfleet.skill_models": {"wave": "FILE", "again": "AGAIN"},
+}
 WAVE = "skills: {wave: {parameters: {robot: robot}, after: [waved(robot) = true]}}\n"
 
 
 @pytest.fixture
 def theirs(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
     site = tmp_path_factory.mktemp("site")
-    (site / "theirs.py").write_text(CODE)
     (site / "wave.yaml").write_text(WAVE)
-    info = site / "theirs-1.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1\n")
-    (info / "entry_points.txt").write_text(ENTRIES)
-    monkeypatch.syspath_prepend(site)
+    monkeypatch.syspath_prepend(plug_in_site(site, CODE, ENTRIES))
     return site
 
 
@@ -75,7 +68,7 @@ def test_sound_plug_ins_are_there_and_each_broken_one_is_named(
     assert {"symbolic", "llm", "lazy"} == set(made.planners)
     assert "siesta" in made.strategies
     assert {"makespan", "turns"} <= set(made.allocators) and "lazy" not in made.allocators
-    assert {"navigate", "wave"} <= set(made.skills)
+    assert {"navigate", "wave"} <= set(load_all_skills())
     warnings = [record.getMessage() for record in caplog.records]
     assert len(warnings) == 7
     for entry, what in (
@@ -93,4 +86,4 @@ def test_sound_plug_ins_are_there_and_each_broken_one_is_named(
 
 def test_a_file_that_models_a_packages_skill_is_refused(theirs: Path) -> None:
     with pytest.raises(BadSkillFile, match=r"wave\.yaml: skill wave is already modelled elsewhere"):
-        compose((theirs / "wave.yaml",))
+        load_all_skills((theirs / "wave.yaml",))

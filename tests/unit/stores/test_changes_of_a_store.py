@@ -7,7 +7,7 @@ import sqlite3
 from pathlib import Path
 
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.transport.storage import Changes, Write
+from keyexpr_schema.transport.store.storage import Changes, Write
 
 PLACES = ["north/world/places/*"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from fleet.stores.index import Index
-from keyexpr_schema.transport.storage import Write
+from keyexpr_schema.transport.store.storage import Write
 
 
 def write(keyexpr: str, number: int) -> Write:

@@ -11,7 +11,7 @@ import pytest
 
 from fleet.errors import StoreError, StoreInUse
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.transport.storage import Write
+from keyexpr_schema.transport.store.storage import Write
 
 
 def write(name: str, time: int, *, deleted: bool = False, data: bytes = b"1") -> Write:
@@ -131,7 +131,7 @@ def test_every_applied_write_survives_kill_9(tmp_path, round_number):
     program = f"""
 from pathlib import Path
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.transport.storage import Write
+from keyexpr_schema.transport.store.storage import Write
 with SqliteStore(Path({str(tmp_path)!r})) as store:
     for number in range(1, 10**9):
         key = f"north/world/places/p{{number % 50}}"

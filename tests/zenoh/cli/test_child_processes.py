@@ -14,6 +14,7 @@ from cli.demo.bring_up import router_up
 from cli.demo.child_processes import ChildProcesses, free_endpoint
 from cli.errors import BadArgument, ProcessDied
 from tests.support.polling import until
+from tests.support.process_ids import alive
 
 
 def make(out: Path) -> ChildProcesses:
@@ -24,24 +25,16 @@ def make(out: Path) -> ChildProcesses:
     return processes
 
 
-def runs(pid: int) -> bool:
-    """Whether the process is there and no zombie."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
-
-
 async def test_a_process_is_ready_by_its_keys_and_gone_at_the_end(tmp_path: Path) -> None:
     async with make(tmp_path) as processes:
         await processes.start("router")
         await processes.guard(router_up(processes))
         pid = processes.pid("router")
         assert pid is not None
-        assert runs(pid)
+        assert alive(pid)
         with pytest.raises(BadArgument, match="runs already"):
             await processes.start("router")
-    assert not runs(pid)
+    assert not alive(pid)
     assert f"listening on {processes.endpoint}" in processes.log("router").read_text()
 
 
@@ -106,7 +99,7 @@ async def test_an_error_in_the_block_leaves_nothing_behind(tmp_path: Path) -> No
             pid = processes.pid("router")
             raise RuntimeError("mine")
     assert pid is not None
-    assert not runs(pid)
+    assert not alive(pid)
 
 
 async def test_children_end_when_their_parent_is_killed(tmp_path: Path) -> None:
@@ -134,8 +127,8 @@ asyncio.run(main())
     try:
         assert parent.stdout is not None
         child = int(await parent.stdout.readline())
-        assert runs(child)
+        assert alive(child)
     finally:
         parent.kill()
         await parent.wait()
-    await until(lambda: not runs(child))
+    await until(lambda: not alive(child))

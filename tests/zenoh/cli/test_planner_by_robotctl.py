@@ -13,9 +13,10 @@ from keyexpr_schema.keyspace import (
     FACT,
     PLAN_STATUS,
     SIM_CLOCK,
+    SIM_SCENE,
 )
 from keyexpr_schema.payloads.plans import PlanAddress, PlanState
-from keyexpr_schema.payloads.simulation import SimAddress, SimClock
+from keyexpr_schema.payloads.simulation import Scene, SimAddress, SimClock
 from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.session import Session
 from tests.support.planner_process import carry_out, next_order, person, planner
@@ -123,6 +124,8 @@ async def test_facts_of_people_carry_the_fleets_time(
         address = FactAddress("cup_1", "at")
         await robotctl.soon("world", "add", "--fact", "at", "cup_1", "hallway")
         by_the_wall = await session.get(FACT, address)
+        scene = Scene(world="home", bodies=(), fixed={})
+        await session.confirm(SIM_SCENE, SimAddress(), scene)
 
         async def tick() -> None:
             while True:

@@ -22,6 +22,7 @@ from keyexpr_schema.keyspace import (
     PLANNER_STATUS,
     ROBOT_ALIVE,
     ROBOT_SPEC,
+    STORE_JOURNAL,
     TASK_RECORD,
     UNDECODABLE,
 )
@@ -29,9 +30,10 @@ from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanAddress, PlanState, Task
 from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
 from keyexpr_schema.payloads.robots import AliveAddress, RobotAddress
-from keyexpr_schema.payloads.system import PlannerAddress
+from keyexpr_schema.payloads.system import PlannerAddress, StoreAddress, StoreQuery
 from keyexpr_schema.payloads.tasks import OrderAddress
 from keyexpr_schema.payloads.world import FactAddress
+from keyexpr_schema.transport.link import Put
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from tests.support.household import fact, manipulator
 from tests.support.planner_process import (
@@ -53,7 +55,11 @@ async def test_a_goal_is_planned_ordered_and_reached(router: RouterProcess, tmp_
     async with planner(router.endpoint, tmp_path), person(router.endpoint) as session:
         await ask_for_plan(session)
         await finish(session, set())
-        assert await session.list(ORDER) == {}
+
+        async def nothing_ordered() -> bool:
+            return await session.list(ORDER) == {}
+
+        await until(nothing_ordered, "the end of all orders")
 
 
 async def test_kill_9_in_the_middle_gives_no_attempt_twice(
@@ -172,9 +178,9 @@ async def test_what_is_malformed_or_unknown_is_told_and_disturbs_nobody(
 ) -> None:
     async with planner(router.endpoint, tmp_path), person(router.endpoint) as session:
         for keyexpr in ("goals/bad/spec", "requests/plan/bad", "world/facts/cup_1/colour"):
-            await session.link.send(
-                keyexpr, b'{"goal": 7, "text":', "application/json", session.link.new_timestamp()
-            )
+            data = b'{"goal": 7, "text":'
+            stamp = session.link.new_timestamp()
+            await session.link.send(Put(keyexpr, data, "application/json", stamp))
         dragon = Goal(goal="dragon", text="Bring the dragon to the hallway")
         await session.confirm(GOAL_SPEC, GoalAddress("dragon"), dragon)
         status = await value(session, GOAL_STATUS, GoalAddress("dragon"), state=GoalState.REJECTED)
@@ -242,3 +248,34 @@ async def test_a_planner_may_start_before_its_router(tmp_path: Path) -> None:
     finally:
         process.end()
         router.kill()
+
+
+async def test_planners_that_start_together_never_have_the_same_epoch(
+    router: RouterProcess, tmp_path: Path
+) -> None:
+    """Each takes a higher one than those before it; all but the last then stop, and say so."""
+    processes = [PlannerProcess(router.endpoint, tmp_path / str(n)) for n in range(3)]
+    config = SessionConfig(endpoints=(router.endpoint,), realm="test")
+    charges: dict[int, set[str]] = {}
+    try:
+        async with open_session(config) as session:
+            await asyncio.gather(*(p.start() for p in processes), return_exceptions=True)
+            async with asyncio.timeout(DEADLINE_S):
+                while len(charges) < len(processes):
+                    asked = StoreQuery(after=0)
+                    journal = await session.query(STORE_JOURNAL, StoreAddress(), asked)
+                    for entry in journal.entries:
+                        if entry.keyexpr == PLANNER_STATUS.build(PlannerAddress()):
+                            status = PLANNER_STATUS.decode(entry.value.encode())
+                            charges.setdefault(status.epoch, set()).add(status.incarnation)
+            assert sorted(charges) == [1, 2, 3]
+            assert all(len(each) == 1 for each in charges.values())
+
+            async def one_is_left() -> bool:
+                alive = [p for p in processes if p.process and p.process.poll() is None]
+                return len(alive) == 1
+
+            await until(one_is_left, "all planners but one to stop")
+    finally:
+        said = [process.end() for process in processes if process.process is not None]
+    assert sum("took charge of realm" in each for each in said) == 2

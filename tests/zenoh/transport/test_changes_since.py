@@ -5,9 +5,9 @@ from __future__ import annotations
 from keyexpr_schema.keyspace import FACT, GOAL_SPEC
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.world import FactAddress
-from keyexpr_schema.transport.link import Link
+from keyexpr_schema.transport.link import Link, Put
 from keyexpr_schema.transport.session import Session, open_session
-from keyexpr_schema.transport.store_client import Page, StoreClient
+from keyexpr_schema.transport.store.client import Page, StoreClient
 from keyexpr_schema.transport.trace import Trace
 from tests.support.polling import until
 from tests.support.session_values import fact, goal, not_connected
@@ -38,7 +38,9 @@ async def test_one_question_tells_what_changed_in_several_patterns(session_confi
         assert (keys(first), first.whole, first.more) == (["goals/g1/spec"], True, False)
         # What no reader could read, and is not even text, comes as it was put.
         raw = b"\xff\x00not a fact"
-        await session.link.send("world/facts/cup_1/at", raw, "x/y", session.link.new_timestamp())
+        await session.link.send(
+            Put("world/facts/cup_1/at", raw, "x/y", session.link.new_timestamp())
+        )
         session.put(GOAL_SPEC, GoalAddress("g2"), goal("g2"))
         await session.delete(GOAL_SPEC, GoalAddress("g1"))
         since = await page(store, first.position)

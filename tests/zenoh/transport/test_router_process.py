@@ -20,7 +20,7 @@ from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.samples import read_sample, stamp_of_text
 from keyexpr_schema.transport.session import SessionConfig, open_session
-from keyexpr_schema.transport.store_client import StoreClient
+from keyexpr_schema.transport.store.client import StoreClient
 from keyexpr_schema.transport.trace import Trace
 
 MODULE = "fleet.service.router_process"

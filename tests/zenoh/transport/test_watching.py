@@ -20,8 +20,9 @@ from keyexpr_schema.payloads.system import StoreAddress, StoreChanges, StoreChan
 from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState
 from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.connecting import zenoh_config
+from keyexpr_schema.transport.link import Put
 from keyexpr_schema.transport.session import Narrowed, Session, Watch, open_session
-from keyexpr_schema.transport.storage import Write
+from keyexpr_schema.transport.store.storage import Write
 from tests.support.polling import until
 from tests.support.router_process import RouterProcess
 from tests.support.session_values import (
@@ -261,12 +262,9 @@ async def test_what_was_known_before_is_not_gone_where_no_store_answers(
         await watch.synced()
         await updated(watch)
         assert watch.exists(GOAL_SPEC, GoalAddress("g1"))
-        await session.link.send(
-            GOAL_SPEC.build(GoalAddress("g2")),
-            GOAL_SPEC.encode(goal("g2")),
-            "",
-            session.link.new_timestamp(),
-        )
+        stamp, address = session.link.new_timestamp(), GoalAddress("g2")
+        g2 = Put(GOAL_SPEC.build(address), GOAL_SPEC.encode(goal("g2")), "", stamp)
+        await session.link.send(g2)
         [change] = await take(watch, 1)
         assert change.value == goal("g2")
 

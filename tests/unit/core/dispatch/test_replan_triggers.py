@@ -16,7 +16,7 @@ def test_a_lost_robots_work_goes_to_another() -> None:
     (order,) = model.orders()
     other = {"r1": "r2", "r2": "r1"}[order.robot]
     model.lose(order.robot)
-    assert {o.robot for o in model.orders()} == {other}
+    assert {o.robot for o in model.wanted()} == {other}
     model.finish()
     assert model.goal_state("g1") is GoalState.REACHED
 
@@ -100,7 +100,7 @@ def test_a_robot_that_is_unregistered_loses_its_work_and_gets_new_once_it_is_bac
     (order,) = model.orders()
     other = {"r1": "r2", "r2": "r1"}[order.robot]
     model.receive(events.RobotUnregistered, robot=order.robot)
-    assert {o.robot for o in model.orders()} == {other}
+    assert {o.robot for o in model.wanted()} == {other}
     model.finish()
     model.receive(events.RobotRegistered, spec=manipulator(order.robot))
     assert model.state.ready(order.robot)

@@ -16,24 +16,42 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from keyexpr_schema.errors import Unconfirmed, Unreachable
+from keyexpr_schema.errors import Overtaken, Unconfirmed, Unreachable
 from keyexpr_schema.key import Key, P
-from keyexpr_schema.keyspace import STORE_CHANGES, STORE_JOURNAL
+from keyexpr_schema.keyspace import STORE_CHANGES, STORE_JOURNAL, STORE_REPLACE, STORE_STAMPS
 from keyexpr_schema.payloads.system import (
     StoreAddress,
     StoreChanges,
     StoreChangesQuery,
     StoredValue,
     StoreQuery,
+    StoreReplaced,
+    StoreReplaceQuery,
+    StoreStamps,
+    StoreStampsQuery,
 )
-from keyexpr_schema.transport.link import Link, Replies
-from keyexpr_schema.transport.samples import Sample, decode_reply, encoding_of, stamp_of_text
+from keyexpr_schema.transport.link import Link, Put, Replies
+from keyexpr_schema.transport.samples import (
+    Sample,
+    decode_reply,
+    encoding_of,
+    stamp_of_text,
+    text_of_stamp,
+)
+from keyexpr_schema.transport.store.writes import ANSWER_S, ConfirmedWrites
 from keyexpr_schema.transport.trace import Trace
 
 SETTLE_S = 0.5
 PAGE = 1000
 """Values asked for at once: some milliseconds of the store's time, in which all others wait."""
-_RESEND_S = 0.25
+
+
+@dataclass(frozen=True)
+class Replaced:
+    """Whether a key was written by compare-and-set, and what it holds now."""
+
+    done: bool
+    there: Sample | None
 
 
 @dataclass(frozen=True)
@@ -51,58 +69,96 @@ class StoreClient:
 
     def __init__(self, link: Link, endpoints: tuple[str, ...], trace: Trace) -> None:
         self._link, self._endpoints, self._trace = link, endpoints, trace
+        self._writes = ConfirmedWrites(link, self._newest, self._settled)
 
     async def write(
         self, key: Key[Any, Any], keyexpr: str, data: bytes | None, timeout_s: float
     ) -> None:
-        """Put (`data` None: delete), and return when the store has it, or something newer.
+        """Put (`data` None: delete), and return when the store has exactly this write.
 
         Raises:
-            Unconfirmed: it was not read back within `timeout_s`; it may still arrive.
+            Overtaken: somebody else's write of the same key has a later stamp.
+            Unconfirmed: it was not confirmed within `timeout_s`; it may still arrive.
         """
+        put = Put(keyexpr, data, encoding_of(key), self._link.new_timestamp())
+        try:
+            async with asyncio.timeout(timeout_s):
+                await self._writes.confirmed(put)
+        except TimeoutError:
+            raise self._unconfirmed(
+                f"{'deleting ' if data is None else ''}{keyexpr}", timeout_s
+            ) from None
+
+    def _unconfirmed(self, what: str, timeout_s: float) -> Unconfirmed:
+        why = (
+            "a router is there, but no store answers for this key"
+            if self._link.router.up
+            else f"no router answers at {', '.join(self._endpoints)}"
+        )
+        return Unconfirmed(f"{what} was not confirmed by the store within {timeout_s:g} s: {why}")
+
+    async def replace(
+        self, key: Key[Any, Any], keyexpr: str, data: bytes, seen: Sample | None, timeout_s: float
+    ) -> Replaced:
+        """Put if the key still holds what was `seen` there (None: nothing); else what it holds.
+
+        The store compares and sets, and stamps the value. A zenohd storage cannot: there the key is
+        looked at, put and read back, so that of two who do so in the same moment both may believe
+        for some milliseconds that they were first.
+
+        Raises:
+            Unconfirmed: it was not known within `timeout_s`; it may have been written.
+        """
+        expected = text_of_stamp(seen.stamp) if seen is not None else ""
+        asked = StoreReplaceQuery(
+            keyexpr=keyexpr, value=data.decode(), encoding=encoding_of(key), expected=expected
+        )
         router = self._link.router
-        timestamp = self._link.new_timestamp()
-        ours = stamp_of_text(str(timestamp))
+        unanswered = generation = 0
+        lost = False
         try:
             async with asyncio.timeout(timeout_s):
                 while True:
                     await router.wait_up()
+                    unanswered = unanswered + 1 if generation == router.generation else 1
                     generation = router.generation
-                    await self._link.send(keyexpr, data, encoding_of(key), timestamp)
-                    if await self._read_back(keyexpr, ours, data is None, generation):
-                        return
+                    replies = await self._ask(STORE_REPLACE, asked, ANSWER_S)
+                    if replies.values:
+                        answer: StoreReplaced = decode_reply(STORE_REPLACE, replies.values[0])  # type: ignore[assignment]
+                        if 0 < answer.behind_s <= timeout_s:
+                            await asyncio.sleep(answer.behind_s)
+                            continue
+                        if answer.behind_s:
+                            raise Unconfirmed(
+                                f"{keyexpr} was not written: it was last written by a clock that "
+                                f"is {answer.behind_s:.3g} s ahead of the router's; set the clocks"
+                            )
+                        there = _replaced_sample(keyexpr, answer)
+                        # An answer that was lost may have been a yes.
+                        ours = answer.done or (lost and there is not None and there.data == data)
+                        return Replaced(ours, there)
+                    if replies.errors:
+                        raise Unconfirmed(f"{keyexpr} was not written: {replies.errors[0]}")
+                    if unanswered > 1 and not replies.timed_out and router.age_s >= SETTLE_S:
+                        return await self._replace_by_hand(key, keyexpr, data, expected)
+                    lost = True
+                    await asyncio.sleep(0.05)
         except TimeoutError:
-            why = (
-                "a router is there, but no store answers for this key"
-                if router.up
-                else f"no router answers at {', '.join(self._endpoints)}"
-            )
-            raise Unconfirmed(
-                f"{'deleting ' if data is None else ''}{keyexpr} was not confirmed by the store "
-                f"within {timeout_s:g} s: {why}"
-            ) from None
+            raise self._unconfirmed(keyexpr, timeout_s) from None
 
-    async def _read_back(self, keyexpr: str, ours: int, gone: bool, generation: int) -> bool:
-        loop = asyncio.get_running_loop()
-        router = self._link.router
-        resend_at_s = loop.time() + _RESEND_S
-        pause_s = 0.0005
-        while router.up and router.generation == generation:
-            replies = await self._link.query(keyexpr, 2.0)
-            stored = max((s.stamp for s in replies.values if not s.deleted), default=None)
-            if stored is not None and stored >= ours:
-                return True
-            if gone and stored is None and not replies.timed_out and not replies.errors:
-                samples = await self._settled(keyexpr, 2.0)
-                newest = max((sample.stamp for sample in samples), default=ours)
-                # Absent proves the deletion only where the query followed it down one link.
-                if newest >= ours and router.generation == generation:
-                    return True
-            if loop.time() >= resend_at_s:
-                return False
-            await asyncio.sleep(pause_s)
-            pause_s = min(0.05, pause_s * 2)
-        return False
+    async def _replace_by_hand(
+        self, key: Key[Any, Any], keyexpr: str, data: bytes, expected: str
+    ) -> Replaced:
+        there = next(iter(await self._settled(keyexpr, ANSWER_S)), None)
+        if (text_of_stamp(there.stamp) if there is not None else "") != expected:
+            return Replaced(False, there)
+        put = Put(keyexpr, data, encoding_of(key), self._link.new_timestamp())
+        try:
+            await self._writes.confirmed(put)
+        except Overtaken:
+            return Replaced(False, next(iter(await self._settled(keyexpr, ANSWER_S)), None))
+        stamp = stamp_of_text(str(put.timestamp))
+        return Replaced(True, Sample(keyexpr, data, put.encoding, stamp, False))
 
     async def list(self, pattern: str, timeout_s: float) -> tuple[Sample, ...]:
         """The newest stored value of every key that `pattern` matches, undecoded.
@@ -185,15 +241,25 @@ class StoreClient:
                 continue
             await asyncio.sleep(0.05)
 
+    async def _newest(self, puts: Sequence[Put], timeout_s: float) -> tuple[str, ...] | None:
+        asked = StoreStampsQuery(keys=tuple(put.keyexpr for put in puts))
+        replies = await self._ask(STORE_STAMPS, asked, timeout_s, puts)
+        if not replies.values:
+            return None
+        answer: StoreStamps = decode_reply(STORE_STAMPS, replies.values[0])  # type: ignore[assignment]
+        return answer.timestamps
+
     async def answers(self, timeout_s: float) -> bool:
         """Whether a store that keeps a journal answers now; a zenohd storage never does."""
         return bool((await self._ask(STORE_JOURNAL, StoreQuery(limit=0), timeout_s)).values)
 
-    async def _ask(self, key: Key[StoreAddress, P], asked: P, timeout_s: float) -> Replies:
+    async def _ask(
+        self, key: Key[StoreAddress, P], asked: P, timeout_s: float, after: Sequence[Put] = ()
+    ) -> Replies:
         keyexpr = key.build(StoreAddress())
         self._trace.note("query", key, keyexpr)
         return await self._link.query(
-            keyexpr, timeout_s, key.encode(asked), encoding_of(key), first=True
+            keyexpr, timeout_s, key.encode(asked), encoding_of(key), first=True, after=after
         )
 
 
@@ -206,3 +272,10 @@ def _sample_of(value: StoredValue) -> Sample:
         stamp_of_text(value.timestamp),
         value.value is None,
     )
+
+
+def _replaced_sample(keyexpr: str, answer: StoreReplaced) -> Sample | None:
+    if answer.value is None:
+        return None
+    stamp = stamp_of_text(answer.timestamp)
+    return Sample(keyexpr, answer.value.encode(), answer.encoding, stamp, False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
+from typing import Any, Protocol
 
 import msgspec
 
@@ -72,6 +72,9 @@ class Store(Protocol):
     def select(self, pattern: str, /) -> list[Write]:
         """The values of every key that `pattern` (`*`, `**` and `$*` allowed) matches, by key."""
 
+    def newest(self, keyexprs: Sequence[str], /) -> list[Write | None]:
+        """The newest write of each of these keys, be it a deletion; None where there is none."""
+
     def changes(self, patterns: Sequence[str], position: str, limit: int, /) -> Changes:
         """At most `limit` changes since `position` of keys that one of `patterns` matches.
 
@@ -85,16 +88,13 @@ class Store(Protocol):
         """
 
 
-@lru_cache(maxsize=65_536)
 def is_stored(keyexpr: str) -> bool:
     """Whether a key expression, realm included, is one that the store keeps."""
-    if "*" in keyexpr.partition("/")[2]:
-        return True  # applies to existing keys, which are all of ours
     key = _key_of(keyexpr)
-    return key is not None and key.stored
+    # One with wildcards applies to existing keys, which are all of ours.
+    return key.stored if key is not None else "*" in keyexpr.partition("/")[2]
 
 
-@lru_cache(maxsize=65_536)
 def is_journaled(keyexpr: str) -> bool:
     """Whether changes of this key, realm included, are in the journal.
 
@@ -107,7 +107,8 @@ def is_journaled(keyexpr: str) -> bool:
     )
 
 
-def _key_of(keyexpr: str) -> Key[object, object] | None:  # type: ignore[type-var]
+@lru_cache(maxsize=65_536)
+def _key_of(keyexpr: str) -> Key[Any, Any] | None:
     try:
         return key_of(keyexpr.partition("/")[2])
     except ForeignKey:

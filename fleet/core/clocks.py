@@ -1,0 +1,67 @@
+"""The clocks in the state: the fleet's, which may be set back, and one that nobody sets.
+
+A simulation that is started anew begins at 0, and a host's clock may be put right. From there on it
+is another *era*: what is said in it is newer than anything of before, whatever its time, and what
+is under way counts as begun with it.
+"""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from fleet.core import events
+from fleet.core.events import Event
+from fleet.core.state import State
+from fleet.core.state_updates import set_entry
+from fleet.core.table import Table
+from keyexpr_schema.payloads.tasks import TaskState
+
+SINCE_LOGIC = 1
+"""Before this logic of the core, the fleet's clock never went back."""
+SET_BACK_S = 5.0
+"""A clock that is further behind than this [s] was set back; less is two messages in another order,
+or a host's clock that is put right by a little."""
+_ANSWERS = (events.PlanningSucceeded, events.PlanningFailed, events.GoalInterpreted)
+"""They may bear the time of what they answer."""
+
+
+def at_time_of(state: State, event: Event) -> State:
+    """The state at the time of an event, in a new era if need be."""
+    reading_s = event.wall_time_s if event.monotonic_s is None else event.monotonic_s
+    back = event.time_s < state.time_s - SET_BACK_S and not isinstance(event, _ANSWERS)
+    if back and state.logic >= SINCE_LOGIC:
+        state = _new_era(state, event)
+    return replace(
+        state,
+        time_s=max(state.time_s, event.time_s),
+        wall_time_s=max(state.wall_time_s, event.wall_time_s),
+        monotonic_s=max(state.monotonic_s, reading_s),
+        over=(),
+    )
+
+
+def with_clock_of_new_run(state: State, event: events.PlannerStarted) -> State:
+    """A new run of the planner waits anew for robots that are away."""
+    if event.monotonic_s is None:
+        return state
+    gone = Table(dict.fromkeys(state.gone_since, event.monotonic_s))
+    return replace(state, monotonic_s=event.monotonic_s, gone_since=gone)
+
+
+def _new_era(state: State, event: Event) -> State:
+    state = replace(
+        state,
+        era=state.era + 1,
+        time_s=event.time_s,
+        wall_time_s=event.wall_time_s,
+        older_facts=Table(dict.fromkeys(state.facts)),
+    )
+    for entry in state.plans.values():
+        running = {
+            name: replace(record, started_s=event.time_s)
+            for name, record in entry.records.items()
+            if record.state is TaskState.RUNNING
+        }
+        if running:
+            state = set_entry(state, replace(entry, records=entry.records.updated(running)))
+    return state

@@ -1,0 +1,283 @@
+"""What is over, at the planner's shell: archived at once, and answered for later.
+
+The core forgets what is over in the event that ends it. But keys say again what they said, when a
+planner starts or a link comes back, and people ask about plans of yesterday. So an event is shown
+to the archive first: a request that was answered and a goal that was reached are no news, and who
+asks something of a plan that ended hears so from here, not from the core.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterable
+from contextlib import AsyncExitStack, asynccontextmanager
+from sqlite3 import Connection
+from typing import Any, TypeVar
+
+from fleet.core import events
+from fleet.core.effects import Archive as ToArchive
+from fleet.core.effects import Effect, Retract, documents_of
+from fleet.core.events import Event
+from fleet.core.state import State
+from fleet.history.archive import PLAN, Archive
+from fleet.history.queries import page, stats
+from fleet.history.retention import Retention, Retirement
+from fleet.service.outbox import Outbox
+from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.keyspace import (
+    GOAL_STATUS,
+    HISTORY,
+    HISTORY_STATS,
+    RETIREMENT,
+)
+from keyexpr_schema.payloads.goals import GoalAddress, GoalState
+from keyexpr_schema.payloads.history import (
+    Ended,
+    HistoryPage,
+    HistoryQuery,
+    HistoryStats,
+    HistoryStatsQuery,
+    PastEntry,
+    RequestRecord,
+    Retired,
+    RetireQuery,
+)
+from keyexpr_schema.payloads.requests import (
+    Answer,
+    Control,
+    ControlRequest,
+    PlanRequest,
+    ReplanRequest,
+)
+from keyexpr_schema.payloads.system import PlannerAddress
+from keyexpr_schema.transport.session import Session
+
+Request = PlanRequest | ReplanRequest | ControlRequest
+Q = TypeVar("Q")
+R = TypeVar("R")
+RETIRED_AT_ONCE = 50
+"""Of what a person wants deleted; robotctl asks again until nothing is left."""
+EVERY = 2**62
+SETTLE_S = 5.0
+RETRY_S = 0.5
+
+log = logging.getLogger(__name__)
+
+
+class Past:
+    """What one run of the planner does about what is over."""
+
+    def __init__(
+        self,
+        session: Session,
+        archive: Archive,
+        outbox: Outbox,
+        retention: Retention | None,
+        state: Callable[[], State],
+    ) -> None:
+        self._session, self._archive, self._outbox = session, archive, outbox
+        self._state = state
+        self._retirement = Retirement(session, archive, retention or Retention(), self._rejected)
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._settling: set[asyncio.Task[None]] = set()
+
+    @asynccontextmanager
+    async def running(self) -> AsyncIterator[None]:
+        """Tell of what is over, and do what is asked about it, until the block ends."""
+        async with AsyncExitStack() as stack:
+            await stack.enter_async_context(self._session.serve(HISTORY, self._page))
+            await stack.enter_async_context(self._session.serve(HISTORY_STATS, self._stats))
+            await stack.enter_async_context(self._session.serve(RETIREMENT, self._retire))
+            try:
+                yield
+            finally:
+                tasks = list(self._tasks)
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def delete_keys_in_time(self) -> None:
+        """Delete keys when what they are about has been over for long, for ever."""
+        await self._retirement.run()
+
+    def _in_background(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        task = asyncio.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    # --- what becomes over -----------------------------------------------------------------------
+
+    def keep(self, effects: Iterable[Effect]) -> None:
+        """Archive what is over by these effects; it is on disk when this returns."""
+        if records := _records(effects):
+            self._archive.add(records)
+
+    def sent(self, effects: Iterable[Effect]) -> None:
+        """These effects are with the outbox: note when the keys of what is over are as they are
+        to stay."""
+        for record in _records(effects):
+            self._settle_soon(record)
+
+    def publish_unsettled(self) -> None:
+        """What ended shortly before an earlier run did: its keys may not say so yet."""
+        for record in self._archive.unsettled():
+            self._publish(record)
+
+    def _publish(self, record: Ended) -> None:
+        self._outbox.send(documents_of(record))
+        self._settle_soon(record)
+
+    def _settle_soon(self, record: Ended) -> None:
+        task = self._in_background(self._settle(record))
+        self._settling.add(task)
+        task.add_done_callback(self._settling.discard)
+
+    async def _settle(self, record: Ended) -> None:
+        await self._outbox.written(d.key.build(d.address) for d in documents_of(record))
+        self._archive.settle(record)
+        self._retirement.wake()
+
+    # --- what is said about it -------------------------------------------------------------------
+
+    def news(self, event: Event) -> Event | None:
+        """The event, if it is about something that is not over; else it is dealt with."""
+        state = self._state()
+        match event:
+            case events.GoalPut() if event.goal.goal not in state.goals:
+                known = self._archive.goal(event.goal.goal)
+                if known == event.goal:
+                    return None
+                if known is not None:  # its keys are a new goal's now
+                    self._archive.retire_goal(event.goal.goal)
+            case events.GoalDeleted() if event.goal not in state.goals:
+                if not self._retirement.deletes(event.goal) and self._archive.goal(event.goal):
+                    self._archive.retire_goal(event.goal)
+                    self._outbox.send([Retract(GOAL_STATUS, GoalAddress(event.goal))])
+            case events.PlanProposed() if event.plan.plan not in state.plans:
+                return None if self._archive.live_plan(event.plan.plan) is not None else event
+            case events.PlanRequested() | events.ReplanRequested() | events.ControlRequested():
+                ask = event.request
+                if self._archive.answered(ask.request) or self._deal_with(ask, event, state):
+                    return None
+            case _:
+                pass
+        return event
+
+    def _deal_with(self, ask: Request, event: Event, state: State) -> bool:
+        """Answer a request that is about something that is over; whether it is."""
+        over = ask.plan is not None and ask.plan not in state.plans
+        past = self._archive.plan(ask.plan) if over and ask.plan is not None else None
+        if past is not None and isinstance(ask, ControlRequest) and ask.control is Control.DELETE:
+            self._in_background(self._delete(ask, event))
+            return True
+        if (refusal := self._refusal(ask, past, event.wall_time_s, state)) is None:
+            return False
+        self._answer(ask, event, False, refusal)
+        return True
+
+    def _refusal(
+        self, ask: Request, past: PastEntry | None, now_s: float, state: State
+    ) -> str | None:
+        if isinstance(ask, PlanRequest):
+            if ask.plan is not None and past and self._archive.live_plan(ask.plan) is not None:
+                return f"there is a plan {ask.plan} already; choose another name or delete it"
+        elif past is not None:
+            return f"plan {ask.plan} is not running: it {ended(past, now_s)}"
+        for goal in () if isinstance(ask, ControlRequest) else ask.goals:
+            known = None if goal in state.goals else self._archive.past_goal(goal)
+            if known is not None:
+                reason = f": {known.reason}" if known.reason else ""
+                return f"goal {goal} is {known.outcome.value}{reason}"
+        return None
+
+    def _answer(self, ask: Request, event: Event, accepted: bool, sentence: str) -> None:
+        record = RequestRecord(
+            answer=Answer(request=ask.request, accepted=accepted, sentence=sentence),
+            ended_s=event.time_s,
+            ended_wall_s=event.wall_time_s,
+        )
+        self._archive.add([record])
+        self._publish(record)
+
+    async def _delete(self, ask: ControlRequest, event: Event) -> None:
+        """Delete the keys of a plan that is over; until they are, the request has no answer."""
+        await self._settled()
+        while (live := self._archive.live_plan(ask.plan)) is not None:
+            try:
+                await self._retirement.end([live])
+            except SchemaError as error:
+                log.warning("plan %s is not deleted yet: %s", ask.plan, error)
+                await asyncio.sleep(RETRY_S)
+        self._answer(ask, event, True, f"plan {ask.plan} is deleted")
+
+    # --- what is asked of it ---------------------------------------------------------------------
+
+    async def _page(self, _: PlannerAddress, query: HistoryQuery) -> HistoryPage:
+        return await asyncio.to_thread(self._read, page, query)
+
+    async def _stats(self, _: PlannerAddress, query: HistoryStatsQuery) -> HistoryStats:
+        return await asyncio.to_thread(self._read, stats, query)
+
+    def _read(self, read: Callable[[Connection, Q], R], query: Q) -> R:
+        with self._archive.reading() as db:
+            return read(db, query)
+
+    async def _retire(self, _: PlannerAddress, query: RetireQuery) -> Retired:
+        """Delete keys that a person does not want to see any more, some at a time."""
+        await self._settled()
+        before_s = time.time() - query.older_than_s
+        plans = self._archive.due(PLAN, EVERY, before_s, RETIRED_AT_ONCE) if query.plans else []
+        await self._retirement.end(plans)
+        goals = list[str]()
+        if query.goals:
+            goals = [*self._archive.live_goals(before_s), *self._rejected(before_s, EVERY)]
+        now = goals[:RETIRED_AT_ONCE]
+        for goal in now:
+            await self._retirement.end_goal(goal)
+        return Retired(
+            plans=len(plans),
+            goals=sum(len(live.goals) for live in plans) + len(now),
+            left=len(plans) == RETIRED_AT_ONCE or len(goals) > len(now),
+        )
+
+    def _rejected(self, before_wall_s: float, keep: int) -> list[str]:
+        """Goals that were rejected before a Unix time [s], and all but the newest `keep`."""
+        statuses = [
+            status
+            for status in self._state().goal_states.values()
+            if status.state is GoalState.REJECTED
+        ]
+        newest_first = sorted(statuses, key=lambda s: s.wall_time_s or 0.0, reverse=True)
+        return [
+            status.goal
+            for number, status in enumerate(newest_first)
+            if number >= keep
+            or (status.wall_time_s is not None and status.wall_time_s < before_wall_s)
+        ]
+
+    async def _settled(self) -> None:
+        """Wait, for a while, until the keys of what is over have their last values."""
+        if self._settling:
+            await asyncio.wait(tuple(self._settling), timeout=SETTLE_S)
+
+
+def _records(effects: Iterable[Effect]) -> list[Ended]:
+    return [effect.record for effect in effects if isinstance(effect, ToArchive)]
+
+
+def ended(past: PastEntry, now_wall_s: float) -> str:
+    """How a plan ended and how long that is ago: `succeeded 12 s ago`."""
+    outcome = past.outcome.value
+    verb = outcome if outcome in ("succeeded", "failed") else f"was {outcome}"
+    return f"{verb} {_span(now_wall_s - past.ended_wall_s)} ago"
+
+
+def _span(span_s: float) -> str:
+    for unit_s, unit in ((172_800.0, "days"), (7200.0, "h"), (120.0, "min")):
+        if span_s >= unit_s:
+            in_s = {"days": 86_400.0, "h": 3600.0, "min": 60.0}[unit]
+            return f"{span_s / in_s:.0f} {unit}"
+    return f"{max(0.0, span_s):.0f} s"

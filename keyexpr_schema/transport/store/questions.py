@@ -1,0 +1,132 @@
+"""What a store is asked besides for the values of keys, and its answers. No Zenoh here."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Callable
+from typing import Any
+
+from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.key import Key, Payload
+from keyexpr_schema.keyspace import STORE_CHANGES, STORE_JOURNAL, STORE_REPLACE, STORE_STAMPS
+from keyexpr_schema.payloads.system import (
+    JournalEntry,
+    StoreAddress,
+    StoreChanges,
+    StoreChangesQuery,
+    StoredValue,
+    StoreJournal,
+    StoreQuery,
+    StoreReplaced,
+    StoreReplaceQuery,
+    StoreStamps,
+    StoreStampsQuery,
+)
+from keyexpr_schema.transport.samples import text_of_stamp, time_s_of_stamp
+from keyexpr_schema.transport.store.storage import Store, Write, is_stored
+
+_MAX_REPLY = 10_000
+
+
+WriteIf = Callable[[str, str, bytes, Callable[[], bool]], bool]
+
+
+class ClockBehind(Exception):
+    """The store's clock has not reached the stamp of a value that is to be replaced yet."""
+
+    def __init__(self, there: int, now: int) -> None:
+        self.seconds = max(0.001, time_s_of_stamp(there) - time_s_of_stamp(now))
+        super().__init__(f"the store's clock is {self.seconds:.3g} s behind")
+
+
+class StoreQuestions:
+    """Answers for `store`; `keys` are those that it serves, by key expression without realm.
+
+    `write` writes a key (with its encoding and bytes) if a condition on what is stored holds, and
+    says whether it did.
+    """
+
+    def __init__(self, store: Store, write: WriteIf) -> None:
+        self._store, self._write = store, write
+        self._answers: dict[str, Callable[[str, Any], Payload]] = {
+            STORE_JOURNAL.name: self._journal,
+            STORE_STAMPS.name: self._stamps,
+            STORE_REPLACE.name: self._replace,
+            STORE_CHANGES.name: self._changes,
+        }
+        served = (STORE_JOURNAL, STORE_STAMPS, STORE_REPLACE, STORE_CHANGES)
+        self.keys: dict[str, Key[StoreAddress, Any]] = {k.build(StoreAddress()): k for k in served}
+
+    def answer(self, realm: str, key: Key[StoreAddress, Any], asked: Payload) -> Payload:
+        """The answer to `asked`, which came on `key` of that realm."""
+        return self._answers[key.name](realm, asked)
+
+    def _journal(self, realm: str, asked: StoreQuery) -> StoreJournal:
+        limit = max(0, min(asked.limit, _MAX_REPLY))
+        found, last = self._store.journal(realm, asked.after, limit)
+        entries = tuple(
+            JournalEntry(
+                number=one.number,
+                wall_time_s=one.wall_time_s,
+                keyexpr=one.keyexpr.removeprefix(realm + "/"),
+                deleted=one.deleted,
+                timestamp=text_of_stamp(one.stamp),
+                value=None if one.deleted else one.data.decode(errors="replace"),
+            )
+            for one in found
+        )
+        return StoreJournal(entries=entries, last=last)
+
+    def _stamps(self, realm: str, asked: StoreStampsQuery) -> StoreStamps:
+        found = self._store.newest([f"{realm}/{keyexpr}" for keyexpr in asked.keys])
+        return StoreStamps(
+            timestamps=tuple(text_of_stamp(w.stamp) if w is not None else "" for w in found)
+        )
+
+    def _replace(self, realm: str, asked: StoreReplaceQuery) -> StoreReplaced:
+        keyexpr = f"{realm}/{asked.keyexpr}"
+        if "*" in keyexpr or not is_stored(keyexpr):
+            raise SchemaError(f"{asked.keyexpr} is not a key that the store keeps")
+
+        def there() -> Write | None:
+            newest = self._store.newest([keyexpr])[0]
+            return None if newest is None or newest.deleted else newest
+
+        def as_expected() -> bool:
+            found = there()
+            return (text_of_stamp(found.stamp) if found is not None else "") == asked.expected
+
+        try:
+            done = self._write(keyexpr, asked.encoding, asked.value.encode(), as_expected)
+        except ClockBehind as error:
+            return StoreReplaced(done=False, behind_s=error.seconds)
+        if (now := there()) is None:
+            return StoreReplaced(done=done)
+        return StoreReplaced(
+            done=done,
+            timestamp=text_of_stamp(now.stamp),
+            value=now.data.decode(errors="replace"),
+            encoding=now.encoding,
+        )
+
+    def _changes(self, realm: str, asked: StoreChangesQuery) -> StoreChanges:
+        patterns = [f"{realm}/{pattern}" for pattern in asked.patterns]
+        limit = max(1, min(asked.limit, _MAX_REPLY))
+        found = self._store.changes(patterns, asked.position, limit)
+        values = tuple(_stored_value(realm, write) for write in found.writes)
+        return StoreChanges(
+            values=values, position=found.position, whole=found.whole, more=found.more
+        )
+
+
+def _stored_value(realm: str, write: Write) -> StoredValue:
+    keyexpr, timestamp = write.keyexpr[len(realm) + 1 :], text_of_stamp(write.stamp)
+    if write.deleted:
+        return StoredValue(keyexpr=keyexpr, timestamp=timestamp)
+    try:
+        value, base64 = write.data.decode(), False
+    except UnicodeDecodeError:
+        value, base64 = b64encode(write.data).decode(), True
+    return StoredValue(
+        keyexpr=keyexpr, timestamp=timestamp, encoding=write.encoding, value=value, base64=base64
+    )

@@ -1,0 +1,215 @@
+"""The store behind a router: takes in what is put, and answers from a `Store`.
+
+Values flow through: subscriber and queryable feed bounded channels; one thread applies what
+arrived in batches, one answers queries. A query is answered after what arrived before it was
+applied: the answering thread sends a mark through the channel of the values and waits until the
+other one has come to it. So values are applied in the order in which they came, and a client reads
+its own writes. Replies carry the exact stored stamp as text in their attachment, because Python
+cannot rebuild a `zenoh.Timestamp` exactly.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import threading
+import uuid
+from collections.abc import Callable
+from typing import Any
+
+import zenoh
+from zenoh import handlers
+
+from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.key import Key
+from keyexpr_schema.transport.samples import (
+    Encoded,
+    decode_value,
+    reply_encoding_of,
+    stamp_of_text,
+    text_of_stamp,
+    timestamp_of_stamp,
+)
+from keyexpr_schema.transport.store.questions import ClockBehind, StoreQuestions
+from keyexpr_schema.transport.store.storage import Store, Write, is_stored
+from keyexpr_schema.transport.trace import Trace
+
+_log = logging.getLogger(__name__)
+CHANNEL = 10_000
+QUERIES = 64
+"""Queries that are answered after one mark, at most."""
+
+
+class StoreServer:
+    """Subscribes for a `Store` and replies to queries from it, on two threads."""
+
+    def __init__(self, session: zenoh.Session, store: Store) -> None:
+        self._session = session
+        self._store = store
+        self._questions = StoreQuestions(store, self._write)
+        self._applying = threading.Lock()
+        self._mark = f"mark-{uuid.uuid4().hex}"
+        self._marks = 0
+        self._reached = 0
+        self._at_mark = threading.Condition()
+        self._subscriber = session.declare_subscriber("**", handlers.FifoChannel(CHANNEL))
+        # Not complete: a complete queryable on `**` would take queries away from those that
+        # serve a key.
+        self._queryable = session.declare_queryable("**", handlers.FifoChannel(CHANNEL))
+        trace = Trace("store")
+        for keyexpr, key in self._questions.keys.items():
+            trace.note("serve", key, keyexpr)
+        self._writing = threading.Thread(target=self._write_for_ever, name="store-write")
+        self._answering = threading.Thread(target=self._reply_for_ever, name="store-answer")
+        self._writing.start()
+        self._answering.start()
+
+    def close(self) -> None:
+        """Apply what arrived, then end both threads."""
+        self._queryable.undeclare()  # type: ignore[no-untyped-call]
+        self._answering.join()
+        self._subscriber.undeclare()  # type: ignore[no-untyped-call]
+        self._writing.join()
+
+    # --- writing ---------------------------------------------------------------------------------
+
+    def _write_for_ever(self) -> None:
+        while True:
+            try:
+                sample: zenoh.Sample | None = self._subscriber.handler.recv()
+            except zenoh.ZError:
+                return
+            batch: list[Write] = []
+            mark = 0
+            for _ in range(CHANNEL):
+                if sample is None:
+                    break
+                try:
+                    mark = self._collect(sample, batch) or mark
+                except Exception:
+                    _log.exception("the store could not take in what is at %s", sample.key_expr)
+                try:
+                    sample = self._subscriber.handler.try_recv()
+                except zenoh.ZError:
+                    break
+            self._apply(batch)
+            if mark:
+                with self._at_mark:
+                    self._reached = mark
+                    self._at_mark.notify()
+
+    def _apply(self, batch: list[Write]) -> None:
+        """Apply `batch` in one transaction."""
+        try:
+            with self._applying:
+                self._store.apply(batch)
+        except Exception:
+            # Not applied means not confirmed: the writers try again.
+            _log.exception("the store could not apply %d writes", len(batch))
+
+    def _wait_for_what_arrived(self) -> None:
+        """Return when everything is applied that came before this call."""
+        self._marks += 1
+        self._session.put(
+            self._mark, str(self._marks), allowed_destination=zenoh.Locality.SESSION_LOCAL
+        )
+        with self._at_mark:
+            self._at_mark.wait_for(lambda: self._reached >= self._marks)
+
+    def _collect(self, sample: zenoh.Sample, batch: list[Write]) -> int:
+        """Add `sample` to `batch` if it is to be stored; the number of a mark, if it is one."""
+        keyexpr = str(sample.key_expr)
+        if not is_stored(keyexpr):
+            return int(sample.payload.to_string()) if keyexpr == self._mark else 0
+        timestamp = sample.timestamp or self._session.new_timestamp()
+        batch.append(
+            Write(
+                keyexpr,
+                stamp_of_text(str(timestamp)),
+                sample.kind == zenoh.SampleKind.DELETE,
+                str(sample.encoding),
+                sample.payload.to_bytes(),
+            )
+        )
+        return 0
+
+    def _write(self, keyexpr: str, encoding: str, data: bytes, allowed: Callable[[], bool]) -> bool:
+        """Write a key for somebody, if that is `allowed` when nothing else is written; whether.
+
+        Every subscriber sees it as a put of this moment.
+
+        Raises:
+            ClockBehind: whoever wrote it last had a clock ahead of ours.
+            Exception: the store could not write it.
+        """
+        with self._applying:
+            if not allowed():
+                return False
+            newest = self._store.newest([keyexpr])[0]
+            timestamp = self._session.new_timestamp()
+            stamp = stamp_of_text(str(timestamp))
+            if newest is not None and newest.stamp >= stamp:
+                raise ClockBehind(newest.stamp, stamp)
+            self._store.apply([Write(keyexpr, stamp, False, encoding, data)])
+        # Without the lock, and not to ourselves: a full channel would never be emptied.
+        self._session.put(
+            keyexpr,
+            data,
+            encoding=encoding,
+            timestamp=timestamp,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            allowed_destination=zenoh.Locality.REMOTE,
+        )
+        return True
+
+    # --- answering -------------------------------------------------------------------------------
+
+    def _reply_for_ever(self) -> None:
+        while True:
+            queries: list[zenoh.Query] = []
+            try:
+                queries.append(self._queryable.handler.recv())
+                while len(queries) < QUERIES and (more := self._queryable.handler.try_recv()):
+                    queries.append(more)
+            except zenoh.ZError:
+                if not queries:
+                    return
+            self._wait_for_what_arrived()
+            for query in queries:
+                with query:
+                    self._try_to_reply(query)
+
+    def _try_to_reply(self, query: zenoh.Query) -> None:
+        try:
+            self._reply(query)
+        except zenoh.ZError:
+            _log.warning("a reply for %s could not be sent", query.key_expr)
+        except SchemaError as error:
+            with contextlib.suppress(zenoh.ZError):
+                query.reply_err(str(error).encode())
+        except Exception as error:
+            _log.exception("the query for %s failed", query.key_expr)
+            with contextlib.suppress(zenoh.ZError):
+                query.reply_err(f"the store failed: {error}".encode())
+
+    def _reply(self, query: zenoh.Query) -> None:
+        keyexpr = str(query.key_expr)
+        realm, _, rest = keyexpr.partition("/")
+        if (key := self._questions.keys.get(rest)) is not None:
+            self._answer(query, realm, key)
+            return
+        for write in self._store.select(keyexpr):
+            query.reply(
+                write.keyexpr,
+                write.data,
+                encoding=write.encoding,
+                timestamp=timestamp_of_stamp(write.stamp),
+                attachment=text_of_stamp(write.stamp),
+            )
+
+    def _answer(self, query: zenoh.Query, realm: str, key: Key[Any, Any]) -> None:
+        keyexpr = str(query.key_expr)
+        data = query.payload.to_bytes() if query.payload is not None else b"{}"
+        asked = decode_value(key, Encoded(keyexpr, data, str(query.encoding or "")))
+        answer = key.encode(self._questions.answer(realm, key, asked))
+        query.reply(keyexpr, answer, encoding=reply_encoding_of(key))

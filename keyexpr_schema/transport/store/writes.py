@@ -1,0 +1,145 @@
+"""Writes that count when the store has them: sent together, confirmed by one question.
+
+Whatever waits when the link's turn comes is put, and the store is asked behind it which stamps
+those keys hold now; it answers after what arrived before was applied and is on disk. A write whose
+stamp is not there yet is put again with the same stamp, which does no harm. With a zenohd storage,
+which answers no such question, each write is read back instead.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Awaitable, Callable, Sequence
+
+from keyexpr_schema.errors import Overtaken
+from keyexpr_schema.transport.link import Link, Put
+from keyexpr_schema.transport.samples import (
+    Sample,
+    source_of_stamp,
+    stamp_of_text,
+    text_of_stamp,
+    time_s_of_stamp,
+)
+
+TOGETHER = 256
+"""Writes of one question at most, so that the first do not wait long for the last."""
+ANSWER_S = 2.0
+"""How long a store may take for one question, before the writes are put again."""
+_PAUSE_S = 0.0005
+_LONGEST_PAUSE_S = 0.05
+
+Ask = Callable[[Sequence[Put], float], Awaitable[tuple[str, ...] | None]]
+ReadBack = Callable[[str, float], Awaitable[tuple[Sample, ...]]]
+
+
+class _Write:
+    """A put on its way, and who waits for it."""
+
+    __slots__ = ("confirmed", "put", "text")
+
+    def __init__(self, put: Put, confirmed: asyncio.Future[None]) -> None:
+        self.put, self.confirmed = put, confirmed
+        self.text = str(put.timestamp)
+
+    def judge(self, newest: str) -> bool:
+        """Tell who waits what became of it, the key's newest stamp being `newest`.
+
+        False: the write has not arrived.
+        """
+        if self.confirmed.done():
+            return True
+        if newest != self.text:
+            ours = stamp_of_text(self.text)
+            there = stamp_of_text(newest) if newest else 0
+            if there < ours:
+                return False
+            # What this session itself wrote later is no surprise to it.
+            if source_of_stamp(there) != source_of_stamp(ours):
+                self.confirmed.set_exception(_overtaken(self.put.keyexpr, ours, there))
+                return True
+        self.confirmed.set_result(None)
+        return True
+
+
+def _overtaken(keyexpr: str, ours: int, there: int) -> Overtaken:
+    ahead_s = time_s_of_stamp(there) - time_s_of_stamp(ours)
+    return Overtaken(
+        f"{keyexpr} was not written: somebody else's write of it has a stamp "
+        f"{ahead_s:.3f} s later; if nobody wrote it just now, the clock of this host is behind"
+    )
+
+
+class ConfirmedWrites:
+    """Puts what must last, and confirms all that waits by one question.
+
+    `ask` puts writes and brings the newest stamps of their keys, None where no store answers such
+    a question; `read_back` brings the values at a key, after it proved that a store is there.
+    """
+
+    def __init__(self, link: Link, ask: Ask, read_back: ReadBack) -> None:
+        self._link, self._ask, self._read_back = link, ask, read_back
+        self._waiting: deque[_Write] = deque()
+        self._open = 0
+        self._sender: asyncio.Task[None] | None = None
+
+    async def confirmed(self, put: Put) -> None:
+        """Return when the store has exactly this write, or a later one of this session.
+
+        Raises:
+            Overtaken: somebody else's write of the same key has a later stamp.
+        """
+        write = _Write(put, asyncio.get_running_loop().create_future())
+        self._waiting.append(write)
+        self._open += 1
+        if self._sender is None or self._sender.done():
+            self._sender = asyncio.create_task(self._send_all())
+        try:
+            await write.confirmed
+        finally:
+            self._open -= 1
+            write.confirmed.cancel()
+            if not self._open and self._sender is not None:
+                self._sender.cancel()
+                self._sender = None
+
+    async def _send_all(self) -> None:
+        pause_s = _PAUSE_S
+        while self._waiting:
+            await self._link.router.wait_up()
+            waiting = [self._waiting.popleft() for _ in range(min(TOGETHER, len(self._waiting)))]
+            batch = [write for write in waiting if not write.confirmed.done()]
+            try:
+                missing = await self._send(batch)
+            except Exception as error:
+                for write in batch:
+                    if not write.confirmed.done():
+                        write.confirmed.set_exception(error)
+                continue
+            self._waiting.extendleft(reversed(missing))
+            if missing:
+                await asyncio.sleep(pause_s)
+                pause_s = min(_LONGEST_PAUSE_S, 2 * pause_s)
+            else:
+                pause_s = _PAUSE_S
+
+    async def _send(self, batch: Sequence[_Write]) -> list[_Write]:
+        """Put these; those that have not arrived."""
+        generation = self._link.router.generation
+        newest = await self._ask([write.put for write in batch], ANSWER_S)
+        if newest is None:
+            arrived = await asyncio.gather(*(self._found(write, generation) for write in batch))
+        else:
+            arrived = [write.judge(each) for write, each in zip(batch, newest, strict=True)]
+        return [write for write, there in zip(batch, arrived, strict=True) if not there]
+
+    async def _found(self, write: _Write, generation: int) -> bool:
+        """Read one back from a storage that only keeps values."""
+        samples = await self._read_back(write.put.keyexpr, ANSWER_S)
+        if samples:
+            stamp = max(sample.stamp for sample in samples)
+            return write.judge(text_of_stamp(stamp))
+        # Absent proves the deletion only where the query followed it down one link.
+        if write.put.data is None and self._link.router.generation == generation:
+            return write.judge(write.text)
+        return False

@@ -1,0 +1,106 @@
+"""The scale benchmarks: errands come to their end in memory, and the page says what came of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks.scale import report
+from benchmarks.scale.core_run import CoreRun
+from benchmarks.scale.errands import Errands
+from benchmarks.scale.soak import Lived, summed_up
+from benchmarks.tables import as_json
+from keyexpr_schema.payloads.plans import PlanState
+
+TWO = {"p50": 2.0, "p99": 4.0, "most": 5.0}
+ONE = {"p50": 1.0, "p99": 3.0, "most": 3.0}
+
+
+def about(*rows: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "command": "c", "machine": "m", "commit": "abc", "load_before": 0.5, "load_after": 0.7,
+        "took_s": 1.0, "results": rows,
+    }  # fmt: skip
+
+
+CORE = {
+    "robots": 1000, "tasks": 10_000, "taken_over_s": 0.5, "done": 10_000, "worked_s": 20.0,
+    "tasks_a_second": 500.0, "finished": True, "started_ms": TWO, "succeeded_ms": TWO,
+}  # fmt: skip
+CUT_OFF = {
+    "robots": 50, "tasks": 10_000, "planned_s": 3.0, "done": 120, "worked_s": 60.0,
+    "tasks_a_second": 2.0, "finished": False,
+}  # fmt: skip
+DISPATCH = {
+    "planning": False, "robots": 50, "tasks": 1000, "orders": 950, "order_ms": TWO, "raw_ms": ONE,
+}  # fmt: skip
+GOALS = [
+    {"way": "step", "goals": goals, "told": told, "took_s": 0.1}
+    for goals, told in ((1000, 1000), (10_000, 4000))
+]
+RESTART = {"what": "missions lived", "number": 338, "ready_s": None}
+
+
+@pytest.mark.parametrize("robots", [2, 3, 10])
+def test_errands_are_done_and_wait_for_what_they_say(robots: int) -> None:
+    run = CoreRun(robots)
+    wanted = run.begin("p", range(7))
+    order = [event.report.task for event in run.waiting if hasattr(event, "report")]
+    assert {wanted.predecessor(task) for task in order} == {None}
+    run.work()
+    assert run.plans["p"] is PlanState.SUCCEEDED
+    assert run.succeeded["p"] == wanted.tasks == 28
+
+
+def test_plans_are_lived_through_one_after_the_other() -> None:
+    run = CoreRun(robots=2)
+    run.live(3, first=0, goals=2)
+    assert list(run.plans.values()) == [PlanState.SUCCEEDED] * 3
+
+
+def test_what_a_task_waits_for_is_what_the_plan_says() -> None:
+    wanted = Errands("p", range(5), robots=2)
+    made = wanted.made(1, {"time_s": 0.0, "wall_time_s": 0.0})
+    for task in made.plan.tasks:
+        before = (*task.after, *made.extra_after.get(task.task, ()))
+        assert before == tuple(filter(None, [wanted.predecessor(task.task)]))
+
+
+def test_the_page_says_what_was_measured_before_and_now(tmp_path: Path) -> None:
+    now = {
+        "core": about(CORE),
+        "keys": about(CUT_OFF),
+        "dispatch": about(DISPATCH),
+        "goals": about(*GOALS),
+        "restart": about(RESTART),
+    }
+    before = {"core": about({**CORE, "tasks_a_second": 9.0, "finished": False, "done": 77})}
+    for name, parts in (("scale.json", now), ("scale-before.json", before)):
+        (tmp_path / name).write_text(as_json(parts), encoding="utf-8")
+    report.write(tmp_path)
+    page = (tmp_path / "scale.md").read_text(encoding="utf-8")
+    assert "| - · - · 9 (of 77, then cut off) | - · - · 500 | 0.5, 0.7 |" in page
+    assert "not finished in 60 s, 120 tasks done" in page
+    assert "p50 2.0, p99 4.0 ms; p50 2.0 x Zenoh's 1.00" in page
+    assert "0.10 s · cut off at 4,000" in page
+    assert "338: not in 60 s" in page
+    assert page.count("`c` at commit abc: 1 s on m; load average 0.5 before, 0.7 after.") == 6
+    assert "{" not in page
+    assert (tmp_path / "scale.png").stat().st_size > 5000
+
+
+def test_a_long_life_is_summed_up_without_what_follows_a_restart() -> None:
+    def lived(mission: int, took_s: float, restarted: str | None = None) -> Lived:
+        each = dict.fromkeys(("planner", "router", "workers", "sim"), took_s)
+        files = dict.fromkeys(("planner", "history", "store", "workers", "logs"), 1.0)
+        return Lived(mission, took_s, each, each, files, restarted, 0.5 if restarted else None)
+
+    rows = summed_up([lived(n, 9.0 if n == 5 else 1.0, "planner" if n == 5 else None)
+                      for n in range(30)])  # fmt: skip
+    assert len(rows) == 10
+    assert [row["took_s"] for row in rows] == [1.0] * 10
+    assert rows[1]["worst_s"] == 9.0
+    assert rows[1]["planner_ready_s"] == 0.5
+    assert rows[0]["planner_ready_s"] is None

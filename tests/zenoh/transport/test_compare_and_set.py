@@ -1,0 +1,166 @@
+"""Of several who write the same key at once one succeeds, and the others hear it."""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import AsyncExitStack
+
+import pytest
+from msgspec.structs import replace
+
+from keyexpr_schema.errors import NoReply, Unconfirmed
+from keyexpr_schema.keyspace import GOAL_SPEC, PLANNER_STATUS, STORE_REPLACE
+from keyexpr_schema.payloads.goals import GoalAddress
+from keyexpr_schema.payloads.system import (
+    PlannerAddress,
+    PlannerStatus,
+    StoreAddress,
+    StoreReplaceQuery,
+)
+from keyexpr_schema.transport.link import Link, Put, Replies
+from keyexpr_schema.transport.samples import stamp_of_text, timestamp_of_stamp
+from keyexpr_schema.transport.session import SessionConfig, open_session
+from tests.support.plain_storage import plain_storage
+from tests.support.polling import until
+from tests.support.session_values import goal, not_connected, take
+
+G1 = GoalAddress("g1")
+CLAIM = PlannerAddress()
+
+
+async def test_of_many_who_create_the_same_key_exactly_one_succeeds(session_config):
+    async with AsyncExitStack() as stack:
+        sessions = [
+            await stack.enter_async_context(open_session(session_config())) for _ in range(12)
+        ]
+        for round_number in range(20):
+            address = GoalAddress(f"g{round_number}")
+            done = await asyncio.gather(
+                *(
+                    s.create(GOAL_SPEC, address, goal(address.goal, f"wish {number}"))
+                    for number, s in enumerate(sessions)
+                )
+            )
+            assert done.count(True) == 1
+            stored = await sessions[0].get(GOAL_SPEC, address)
+            assert stored == goal(address.goal, f"wish {done.index(True)}")
+
+
+async def test_no_update_of_many_is_lost(session_config):
+    """Each of ten sessions raises the epoch ten times; all rises are there, none twice."""
+
+    def higher(name: str):
+        return lambda seen: PlannerStatus(epoch=1 + (seen.epoch if seen else 0), incarnation=name)
+
+    async with AsyncExitStack() as stack:
+        sessions = [
+            await stack.enter_async_context(open_session(session_config())) for _ in range(10)
+        ]
+
+        async def rise(number: int) -> list[int]:
+            session = sessions[number]
+            return [
+                (await session.update(PLANNER_STATUS, CLAIM, higher(f"p{number}"), 60.0)).epoch
+                for _ in range(10)
+            ]
+
+        epochs = await asyncio.gather(*map(rise, range(10)))
+        assert sorted(epoch for each in epochs for epoch in each) == list(range(1, 101))
+
+
+async def test_subscribers_see_it_as_a_put_and_a_deleted_name_is_free_again(session_config):
+    async with open_session(session_config()) as one, open_session(session_config()) as other:
+        async with other.watch(GOAL_SPEC) as watch:
+            await watch.synced()
+            assert await one.create(GOAL_SPEC, G1, goal("g1", "first"))
+            assert not await one.create(GOAL_SPEC, G1, goal("g1", "first"))
+            await other.delete(GOAL_SPEC, G1)
+            assert await one.create(GOAL_SPEC, G1, goal("g1", "second"))
+            # It is a value like any other.
+            await other.confirm(GOAL_SPEC, G1, goal("g1", "third"))
+            changes = await take(watch, 4)
+        assert [c.value and c.value.text for c in changes] == ["first", None, "second", "third"]
+
+
+async def test_what_does_not_decode_is_replaced_all_the_same(session_config):
+    async with open_session(session_config()) as session:
+        stamp = session.link.new_timestamp()
+        await session.link.send(Put(PLANNER_STATUS.build(CLAIM), b"nonsense", "", stamp))
+        first = PlannerStatus(epoch=3, incarnation="a")
+        seen: list[PlannerStatus | None] = []
+
+        def change(status: PlannerStatus | None) -> PlannerStatus:
+            seen.append(status)
+            return first
+
+        assert await session.update(PLANNER_STATUS, CLAIM, change) == first
+        assert await session.get(PLANNER_STATUS, CLAIM) == first
+        assert seen == [None]
+
+
+async def test_an_answer_that_was_lost_is_asked_for_again(router, session_config, monkeypatch):
+    """The store has written it, and then the router dies before it can say so."""
+    async with open_session(session_config()) as session:
+        query = Link.query
+
+        async def lost_once(self, keyexpr, *args, **kwargs):
+            replies = await query(self, keyexpr, *args, **kwargs)
+            if keyexpr != STORE_REPLACE.build(StoreAddress()):
+                return replies
+            monkeypatch.setattr(Link, "query", query)
+            router.restart()
+            await until(lambda: connected(session))
+            return Replies(timed_out=True)
+
+        monkeypatch.setattr(Link, "query", lost_once)
+        assert await session.create(GOAL_SPEC, G1, goal("g1"), 30.0)
+        assert await session.get(GOAL_SPEC, G1) == goal("g1")
+        assert not await session.create(GOAL_SPEC, G1, goal("g1"))
+
+
+async def connected(session) -> bool:
+    return session.connected
+
+
+async def test_a_clock_that_is_a_little_ahead_is_waited_for_and_one_far_ahead_is_told(
+    router, session_config
+):
+    async with open_session(session_config()) as session:
+        for ahead_s, name in ((0.3, "g1"), (90.0, "g2")):
+            stamp = stamp_of_text(str(session.link.new_timestamp())) + (int(ahead_s * 2**32) << 128)
+            keyexpr = GOAL_SPEC.build(GoalAddress(name))
+            await session.link.send(Put(keyexpr, None, "", timestamp_of_stamp(stamp)))
+        assert await session.create(GOAL_SPEC, G1, goal("g1"))
+        with pytest.raises(Unconfirmed, match=r"a clock that is \S+ s ahead of the router's"):
+            await session.create(GOAL_SPEC, GoalAddress("g2"), goal("g2"))
+
+
+async def test_what_is_not_stored_cannot_be_replaced(session_config):
+    async with open_session(session_config()) as session:
+        for keyexpr in ("sim/clock", "goals/*/spec", "nonsense"):
+            asked = StoreReplaceQuery(keyexpr=keyexpr, value="{}")
+            with pytest.raises(NoReply, match="is not a key that the store keeps"):
+                await session.query(STORE_REPLACE, StoreAddress(), asked)
+
+
+async def test_without_its_router_it_says_so(router, session_config):
+    async with open_session(session_config()) as session:
+        router.kill()
+        await until(lambda: not_connected(session))
+        with pytest.raises(Unconfirmed, match="no router answers"):
+            await session.create(GOAL_SPEC, G1, goal("g1"), 0.3)
+
+
+async def test_with_a_storage_of_zenohd_it_is_looked_at_put_and_read_back():
+    async with plain_storage() as (endpoint, _):
+        config = SessionConfig((endpoint,))
+        async with open_session(config) as one, open_session(config) as other:
+            assert await one.create(GOAL_SPEC, G1, goal("g1", "first"))
+            assert not await other.create(GOAL_SPEC, G1, goal("g1", "second"))
+            assert await other.get(GOAL_SPEC, G1) == goal("g1", "first")
+            status = PlannerStatus(epoch=1, incarnation="a")
+            await one.update(PLANNER_STATUS, CLAIM, lambda seen: status)
+            higher = await other.update(
+                PLANNER_STATUS, CLAIM, lambda seen: replace(seen or status, epoch=2)
+            )
+            assert await one.get(PLANNER_STATUS, CLAIM) == higher

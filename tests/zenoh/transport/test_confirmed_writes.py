@@ -1,0 +1,144 @@
+"""A confirmed write is exactly that one; many cost one question; the overtaken hear of it."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from keyexpr_schema.errors import Overtaken, Unconfirmed
+from keyexpr_schema.keyspace import GOAL_SPEC, STORE_JOURNAL, STORE_STAMPS
+from keyexpr_schema.payloads.goals import GoalAddress
+from keyexpr_schema.payloads.system import StoreAddress, StoreQuery, StoreStampsQuery
+from keyexpr_schema.transport.link import Link, Put
+from keyexpr_schema.transport.samples import stamp_of_text, timestamp_of_stamp
+from keyexpr_schema.transport.session import Session, SessionConfig, open_session
+from tests.support.plain_storage import plain_storage
+from tests.support.polling import until
+from tests.support.session_values import goal
+
+G1 = GoalAddress("g1")
+KEYEXPR = GOAL_SPEC.build(G1)
+
+
+def counted_questions(monkeypatch) -> list[str]:
+    """Fills with the key of every query that any session of this process sends."""
+    asked: list[str] = []
+    query = Link.query
+
+    async def counted(self, keyexpr, *args, **kwargs):
+        asked.append(keyexpr)
+        return await query(self, keyexpr, *args, **kwargs)
+
+    monkeypatch.setattr(Link, "query", counted)
+    return asked
+
+
+def behind(session: Session, monkeypatch, seconds: float) -> None:
+    """Set the clock back by which this session stamps what it writes."""
+    now = session.link.new_timestamp
+
+    def earlier():
+        return timestamp_of_stamp(stamp_of_text(str(now())) - (int(seconds * 2**32) << 128))
+
+    monkeypatch.setattr(session.link, "new_timestamp", earlier)
+
+
+async def test_writes_that_wait_together_cost_one_question(session_config, monkeypatch):
+    async with open_session(session_config()) as session:
+        await session.confirm(GOAL_SPEC, G1, goal("g1"))
+        asked = counted_questions(monkeypatch)
+        names = [f"g{number}" for number in range(100)]
+        await asyncio.gather(
+            *(session.confirm(GOAL_SPEC, GoalAddress(name), goal(name)) for name in names),
+            session.delete(GOAL_SPEC, GoalAddress("none")),
+        )
+        assert asked == [STORE_STAMPS.build(StoreAddress())]
+        monkeypatch.undo()
+        assert len(await session.list(GOAL_SPEC)) == 100
+
+
+async def test_a_writer_whose_clock_is_behind_hears_that_it_was_overtaken(
+    session_config, monkeypatch
+):
+    async with open_session(session_config()) as early, open_session(session_config()) as late:
+        await early.confirm(GOAL_SPEC, G1, goal("g1", "first"))
+        behind(late, monkeypatch, 3600)
+        with pytest.raises(Overtaken, match=r"goals/g1/spec was not written: .* 3\d\d\d\.\d* s"):
+            await late.confirm(GOAL_SPEC, G1, goal("g1", "second"))
+        with pytest.raises(Overtaken):
+            await late.delete(GOAL_SPEC, G1)
+        # What nobody has written yet it can write.
+        await late.confirm(GOAL_SPEC, GoalAddress("g2"), goal("g2"))
+        assert await late.get(GOAL_SPEC, G1) == goal("g1", "first")
+        # A deletion overtakes, too.
+        await early.delete(GOAL_SPEC, G1)
+        with pytest.raises(Overtaken):
+            await late.confirm(GOAL_SPEC, G1, goal("g1", "third"))
+
+
+async def test_a_value_that_its_own_session_has_replaced_is_confirmed(session_config):
+    async with open_session(session_config()) as session:
+        writes = [session.confirm(GOAL_SPEC, G1, goal("g1", f"text {n}")) for n in range(50)]
+        await asyncio.gather(*writes)
+        assert await session.get(GOAL_SPEC, G1) == goal("g1", "text 49")
+
+
+async def test_putting_again_with_the_same_stamp_changes_nothing(session_config):
+    async with open_session(session_config()) as session:
+        put = Put(KEYEXPR, b"{}", "application/json", session.link.new_timestamp())
+        for _ in range(3):
+            await session.link.send(put)
+        await session.confirm(GOAL_SPEC, GoalAddress("g2"), goal("g2"))
+        journal = await session.query(STORE_JOURNAL, StoreAddress(), StoreQuery())
+        assert [e.keyexpr for e in journal.entries] == [KEYEXPR, "goals/g2/spec"]
+
+
+async def test_the_store_tells_what_is_not_there(session_config):
+    async with open_session(session_config()) as session:
+        await session.confirm(GOAL_SPEC, G1, goal("g1"))
+        asked = StoreStampsQuery(keys=(KEYEXPR, "goals/g9/spec"))
+        found = (await session.query(STORE_STAMPS, StoreAddress(), asked)).timestamps
+        (stored,) = (await session.link.query(KEYEXPR, 5.0)).values
+        assert [stamp_of_text(found[0]), found[1]] == [stored.stamp, ""]
+
+
+async def test_a_storage_of_zenohd_is_read_back(monkeypatch):
+    async with plain_storage() as (endpoint, storage):
+        config = SessionConfig((endpoint,))
+        async with open_session(config) as early, open_session(config) as late:
+            await early.confirm(GOAL_SPEC, G1, goal("g1", "first"))
+            assert await early.get(GOAL_SPEC, G1) == goal("g1", "first")
+            assert await early.list(GOAL_SPEC) == {G1: goal("g1", "first")}
+            await asyncio.gather(
+                *(early.confirm(GOAL_SPEC, GoalAddress(f"n{n}"), goal(f"n{n}")) for n in range(20))
+            )
+            assert len(await early.list(GOAL_SPEC)) == 21
+            behind(late, monkeypatch, 3600)
+            with pytest.raises(Overtaken):
+                await late.confirm(GOAL_SPEC, G1, goal("g1", "second"))
+            with pytest.raises(Overtaken):
+                await late.delete(GOAL_SPEC, G1)
+            await early.delete(GOAL_SPEC, G1)
+            assert await early.get(GOAL_SPEC, G1) is None
+            assert storage.gets > 20
+
+
+async def test_who_gives_up_waiting_leaves_the_others_alone(router, session_config):
+    async with open_session(session_config()) as session:
+        router.freeze()
+        impatient = asyncio.create_task(session.confirm(GOAL_SPEC, G1, goal("g1"), 0.05))
+        patient = asyncio.create_task(session.confirm(GOAL_SPEC, GoalAddress("g2"), goal("g2"), 30))
+        with pytest.raises(Unconfirmed):
+            await impatient
+        # The last to wait is gone, and then there is another one.
+        patient.cancel()
+        await asyncio.gather(patient, return_exceptions=True)
+        third = asyncio.create_task(session.confirm(GOAL_SPEC, GoalAddress("g3"), goal("g3"), 30))
+        router.thaw()
+        await third
+
+        async def stored() -> bool:
+            return GoalAddress("g3") in await session.list(GOAL_SPEC, 10.0)
+
+        await until(stored)

@@ -301,6 +301,12 @@ def set_late_bound(state: State, entry: PlanEntry, late_s: float) -> State:
     return replace(state, plans=state.plans.set(entry.plan.plan, entry))
 
 
+def set_given_out(state: State, entry: PlanEntry, task: str) -> State:
+    """Note that a task was ordered while the plan's job is in work; this has no other effect."""
+    entry = replace(entry, given_out=entry.given_out.set(task, None))
+    return replace(state, plans=state.plans.set(entry.plan.plan, entry))
+
+
 def cancel(state: State, entry: PlanEntry) -> State:
     """Begin to cancel a plan; a planning job under way counts no more."""
     name = entry.plan.plan

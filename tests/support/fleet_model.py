@@ -114,6 +114,8 @@ class FleetModel:
             old = before.plans.get(plan)
             if old is not None and entry.plan.revision > old.plan.revision:
                 check_revision(old, entry)
+                self.met["ordered meanwhile, and goes on"] += check_given_out(old, entry)
+            self.met["discarded"] += old is not None and entry.discarded > old.discarded
         self._take(effects)
 
     def _take(self, effects: tuple[Effect, ...]) -> None:
@@ -175,6 +177,7 @@ class FleetModel:
         entry = self.state.plans[order.plan]
         record = entry.records[order.task]
         if new:
+            self.met["ordered while a plan was made"] += entry.job is not None
             assert record.goal in (None, *self.state.goals), "ordered for a goal that is no more"
         for before in (*record.after, *record.behind):
             if before in entry.records:
@@ -347,6 +350,20 @@ def check_revision(old: PlanEntry, new: PlanEntry) -> None:
         was, now = old.records[name], new.records[name]
         if was.state in OUTSTANDING and now.state in OUTSTANDING:
             assert (was.robot, was.attempt) == (now.robot, now.attempt), "running work disturbed"
+
+
+def check_given_out(old: PlanEntry, new: PlanEntry) -> bool:
+    """What was ordered while the revision was made is part of it; says whether there was any."""
+    asked_for = set(old.job.under_way if old.job is not None else ())
+    given_out = [
+        name
+        for name in old.given_out.keys() - asked_for - set(old.unwanted)
+        if old.records[name].state in {TaskState.SUCCEEDED, *OUTSTANDING}
+    ]
+    names = {task.task for task in new.plan.tasks}
+    assert names.issuperset(given_out), "done, and not in the plan: it would be done again"
+    assert not set(given_out) & set(new.unwanted), "given out, and cancelled at once"
+    return bool(given_out)
 
 
 def _robots(order: Order, state: State) -> set[str]:

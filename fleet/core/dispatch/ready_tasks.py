@@ -16,7 +16,7 @@ from fleet.core.model.skills import Action
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import give_up, set_entry, set_record
+from fleet.core.state_updates import give_up, set_entry, set_given_out, set_record
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import TaskState
@@ -93,8 +93,8 @@ def order_if_ready(state: State, plan: str, task: str, reservations: bool = True
         way_s=_way_s(state, action),
     )
     if entry.job is not None:
-        entry = replace(entry, given_out=entry.given_out.set(record.task, None))
-    return set_record(state, entry, ordered)
+        state = set_given_out(state, entry, task)
+    return set_record(state, state.plans[plan], ordered)
 
 
 def _touches_unwanted_work(state: State, action: Action) -> bool:

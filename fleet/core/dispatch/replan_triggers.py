@@ -26,7 +26,7 @@ def contradicted(state: State, entry: PlanEntry, fact: Fact) -> PlanEntry | None
     otherwise, and nothing before it changes it.
 
     What a robot says of the work it is doing is part of that work. So is what anybody says that
-    the work is just making true, and what was so before it began and is heard of only now.
+    the work is just making true, or that it found when it began and is heard of only now.
     """
     known = fact.key
     for task in entry.index.exposed.get(known, ()):
@@ -57,13 +57,12 @@ def _is_being_made(state: State, entry: PlanEntry, fact: Fact) -> bool:
 
 
 def _is_of_its_making(record: TaskRecord, action: Action, fact: Fact) -> bool:
-    """Whether a fact says what a task under way makes true, or is from before the task began."""
-    if fact.key not in action.variables:
-        return False
+    """Whether a fact says what a task under way makes true, or what it found when it began."""
+    said = (fact.key, fact.value)
+    if said in action.after:
+        return True
     begun_s = record.ordered_s if record.started_s is None else record.started_s
-    return (begun_s is not None and fact.time_s < begun_s) or any(
-        literal == (fact.key, fact.value) for literal in action.after
-    )
+    return said in action.before and begun_s is not None and 0.0 < fact.time_s < begun_s
 
 
 def unforeseen(state: State, entry: PlanEntry) -> PlanEntry | None:

@@ -23,7 +23,7 @@ from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
-LOGIC = 1
+LOGIC = 2
 """Counts up whenever the core comes to handle an event otherwise than before."""
 
 
@@ -122,7 +122,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             places=self.places,
             objects=self.objects,
             robots=self.robots,
-            available=frozenset(self.index.team),
+            available=self.index.available,
             facts=FactValues(self.facts),
             durations=self.durations,
         )

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import asyncio
+<<<<<<< HEAD
+from collections.abc import AsyncIterator, Callable
+=======
 from collections.abc import AsyncIterator, Collection, Iterator
+>>>>>>> next
 from typing import Any
 
 from fleet.core.effects import Publish, Retract, effects_of
 from fleet.core.events import At, PriorStateLoaded
 from fleet.core.state import State
+<<<<<<< HEAD
+=======
 from fleet.service.event_translation import WATCHED
 from keyexpr_schema.facts import FactKey
+>>>>>>> next
 from keyexpr_schema.key import Address, Key
 from keyexpr_schema.keyspace import (
-    ANSWER,
     DURATIONS,
     FACT,
     GOAL_SPEC,
@@ -70,16 +76,12 @@ def in_order(changes: list[Change[Any, Any]]) -> list[Change[Any, Any]]:
 
 
 async def prior_state(session: Session, at: At) -> PriorStateLoaded:
-    """Without a journal: what an earlier planner answered and ended is not done again, and what it
+    """Without a journal: names that an earlier planner gave are not given again, and what it
     learned is not forgotten."""
-    answers = await session.list(ANSWER)
-    goals = await session.list(GOAL_STATUS)
     plans = await session.list(PLAN_STATUS)
     durations = await session.list(DURATIONS)
     statements = await session.list(STATEMENT_STATUS)
     return PriorStateLoaded(
-        answers=tuple(answers.values()),
-        goals=tuple(goals.values()),
         plans=tuple(address.plan for address in plans),
         statements=tuple(statements.values()),
         durations=tuple(durations.values()),
@@ -87,8 +89,16 @@ async def prior_state(session: Session, at: At) -> PriorStateLoaded:
     )
 
 
+<<<<<<< HEAD
+async def stale_documents(
+    session: Session, state: State, is_over: Callable[[Address], bool]
+) -> list[Retract]:
+    """Documents of the planner in the store that the state does not have, and of nothing that is
+    over: that keeps its keys for a while.
+=======
 async def stale_documents(session: Session, state: State, *, all_of_them: bool) -> list[Retract]:
     """Documents of the planner in the store that the state does not have.
+>>>>>>> next
 
     Orders, whatever happened: nobody would ever follow them up, and there are no more of them than
     there is work under way. All others only where the journal is lost: with a journal there are
@@ -101,10 +111,16 @@ async def stale_documents(session: Session, state: State, *, all_of_them: bool) 
     }
     return [
         Retract(key, address)
+<<<<<<< HEAD
+        for key in OWN
+        for address in await session.list(key, timeout_s=60.0)
+        if key.build(address) not in wanted and (key is ORDER or not is_over(address))
+=======
         for key in (ORDER, *(OWN if all_of_them else ()))
         for address in await session.list(key)
         if key.build(address) not in wanted
         and (key is ORDER or getattr(address, "plan", None) not in state.past_plans)
+>>>>>>> next
     ]
 
 

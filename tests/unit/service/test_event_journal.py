@@ -14,9 +14,15 @@ from fleet.core.plan_entry import PlanEntry, PlanningJob, PlanOutcome
 from fleet.core.replan_reasons import ReplanReason
 from fleet.core.state import LOGIC, Policy, State
 from fleet.core.step import replay, step
+<<<<<<< HEAD
+from fleet.service import event_journal
+from fleet.service.event_journal import SNAPSHOT_FORMAT, EventJournal, JournalInUse
+from keyexpr_schema.payloads.history import RequestRecord
+=======
 from fleet.service.event_journal import EventJournal, JournalInUse, JournalUnreadable
 from fleet.service.recovery import recover
 from fleet.service.snapshots import SNAPSHOT_FORMAT, Snapshot
+>>>>>>> next
 from keyexpr_schema.payloads.plans import PlanState
 from tests.replay.journal_files import HERE, events_in
 from tests.support.fleet_model import FleetModel
@@ -191,7 +197,9 @@ def test_a_snapshot_from_before_wishes_is_gone_on_from(
     assert len(entry.open_reasons) == open_now
     if name == "task-being-added":
         assert entry.state is PlanState.RUNNING
-        assert state.answers["c"].sentence == "the task was not added: no way"
+        (answered,) = (r for r in state.over if isinstance(r, RequestRecord))
+        assert answered.answer.request == "c"
+        assert answered.answer.sentence == "the task was not added: no way"
 
 
 def test_the_format_counts_up_when_a_field_of_the_state_gets_another_name() -> None:

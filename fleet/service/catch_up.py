@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-<<<<<<< HEAD
-from collections.abc import AsyncIterator, Callable
-=======
-from collections.abc import AsyncIterator, Collection, Iterator
->>>>>>> next
+from collections.abc import AsyncIterator, Callable, Collection, Iterator
 from typing import Any
 
 from fleet.core.effects import Publish, Retract, effects_of
 from fleet.core.events import At, PriorStateLoaded
 from fleet.core.state import State
-<<<<<<< HEAD
-=======
 from fleet.service.event_translation import WATCHED
 from keyexpr_schema.facts import FactKey
->>>>>>> next
 from keyexpr_schema.key import Address, Key
 from keyexpr_schema.keyspace import (
     DURATIONS,
@@ -89,16 +82,11 @@ async def prior_state(session: Session, at: At) -> PriorStateLoaded:
     )
 
 
-<<<<<<< HEAD
 async def stale_documents(
-    session: Session, state: State, is_over: Callable[[Address], bool]
+    session: Session, state: State, is_over: Callable[[Address], bool], *, all_of_them: bool
 ) -> list[Retract]:
     """Documents of the planner in the store that the state does not have, and of nothing that is
     over: that keeps its keys for a while.
-=======
-async def stale_documents(session: Session, state: State, *, all_of_them: bool) -> list[Retract]:
-    """Documents of the planner in the store that the state does not have.
->>>>>>> next
 
     Orders, whatever happened: nobody would ever follow them up, and there are no more of them than
     there is work under way. All others only where the journal is lost: with a journal there are
@@ -111,16 +99,9 @@ async def stale_documents(session: Session, state: State, *, all_of_them: bool) 
     }
     return [
         Retract(key, address)
-<<<<<<< HEAD
-        for key in OWN
-        for address in await session.list(key, timeout_s=60.0)
-        if key.build(address) not in wanted and (key is ORDER or not is_over(address))
-=======
         for key in (ORDER, *(OWN if all_of_them else ()))
         for address in await session.list(key)
-        if key.build(address) not in wanted
-        and (key is ORDER or getattr(address, "plan", None) not in state.past_plans)
->>>>>>> next
+        if key.build(address) not in wanted and (key is ORDER or not is_over(address))
     ]
 
 

@@ -126,16 +126,12 @@ class PlannerService:
             await stack.enter_async_context(
                 self._session.token(PLANNER_ALIVE, PlannerAliveAddress(self._incarnation))
             )
-<<<<<<< HEAD
-            await self._catch_up(watch, tokens)
-            stale = await stale_documents(self._session, self._state, self._past.has)
-            self._go_live()
-=======
             await self._catch_up(watch, tokens, recovered.concluded)
-            stale = await stale_documents(self._session, self.state, all_of_them=first_run)
+            stale = await stale_documents(
+                self._session, self.state, self._past.has, all_of_them=first_run
+            )
             await self._diagnostics.start()
             self._go_live(recovered)
->>>>>>> next
             self._carry_out(stale)
             if ready is not None:
                 ready.set()

@@ -14,15 +14,10 @@ from fleet.core.plan_entry import PlanEntry, PlanningJob, PlanOutcome
 from fleet.core.replan_reasons import ReplanReason
 from fleet.core.state import LOGIC, Policy, State
 from fleet.core.step import replay, step
-<<<<<<< HEAD
-from fleet.service import event_journal
-from fleet.service.event_journal import SNAPSHOT_FORMAT, EventJournal, JournalInUse
-from keyexpr_schema.payloads.history import RequestRecord
-=======
 from fleet.service.event_journal import EventJournal, JournalInUse, JournalUnreadable
 from fleet.service.recovery import recover
 from fleet.service.snapshots import SNAPSHOT_FORMAT, Snapshot
->>>>>>> next
+from keyexpr_schema.payloads.history import RequestRecord
 from keyexpr_schema.payloads.plans import PlanState
 from tests.replay.journal_files import HERE, events_in
 from tests.support.fleet_model import FleetModel

@@ -104,6 +104,7 @@ def robot_changed(state: State, robot: str) -> State:
     if ready == (robot in team):
         return state
     team = tuple(sorted({*team, robot} if ready else {*team} - {robot}))
+    state = replace(state, team_number=state.team_number + ready)
     index = replace(state.index, team=team, available=frozenset(team))
     return touch(replace(state, index=index), Touch(Part.TEAM))
 

@@ -32,14 +32,6 @@ def test_a_worker_that_comes_back_in_time_keeps_its_work() -> None:
     assert model.plans["plan-1"].plan.revision == 1
 
 
-def test_when_nobody_is_left_goals_fail_and_say_why() -> None:
-    model = FleetModel((manipulator(),), cups=1)
-    model.plan(bring(1, "hallway"))
-    model.lose("hsr")
-    assert model.goal_state("g1") is GoalState.FAILED
-    assert "no robot is connected" in (model.goal_states["g1"].reason or "")
-
-
 def test_a_fact_that_contradicts_the_plan_leads_to_a_new_one() -> None:
     model = fleet()
     model.plan(bring(1, "hallway"))

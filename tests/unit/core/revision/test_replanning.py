@@ -78,22 +78,25 @@ def test_a_lost_robot_that_had_begun_is_followed_by_one_that_begins_anew() -> No
     assert entry(model).state is PlanState.SUCCEEDED
 
 
-def test_what_a_lost_robot_had_in_its_hand_fails_that_goal_only() -> None:
+def test_what_a_lost_robot_had_in_its_hand_makes_that_goal_wait_and_no_other() -> None:
     model = running(robots=3, cups=6)
     while (held := model.state.facts[FactKey(HOLDING, "r1")].value) == "nothing":
         model.succeed(order_of(model, "r1"))
     before = robot_of(model)
     model.lose("r1")
-    (failed,) = [g for g, s in model.goal_states.items() if s.state is GoalState.FAILED]
-    assert f"g{str(held).removeprefix('cup_')}" == failed
-    assert f"at({held})" in (model.goal_states[failed].reason or "")
-    assert any(f"goal {failed} is left out" in note for note in entry(model).outcome.notes)
+    (waits,) = [g for g, s in model.goal_states.items() if s.state is GoalState.WAITING]
+    assert f"g{str(held).removeprefix('cup_')}" == waits
+    assert f"at({held})" in (model.goal_states[waits].reason or "")
+    assert any(f"goal {waits} is left out" in note for note in entry(model).outcome.notes)
     begun = {order.task: order.robot for order in model.orders()}
     assert begun.items() <= before.items()
     model.finish()
-    others = [s.state for g, s in model.goal_states.items() if g != failed]
+    others = [s.state for g, s in model.goal_states.items() if g != waits]
     assert others == [GoalState.REACHED] * 5
     assert entry(model).state is PlanState.SUCCEEDED
+    model.return_("r1")
+    model.finish()
+    assert model.goal_state(waits) is GoalState.REACHED
 
 
 def test_a_goal_that_cannot_be_reached_any_more_does_not_end_the_others() -> None:
@@ -207,7 +210,7 @@ def test_the_only_robot_is_planned_with_again_while_its_hand_is_full(strategy: s
     assert all(status.state is GoalState.REACHED for status in model.goal_states.values())
 
 
-def test_a_lost_robot_that_had_nothing_else_to_do_takes_its_goal_with_it() -> None:
+def test_the_goal_of_a_lost_robot_that_had_nothing_else_to_do_waits_for_it() -> None:
     model = running(robots=2, cups=2)
     holder, other = (order.robot for order in model.orders())
     while model.state.facts[FactKey(HOLDING, holder)].value == "nothing":
@@ -216,7 +219,7 @@ def test_a_lost_robot_that_had_nothing_else_to_do_takes_its_goal_with_it() -> No
     model.lose(holder)
     assert order_of(model, other) == undisturbed
     states = sorted(status.state.value for status in model.goal_states.values())
-    assert states == ["failed", "running"]
+    assert states == ["running", "waiting"]
     model.finish()
     assert entry(model).state is PlanState.SUCCEEDED
     assert all(record.robot == other for record in entry(model).current())

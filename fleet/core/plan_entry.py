@@ -8,6 +8,7 @@ import msgspec
 from msgspec.structs import replace
 
 from fleet.core.model.skills import Skills
+from fleet.core.model.world import Hopeless
 from fleet.core.plan_index import EMPTY_INDEX, PlanGraph, PlanIndex
 from fleet.core.replan_reasons import ReplanReason, ReplanScope, Wish
 from fleet.core.table import Table
@@ -105,6 +106,8 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     discarded: int = 0
     late: tuple[str, ...] = ()
     failures: Table[str, int] = Table()
+    hopeless: tuple[Hopeless, ...] = ()
+    """Calls that failed in a way that their workers say is not worth another try."""
     unwanted: tuple[str, ...] = ()
     team: tuple[str, ...] = ()
     change: PlanChange | None = None

@@ -164,7 +164,7 @@ def replan_requested(state: State, event: events.ReplanRequested) -> State:
         return answer(state, ask.request, False, entry)
     wish = ReplanAsked(request=ask.request, sentence=ask.reason, goals=ask.goals)
     # What a person asks for is no sign that the world does not go along: counting begins anew.
-    return set_entry(state, replace(entry.wishing(wish), fruitless_replans=0))
+    return set_entry(state, replace(entry.wishing(wish), fruitless_replans=0, hopeless=()))
 
 
 def _entry_to_replan(state: State, ask: ReplanRequest) -> PlanEntry | str:

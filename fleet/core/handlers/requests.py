@@ -121,7 +121,7 @@ def _planning(state: State, plan: Plan, job: PlanningJob) -> State:
         begun_s=state.time_s,
         begun_wall_s=state.wall_time_s,
     )
-    made = max(state.plans_made, _plan_number(plan.plan))
+    made = max(state.plans_made, plan_number(plan.plan))
     state = replace(_taken_up(state, plan.goals), jobs=job.job, plans_made=made)
     return set_entry(state, entry)
 
@@ -155,7 +155,7 @@ def _waiting_goals(state: State) -> Iterator[str]:
             yield goal
 
 
-def _plan_number(plan: str) -> int:
+def plan_number(plan: str) -> int:
     """`N` where the plan is called `plan-N`, else 0."""
     named = _NUMBERED.fullmatch(plan)
     return 0 if named is None else int(named[1])

@@ -18,10 +18,11 @@ from rich.console import Console
 from rich.table import Table
 
 from fleet.core import events
-from fleet.core.dispatch.delays import FACTOR, MARGIN_S
 from fleet.core.effects import MakePlan
 from fleet.core.events import PlanningSucceeded
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.model.durations import FACTOR, MARGIN_S
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_index import OUTSTANDING
 from fleet.core.state import Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose

@@ -49,8 +49,8 @@ else:
                 "GOAL_SPEC GOAL_STATUS FACT STATEMENT STATEMENT_STATUS PLACE OBJECT CLAIM "
                 "ROBOT_SPEC ROBOT_STATE ROBOT_ALIVE ORDER REPORT DURATIONS PLAN_SPEC PLAN_PROPOSAL "
                 "PLAN_STATUS TASK_RECORD PLAN_REQUEST REPLAN_REQUEST CONTROL_REQUEST ANSWER "
-                "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE STORE_JOURNAL STORE_STAMPS STORE_REPLACE "
-                "STORE_CHANGES "
+                "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE DIAGNOSTIC STORE_JOURNAL STORE_STAMPS "
+                "STORE_REPLACE STORE_CHANGES "
                 "SIM_MOTION SIM_SENSES SIM_CLOCK SIM_FRAMES SIM_SCENE SIM_TRUTH SIM_CONTACTS "
                 "KEYSPACE key_of"
             ),
@@ -69,10 +69,10 @@ else:
                 "Alive AliveAddress PoseMRad RobotActivity RobotAddress RobotSpec RobotState"
             ),
             "payloads.system": (
-                "JournalEntry PlannerAddress PlannerAliveAddress PlannerStatus StoreAddress "
-                "StoreChanges StoreChangesQuery StoreJournal StoreQuery StoreReplaced "
-                "StoreReplaceQuery StoreStamps "
-                "StoreStampsQuery StoredValue UndecodableAddress UndecodableValue"
+                "Diagnostic DiagnosticAddress JournalEntry PlannerAddress PlannerAliveAddress "
+                "PlannerStatus StoreAddress StoreChanges StoreChangesQuery StoreJournal "
+                "StoreQuery StoreReplaced StoreReplaceQuery StoreStamps StoreStampsQuery "
+                "StoredValue UndecodableAddress UndecodableValue"
             ),
             "payloads.simulation": (
                 "Body ContactCount Frame Frames MotionCall QuaternionWxyz Scene Shape ShapeKind "

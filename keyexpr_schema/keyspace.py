@@ -170,6 +170,11 @@ UNDECODABLE = Key(
     delivery=STORED, writers=ANYONE, readers=PERSON | RECORDER,
     about="A value that is not what its key promises: which key, why, how often.",
 )
+DIAGNOSTIC = Key(
+    "diagnostic", "diagnostics/{component}/{check}", system.DiagnosticAddress, system.Diagnostic,
+    delivery=STORED, writers=PLANNER, readers=PLANNER | PERSON,
+    about="What is wrong with a component now; nothing there means that all is well.",
+)
 HISTORY = Key(
     "history", "planner/history", system.PlannerAddress, history.HistoryQuery,
     delivery=QUERY, writers=PERSON, readers=PLANNER,

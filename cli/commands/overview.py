@@ -25,7 +25,7 @@ async def status(call: Call) -> None:
     from cli.views.goals import goal_rows
     from cli.views.robots import robot_rows
     from cli.views.status import status_page
-    from keyexpr_schema.keyspace import UNDECODABLE
+    from keyexpr_schema.keyspace import DIAGNOSTIC, UNDECODABLE
 
     async with call.session() as session:
         view = await snapshot(session, *FLEET_KEYS, UNDECODABLE)
@@ -33,6 +33,7 @@ async def status(call: Call) -> None:
         planning = await planner_alive(session)
         connected = await robots_alive(session)
         undecodable = await _still_undecodable(session, view.undecodable.values())
+        diagnostics = list((await session.list(DIAGNOSTIC)).values())
     robots = robot_rows(view.robot_specs, view.robot_states, connected)
     goals = goal_rows(view.goals, view.goal_status)
     settings = call.settings
@@ -44,10 +45,19 @@ async def status(call: Call) -> None:
             "robots": robots,
             "goals": goals,
             "plans": list(view.plan_status.values()),
+            "diagnostics": diagnostics,
             "rejects": undecodable,
         },
         lambda: status_page(
-            settings.routers, settings.realm, planner, planning, robots, goals, view, undecodable
+            settings.routers,
+            settings.realm,
+            planner,
+            planning,
+            robots,
+            goals,
+            view,
+            diagnostics,
+            undecodable,
         ),
     )
 
@@ -55,21 +65,23 @@ async def status(call: Call) -> None:
 async def _still_undecodable(
     session: Session, values: Iterable[UndecodableValue]
 ) -> list[UndecodableValue]:
-    """Those whose key still has a value that does not decode.
+    """Those whose key still has a value that does not decode, or the one that was of no use.
 
     The report stays on its key when the bad value is replaced or deleted. What is not stored, and
     what was put on a key that nobody can have, cannot be looked at again and stays listed.
     """
     from keyexpr_schema.errors import ForeignKey, UndecodablePayload
     from keyexpr_schema.keyspace import key_of
+    from keyexpr_schema.transport.undecodable import digest_of
 
     left = []
     for value in values:
         try:
             key = key_of(value.keyexpr)
             if key.stored:
-                await session.get(key, key.parse(value.keyexpr), ASK_S)
-                continue
+                now = await session.get(key, key.parse(value.keyexpr), ASK_S)
+                if now is None or value.digest != digest_of(key.encode(now)):
+                    continue
         except (ForeignKey, UndecodablePayload):
             pass
         left.append(value)

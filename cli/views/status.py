@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 
 from rich.console import Group, RenderableType
 from rich.table import Table
+from rich.text import Text
 
 from cli.views.console import table
 from cli.views.goals import GoalRow, goals_table
 from cli.views.plans import plans_table
 from cli.views.robots import RobotRow, robots_table
 from keyexpr_schema.payloads.system import (
+    Diagnostic,
     JournalEntry,
     PlannerStatus,
     StoreJournal,
@@ -35,6 +37,7 @@ def status_page(
     robots: Sequence[RobotRow],
     goals: Sequence[GoalRow],
     view: FleetView,
+    diagnostics: Sequence[Diagnostic],
     undecodable: Sequence[UndecodableValue],
 ) -> Group:
     """One page; a part with nothing in it is one short line."""
@@ -43,6 +46,7 @@ def status_page(
     return Group(
         f"router   {', '.join(routers)}, realm {realm}",
         f"planner  {_planner(planner, planning)}",
+        *(_diagnostic(each) for each in diagnostics),
         "",
         robots_table(robots) if robots else "No robots are registered.",
         "",
@@ -66,6 +70,12 @@ def _planner(planner: PlannerStatus | None, planning: bool) -> str:
     )
     lines = [f"  {what:<11}{', '.join(names)}" for what, names in offers if names]
     return "\n".join([f"running, epoch {planner.epoch}", *lines])
+
+
+def _diagnostic(found: Diagnostic) -> Text:
+    since = datetime.fromtimestamp(found.since_s).strftime("%Y-%m-%d %H:%M:%S")
+    often = f", {found.count} times" if found.count > 1 else ""
+    return Text(f"{found.component}: {found.sentence} (since {since}{often})", style="red")
 
 
 def undecodable_table(undecodable: Sequence[UndecodableValue]) -> Table:

@@ -36,6 +36,7 @@ def at_time_of(state: State, event: Event) -> State:
         time_s=max(state.time_s, event.time_s),
         wall_time_s=max(state.wall_time_s, event.wall_time_s),
         monotonic_s=max(state.monotonic_s, reading_s),
+        over=(),
     )
 
 

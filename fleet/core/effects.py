@@ -7,14 +7,14 @@ whatever was lost.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from msgspec.structs import asdict
 
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_index import OUTSTANDING
 from fleet.core.planning_input import (
     InterpretationInput,
     PlanningInput,
@@ -22,6 +22,7 @@ from fleet.core.planning_input import (
     planning_input,
 )
 from fleet.core.state import State
+from fleet.core.touches import Part, Touch
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
     ANSWER,
@@ -98,13 +99,36 @@ class DropJob:
 Effect = Publish | Retract | MakePlan | Interpret | DropJob | Archive
 
 
-def effects_between(old: State, new: State) -> tuple[Effect, ...]:
+def effects_between(old: State, new: State, touches: Iterable[Touch]) -> tuple[Effect, ...]:
     """What to do so that keys and planning jobs follow the state from `old` to `new`.
 
-    What is over in `new` is of its view for the last time: the keys keep their last values. It is
-    archived, and what was over in `old` is none of this any more.
+    Only what `touches` name is looked at. What is over in `new` is of its view for the last time:
+    the keys keep their last values. It is archived, and what was over in `old` is none of this.
     """
-    return (*_archived(new), *_documents(old, new), *_own_facts(old, new), *_jobs(old, new))
+    scope = _Scope.of(touches, new)
+    return (
+        *_archived(new),
+        *_documents(old, new, scope),
+        *_own_facts(old, new, scope),
+        *_jobs(old, new, scope),
+    )
+
+
+def all_touches(old: State, new: State) -> tuple[Touch, ...]:
+    """Touches of everything that is in one of two states, or over in the newer one."""
+    over = _Over.of(new)
+    names: tuple[tuple[Part, Iterable[Any]], ...] = (
+        (Part.GOAL, (*old.goal_states, *new.goal_states, *over.goals)),
+        (Part.STATEMENT, (*old.statement_states, *new.statement_states)),
+        (Part.ANSWER, (*old.answers, *new.answers, *over.answers)),
+        (Part.DURATIONS, (*old.durations, *new.durations)),
+        (Part.PLAN, (*old.plans, *new.plans, *over.plans)),
+        (Part.RECORDS, (*old.plans, *new.plans, *over.plans)),
+        (Part.FACT, (*old.concluded, *new.concluded)),
+        (Part.PREVIEW, (*old.previews, *new.previews)),
+        (Part.INTERPRETING, new.interpreting),
+    )
+    return tuple(Touch(part, name) for part, found in names for name in dict.fromkeys(found))
 
 
 def effects_of(state: State) -> tuple[Effect, ...]:
@@ -113,7 +137,12 @@ def effects_of(state: State) -> tuple[Effect, ...]:
     Facts are left out: other writers may have newer ones.
     """
     empty = State()
-    return (*_archived(state), *_documents(empty, state), *_jobs(empty, state))
+    scope = _Scope.of(all_touches(empty, state), state)
+    return (
+        *_archived(state),
+        *_documents(empty, state, scope),
+        *_jobs(empty, state, scope),
+    )
 
 
 def documents_of(record: Ended) -> Iterator[Publish]:
@@ -140,27 +169,62 @@ def _archived(state: State) -> Iterator[Archive]:
     return (Archive(record) for record in state.over)
 
 
-def _documents(old: State, new: State) -> Iterator[Effect]:
+@dataclass(frozen=True)
+class _Scope:
+    """Which parts of two states to compare."""
+
+    names: Mapping[Part, tuple[Any, ...]]
+    tasks: Mapping[str, tuple[str, ...]]
+    """Tasks by plan, where not all of a plan's are compared."""
+    plans: tuple[str, ...]
+
+    @classmethod
+    def of(cls, touches: Iterable[Touch], new: State) -> _Scope:
+        names: dict[Part, dict[Any, None]] = {}
+        tasks: dict[str, dict[str, None]] = {}
+        plans: dict[str, None] = {}
+        for part, name, task in touches:
+            names.setdefault(part, {})[name] = None
+            if part is Part.RECORD:
+                tasks.setdefault(name, {})[task] = None
+            if part in (Part.PLAN, Part.RECORD, Part.RECORDS):
+                plans[name] = None
+        if Part.EPOCH in names:  # orders carry it
+            plans |= dict.fromkeys(new.plans)
+        return cls(
+            {part: tuple(found) for part, found in names.items()},
+            {plan: tuple(found) for plan, found in tasks.items()},
+            tuple(plans),
+        )
+
+    def has(self, part: Part, name: str) -> bool:
+        """Whether a part of this name is to be compared."""
+        return name in self.names.get(part, ())
+
+
+def _documents(old: State, new: State, scope: _Scope) -> Iterator[Effect]:
     over = _Over.of(new)
     views: tuple[
-        tuple[Key[Any, Any], Mapping[str, Payload], Mapping[str, Payload], Mapping[str, Payload]],
+        tuple[
+            Part,
+            Key[Any, Any],
+            Mapping[str, Payload],
+            Mapping[str, Payload],
+            Mapping[str, Payload],
+        ],
         ...,
     ] = (
-        (GOAL_STATUS, old.goal_states, new.goal_states, over.goals),
-        (STATEMENT_STATUS, old.statement_states, new.statement_states, {}),
-        (ANSWER, old.answers, new.answers, over.answers),
-        (DURATIONS, old.durations, new.durations, {}),
+        (Part.GOAL, GOAL_STATUS, old.goal_states, new.goal_states, over.goals),
+        (Part.STATEMENT, STATEMENT_STATUS, old.statement_states, new.statement_states, {}),
+        (Part.ANSWER, ANSWER, old.answers, new.answers, over.answers),
+        (Part.DURATIONS, DURATIONS, old.durations, new.durations, {}),
     )
-    for key, before, after, gone in views:
-        if before is not after or gone:
-            yield from _difference(key, key.address, before, _with(after, gone))
-    for plan in {**old.plans, **new.plans, **over.plans}:
-        if old.plans.get(plan) is not new.plans.get(plan) or old.epoch != new.epoch:
-            yield from _plan_documents(plan, old, new, over.plans.get(plan))
-
-
-def _with(some: Mapping[str, Payload], more: Mapping[str, Payload]) -> Mapping[str, Payload]:
-    return {**some, **more} if more else some
+    for part, key, before, after, gone in views:
+        for name in scope.names.get(part, ()):
+            now = after.get(name) or gone.get(name)
+            yield from _difference(key, key.address(name), before.get(name), now)
+    for plan in scope.plans:
+        yield from _plan_documents(plan, old, new, over.plans.get(plan), scope)
 
 
 @dataclass(frozen=True)
@@ -184,47 +248,46 @@ class _Over:
         )
 
 
-def _plan_documents(plan: str, old: State, new: State, over: PlanRecord | None) -> Iterator[Effect]:
+def _plan_documents(
+    plan: str, old: State, new: State, over: PlanRecord | None, scope: _Scope
+) -> Iterator[Effect]:
     before, after = old.plans.get(plan), new.plans.get(plan)
-    spec = after.plan if after else over.spec if over else None
-    status = status_of(after) if after else over.status if over else None
-    yield from _difference(
-        PLAN_SPEC,
-        PlanAddress,
-        {plan: before.plan} if before and before.plan.tasks else {},
-        {plan: spec} if spec and spec.tasks else {},
-    )
-    yield from _difference(
-        PLAN_STATUS,
-        PlanAddress,
-        {plan: status_of(before)} if before else {},
-        {plan: status} if status else {},
-    )
-    records: Mapping[str, TaskRecord] = {task.task: task for task in over.tasks} if over else {}
-    yield from _difference(
-        TASK_RECORD,
-        partial(TaskAddress, plan),
-        before.records if before else {},
-        after.records if after else records,
-    )
-    orders = _orders(before, old.epoch), _orders(after, new.epoch)
-    yield from _difference(ORDER, lambda address: address, *orders)
+    if scope.has(Part.PLAN, plan):
+        spec = after.plan if after else over.spec if over else None
+        status = status_of(after) if after else over.status if over else None
+        address = PlanAddress(plan)
+        known = before.plan if before and before.plan.tasks else None
+        yield from _difference(PLAN_SPEC, address, known, spec if spec and spec.tasks else None)
+        yield from _difference(PLAN_STATUS, address, status_of(before) if before else None, status)
+    was: Mapping[str, TaskRecord] = before.records if before else {}
+    now: Mapping[str, TaskRecord] = after.records if after else {}
+    if over:
+        now = {task.task: task for task in over.tasks}
+    tasks: Iterable[str] = scope.tasks.get(plan, ())
+    if scope.has(Part.RECORDS, plan):
+        tasks = dict.fromkeys([*was, *now])
+    for task in tasks:
+        yield from _difference(TASK_RECORD, TaskAddress(plan, task), was.get(task), now.get(task))
+    if scope.has(Part.PLAN, plan) or Part.EPOCH in scope.names:
+        outstanding = [entry.index.outstanding for entry in (before, after) if entry]
+        tasks = dict.fromkeys(task for tasks in outstanding for task in tasks)
+    for task in tasks:
+        first, then = _order_of(before, task, old.epoch), _order_of(after, task, new.epoch)
+        if first and (not then or then.robot != first.robot):
+            yield Retract(ORDER, OrderAddress.of(first))
+            first = None
+        if then:
+            yield from _difference(ORDER, OrderAddress.of(then), first, then)
 
 
 def _difference(
-    key: Key[Any, Any],
-    address: Callable[[Any], Address],
-    old: Mapping[Any, Payload],
-    new: Mapping[Any, Payload],
+    key: Key[Any, Any], address: Address, old: Payload | None, new: Payload | None
 ) -> Iterator[Effect]:
-    for name in old:
-        if name not in new:
-            yield Retract(key, address(name))
-    for name, payload in new.items():
-        known = old.get(name)
-        # Of a thousand records one has changed: the others are the very same objects.
-        if payload is not known and payload != known:
-            yield Publish(key, address(name), payload)
+    if new is None:
+        if old is not None:
+            yield Retract(key, address)
+    elif new is not old and new != old:
+        yield Publish(key, address, new)
 
 
 def status_of(entry: PlanEntry) -> PlanStatus:
@@ -245,14 +308,11 @@ def status_of(entry: PlanEntry) -> PlanStatus:
     )
 
 
-def _orders(entry: PlanEntry | None, epoch: int) -> dict[OrderAddress, Order]:
-    if entry is None:
-        return {}
-    return {
-        OrderAddress(record.robot, record.plan, record.task): _order(record, entry, epoch)
-        for record in entry.records.values()
-        if record.state in OUTSTANDING and record.robot is not None
-    }
+def _order_of(entry: PlanEntry | None, task: str, epoch: int) -> Order | None:
+    record = entry.records.get(task) if entry is not None else None
+    if entry is None or record is None or record.state not in OUTSTANDING or record.robot is None:
+        return None
+    return _order(record, entry, epoch)
 
 
 def _order(record: TaskRecord, entry: PlanEntry, epoch: int) -> Order:
@@ -273,29 +333,29 @@ def _order(record: TaskRecord, entry: PlanEntry, epoch: int) -> Order:
     )
 
 
-def _own_facts(old: State, new: State) -> Iterator[Effect]:
-    if old.concluded is new.concluded:
-        return
-    for key, fact in new.concluded.items():
-        if fact is not old.concluded.get(key):
+def _own_facts(old: State, new: State, scope: _Scope) -> Iterator[Effect]:
+    for key in scope.names.get(Part.FACT, ()):
+        fact = new.concluded.get(key)
+        if fact is not None and fact is not old.concluded.get(key):
             yield Publish(FACT, FactAddress.of(key), fact)
 
 
-def _jobs(old: State, new: State) -> Iterator[Effect]:
-    for plan, before in old.plans.items():
-        after = new.plans.get(plan)
-        if before.job is not None and (after is None or after.job != before.job):
-            yield DropJob(before.job.job)
-    for request, job in old.previews.items():
-        if request not in new.previews:
-            yield DropJob(job.job)
-    for plan, entry in new.plans.items():
-        known = old.plans.get(plan)
-        if entry.job is not None and (known is None or known.job != entry.job):
-            yield MakePlan(planning_input(new, entry.job))
-    for request, job in new.previews.items():
-        if request not in old.previews:
-            yield MakePlan(planning_input(new, job))
-    for goal in new.interpreting:
-        if goal not in old.interpreting and goal in new.goals:
+def _jobs(old: State, new: State, scope: _Scope) -> Iterator[Effect]:
+    jobs = [
+        (old.plans[plan].job if plan in old.plans else None,
+         new.plans[plan].job if plan in new.plans else None)
+        for plan in scope.names.get(Part.PLAN, ())
+    ]  # fmt: skip
+    jobs += [
+        (old.previews.get(request), new.previews.get(request))
+        for request in scope.names.get(Part.PREVIEW, ())
+    ]
+    for before, after in jobs:
+        if before is not None and before != after:
+            yield DropJob(before.job)
+    for before, after in jobs:
+        if after is not None and before != after:
+            yield MakePlan(planning_input(new, after))
+    for goal in scope.names.get(Part.INTERPRETING, ()):
+        if goal in new.interpreting and goal not in old.interpreting and goal in new.goals:
             yield Interpret(interpretation_input(new, goal))

@@ -15,7 +15,9 @@ from msgspec.structs import replace
 from fleet.core.effects import status_of
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.state import State
+from fleet.core.state_updates import forget_entry, forget_goal, touch
 from fleet.core.table import Table
+from fleet.core.touches import UNTOUCHED, Part, Touch
 from keyexpr_schema.payloads.goals import OVER_GOALS, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.history import GoalRecord, PlanRecord, RequestRecord
 
@@ -25,17 +27,14 @@ SINCE_LOGIC = 2
 
 def let_go(state: State) -> State:
     """The state without what has come to be over in this event, which stands in `over`."""
-    plans, goals = state.perhaps_over_plans, state.perhaps_over_goals
-    if not plans and not goals and (not state.answers or state.logic < SINCE_LOGIC):
-        return state
-    state = replace(state, perhaps_over_plans=(), perhaps_over_goals=())
     if state.logic < SINCE_LOGIC:
         return state
-    for plan in dict.fromkeys(plans):
+    touches = state.touches.since(UNTOUCHED)
+    for plan in dict.fromkeys(t.name for t in touches if t.part in (Part.PLAN, Part.RECORD)):
         entry = state.plans.get(plan)
-        if entry is not None and entry.ended and not entry.outstanding():
+        if entry is not None and entry.ended and not entry.index.outstanding:
             state = _without_plan(state, entry)
-    for goal in dict.fromkeys(goals):
+    for goal in (t.name for t in touches if t.part is Part.GOAL):
         status = state.goal_states.get(goal)
         if status is not None and status.state in OVER_GOALS and not _in_its_plan(state, status):
             state = _without_goals(state, [goal], (goal_record(state, status),))
@@ -48,9 +47,10 @@ def let_go(state: State) -> State:
 
 def everything_perhaps_over(state: State) -> State:
     """The state of a logic that kept what was over, for this one to look through."""
-    goals = (goal for goal, status in state.goal_states.items() if status.state in OVER_GOALS)
-    plans = (plan for plan, entry in state.plans.items() if entry.ended)
-    return replace(state, perhaps_over_plans=tuple(plans), perhaps_over_goals=tuple(goals))
+    for part, names in ((Part.GOAL, state.goal_states), (Part.PLAN, state.plans)):
+        for name in names:
+            state = touch(state, Touch(part, name))
+    return state
 
 
 def goal_record(state: State, status: GoalStatus, deleted: bool = False) -> GoalRecord:
@@ -78,7 +78,7 @@ def _without_plan(state: State, entry: PlanEntry) -> State:
     statuses = [state.goal_states[g] for g in entry.plan.goals if g in state.goal_states]
     record = _plan_record(state, entry, statuses)
     over = [status.goal for status in statuses if status.state in OVER_GOALS]
-    state = replace(state, plans=state.plans.without(entry.plan.plan))
+    state = forget_entry(state, entry.plan.plan)
     return _without_goals(state, over, (record,))
 
 
@@ -101,10 +101,9 @@ def _plan_record(state: State, entry: PlanEntry, statuses: Iterable[GoalStatus])
 def _without_goals(
     state: State, goals: Iterable[str], records: tuple[PlanRecord | GoalRecord, ...]
 ) -> State:
-    specs, statuses = state.goals, state.goal_states
     for goal in goals:
-        specs, statuses = specs.without(goal), statuses.without(goal)
-    return replace(state, goals=specs, goal_states=statuses, over=(*state.over, *records))
+        state = forget_goal(state, goal)
+    return replace(state, over=(*state.over, *records))
 
 
 def _in_its_plan(state: State, status: GoalStatus) -> bool:

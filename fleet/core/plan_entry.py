@@ -7,14 +7,13 @@ from collections.abc import Iterator
 import msgspec
 from msgspec.structs import replace
 
+from fleet.core.model.skills import Skills
+from fleet.core.plan_index import EMPTY_INDEX, PlanGraph, PlanIndex
 from fleet.core.replan_reasons import ReplanReason, ReplanScope, Wish
 from fleet.core.table import Table
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.payloads.plans import ENDED_PLANS, Plan, PlanChange, PlanState, Task, Violation
-from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
-
-OUTSTANDING = frozenset({TaskState.ORDERED, TaskState.RUNNING})
-"""Tasks that a robot has an order for."""
+from keyexpr_schema.payloads.tasks import TaskRecord
 
 
 class PlanOutcome(msgspec.Struct, frozen=True, kw_only=True):
@@ -76,7 +75,7 @@ class PlanningJob(msgspec.Struct, frozen=True, kw_only=True):
         return self.reason is not None and self.reason.scope is ReplanScope.REALLOCATE
 
 
-class PlanEntry(msgspec.Struct, frozen=True, kw_only=True):
+class PlanEntry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A plan with everything the planner keeps about it.
 
     `records` hold the tasks of every revision; `plan` is the one in work. With `reasons`, and with
@@ -117,6 +116,7 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True):
     begun_s: float | None = None
     begun_wall_s: float | None = None
     """When it was asked for, on the fleet's clock [s] and in Unix time [s]."""
+    index: PlanIndex = EMPTY_INDEX
 
     @property
     def ended(self) -> bool:
@@ -157,7 +157,17 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True):
 
     def outstanding(self) -> list[TaskRecord]:
         """Tasks that a robot has an order for."""
-        return [record for record in self.records.values() if record.state in OUTSTANDING]
+        return [self.records[task] for task in self.index.outstanding]
+
+    def indexed(self, known: PlanEntry | None, skills: Skills) -> PlanEntry:
+        """The entry with its index, as far as it differs from the entry `known` before."""
+        graph = known.index.graph if known is not None else None
+        if known is None or known.plan.tasks is not self.plan.tasks or graph is None:
+            graph = PlanGraph(self.current(), skills)
+        elif known.records is self.records:
+            return self
+        names = (task.task for task in self.plan.tasks)
+        return replace(self, index=PlanIndex.of(names, self.records, graph))
 
     def to_replan(
         self,

@@ -130,6 +130,8 @@ def interpretation_input(state: State, goal: str) -> InterpretationInput:
             places=dict(words.places),
             objects=dict(words.objects),
             robots=dict(words.robots),
+            whereabouts=dict(words.whereabouts),
+            rests=dict(words.rests),
         ),
         skills=state.skills,
     )

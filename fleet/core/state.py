@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import msgspec
+from msgspec.structs import replace
 
+from fleet.core.fact_views import FactValues, Resting, Whereabouts
+from fleet.core.fleet_index import NO_FLEET, FleetIndex, index_of
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import PlanEntry, PlanningJob
+from fleet.core.plan_index import EMPTY_INDEX
 from fleet.core.table import Table
+from fleet.core.touches import UNTOUCHED, Touches
 from fleet.language import Vocabulary
 from fleet.language.vocabulary import SkillPhrase
-from keyexpr_schema.facts import AT, HOLDING, ON, FactKey
+from keyexpr_schema.facts import HOLDING, FactKey
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
 from keyexpr_schema.payloads.history import Ended
@@ -40,7 +45,7 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     skill_phrases: tuple[SkillPhrase, ...] = msgspec.field(default=(), name="deeds")
 
 
-class State(msgspec.Struct, frozen=True, kw_only=True):
+class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """What the planner knows."""
 
     skills: dict[str, SkillModel] = {}
@@ -89,9 +94,9 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     policy: Policy = Policy()
     over: tuple[Ended, ...] = ()
     """What left the state in the latest event, because it is over."""
-    perhaps_over_plans: tuple[str, ...] = ()
-    perhaps_over_goals: tuple[str, ...] = ()
-    """What may leave it in the event that is being handled."""
+    index: FleetIndex = NO_FLEET
+    touches: Touches = UNTOUCHED
+    """What the event under way has changed so far; empty between two events."""
 
     @property
     def plans_while_acting(self) -> bool:
@@ -101,38 +106,30 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
 
     def vocabulary(self) -> Vocabulary:
         """The names that sentences can use."""
-        whereabouts = {
-            fact.subject: fact.value
-            for fact in self.facts.values()
-            if fact.relation == AT and isinstance(fact.value, str)
-        }
-        rooms = {s.surface: p.place for p in self.places.values() for s in p.surfaces}
-        rests: dict[str, str] = {}
-        for fact in self.facts.values():
-            where = whereabouts.get(fact.subject)
-            # What it lay on says nothing any more once it was taken to another place.
-            if fact.relation != ON or where not in self.places:
-                continue
-            if isinstance(fact.value, str) and rooms.get(fact.value, where) == where:
-                rests[fact.subject] = fact.value
-        phrases = self.policy.skill_phrases
-        return Vocabulary(self.places, self.objects, self.robots, whereabouts, rests, phrases)
+        return Vocabulary(
+            self.places,
+            self.objects,
+            self.robots,
+            Whereabouts(self.facts),
+            Resting(self.facts, self.places),
+            self.policy.skill_phrases,
+        )
 
     def world(self) -> WorldModel:
-        """The world as believed now."""
-        return WorldModel.of(
-            self.skills,
-            self.places.values(),
-            self.objects.values(),
-            self.robots.values(),
-            self.facts.values(),
-            available=self.team(),
+        """The world as believed now: a view, which costs nothing to make."""
+        return WorldModel(
+            skills=self.skills,
+            places=self.places,
+            objects=self.objects,
+            robots=self.robots,
+            available=frozenset(self.index.team),
+            facts=FactValues(self.facts),
             durations=self.durations,
         )
 
     def team(self) -> tuple[str, ...]:
         """The robots that can be planned with, in a fixed order."""
-        return tuple(sorted(robot for robot in self.connected if self.ready(robot)))
+        return self.index.team
 
     def ready(self, robot: str) -> bool:
         """Whether a robot can be planned with: connected, and what its hand holds is known."""
@@ -144,3 +141,19 @@ class State(msgspec.Struct, frozen=True, kw_only=True):
     def fact(self, relation: str, subject: str) -> Fact | None:
         """The fact about a variable, if there is one."""
         return self.facts.get(FactKey(relation, subject))
+
+    def bare(self) -> State:
+        """The state without what is derived: what is kept of it. `reindexed` is the way back."""
+        plans = Table(
+            {plan: replace(entry, index=EMPTY_INDEX) for plan, entry in self.plans.items()}
+        )
+        return replace(self, plans=plans, index=NO_FLEET, touches=UNTOUCHED)
+
+    def reindexed(self) -> State:
+        """The state with everything derived anew, as after it was read or got other skills."""
+        plans = Table(
+            {plan: entry.indexed(None, self.skills) for plan, entry in self.plans.items()}
+        )
+        team = sorted(robot for robot in self.connected if self.ready(robot))
+        index = index_of(plans, self.goals, self.goal_states, self.facts, team)
+        return replace(self, plans=plans, index=index)

@@ -1,4 +1,8 @@
-"""Changes to the state that handlers, dispatch and revision have in common."""
+"""Changes to the state that handlers, dispatch and revision have in common.
+
+Nothing else changes what has an index or a document: these keep the indexes up, and note what they
+touched.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +10,22 @@ from collections.abc import Iterable
 
 from msgspec.structs import replace
 
+from fleet.core.fleet_index import (
+    NO_ORDERS,
+    UNPLANNED,
+    FleetIndex,
+    in_set,
+    place_of,
+    priority_of,
+    subjects_of,
+)
 from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_index import OUTSTANDING, robots_of
 from fleet.core.state import State
 from fleet.core.table import Table
-from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, GoalState, GoalStatus
+from fleet.core.touches import Part, Touch
+from keyexpr_schema.facts import AT, HOLDING, FactKey
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, Violation
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -19,6 +35,9 @@ AHEAD_S = 60.0
 """A fact from further ahead than this [s] was said in an earlier era, if there was one."""
 COMPARED_SINCE_LOGIC = 1
 """Before this logic of the core, only facts in reports gave way to newer ones."""
+
+
+# --- facts ---------------------------------------------------------------------------------------
 
 
 def believe(state: State, fact: Fact) -> State:
@@ -37,7 +56,7 @@ def believe(state: State, fact: Fact) -> State:
     older = state.older_facts.without(fact.key)
     if earlier:
         older = older.set(fact.key, None)
-    return replace(state, facts=state.facts.set(fact.key, fact), older_facts=older)
+    return replace(_fact_changed(state, fact.key, known, fact), older_facts=older)
 
 
 def _said_in_earlier_era(state: State, fact: Fact) -> bool:
@@ -52,13 +71,95 @@ def conclude(state: State, fact: Fact) -> State:
     return replace(believed, concluded=state.concluded.set(fact.key, fact))
 
 
+def forget_fact(state: State, key: FactKey) -> State:
+    """No longer believe anything of a variable."""
+    known = state.facts.get(key)
+    if known is None:
+        return state
+    state = replace(state, older_facts=state.older_facts.without(key))
+    return _fact_changed(state, key, known, None)
+
+
+def _fact_changed(state: State, key: FactKey, old: Fact | None, new: Fact | None) -> State:
+    index, touches = state.index, state.touches.and_(Touch(Part.FACT, key))
+    was, now = place_of(old), place_of(new)
+    if was != now:
+        things_at = index.things_at
+        if was is not None:
+            things_at = in_set(things_at, was, key.subject, False)
+            touches = touches.and_(Touch(Part.ROBOT, was))
+        if now is not None:
+            things_at = in_set(things_at, now, key.subject, True)
+            touches = touches.and_(Touch(Part.ROBOT, now))
+        index = replace(index, things_at=things_at)
+    facts = state.facts.without(key) if new is None else state.facts.set(key, new)
+    state = replace(state, facts=facts, index=index, touches=touches)
+    return robot_changed(state, key.subject) if key.relation == HOLDING else state
+
+
+def robot_changed(state: State, robot: str) -> State:
+    """Look again at whether a robot is there and can be planned with."""
+    state = touch(state, Touch(Part.ROBOT, robot))
+    ready, team = state.ready(robot), state.index.team
+    if ready == (robot in team):
+        return state
+    team = tuple(sorted({*team, robot} if ready else {*team} - {robot}))
+    return touch(replace(state, index=replace(state.index, team=team)), Touch(Part.TEAM))
+
+
+def touch(state: State, what: Touch) -> State:
+    """Note that something was changed."""
+    return replace(state, touches=state.touches.and_(what))
+
+
+# --- goals ---------------------------------------------------------------------------------------
+
+
 def set_goal(state: State, status: GoalStatus) -> State:
     """Change what is published of a goal."""
     status = replace(status, time_s=state.time_s, wall_time_s=state.wall_time_s)
-    state = replace(state, goal_states=state.goal_states.set(status.goal, status))
-    if status.state not in ENDED_GOALS:
-        return state
-    return replace(state, perhaps_over_goals=(*state.perhaps_over_goals, status.goal))
+    goal_states = state.goal_states.set(status.goal, status)
+    return _goal_changed(state, status.goal, goal_states)
+
+
+def set_spec(state: State, goal: Goal) -> State:
+    """Keep what somebody wants; plans for it may get another priority."""
+    state = replace(state, goals=state.goals.set(goal.goal, goal))
+    active = state.index.active
+    for plan in state.index.plans_of.get(goal.goal, ()):
+        active = active.set(plan, priority_of(state.plans[plan], state.goals))
+    return replace(state, index=replace(state.index, active=active))
+
+
+def forget_goal(state: State, goal: str) -> State:
+    """Drop a goal."""
+    state = replace(state, goals=state.goals.without(goal))
+    return _goal_changed(state, goal, state.goal_states.without(goal))
+
+
+def _goal_changed(state: State, goal: str, goal_states: Table[str, GoalStatus]) -> State:
+    old, new = state.goal_states.get(goal), goal_states.get(goal)
+    index, was, now = state.index, subjects_of(old), subjects_of(new)
+    if was != now:
+        about = index.goals_about
+        for subject in was - now:
+            about = in_set(about, subject, goal, False)
+        for subject in now - was:
+            about = in_set(about, subject, goal, True)
+        index = replace(index, goals_about=about)
+    before, after = old and old.state, new and new.state
+    if before is not after:
+        in_state = index.in_state
+        if before in UNPLANNED:
+            in_state = in_set(in_state, before, goal, False)
+        if after in UNPLANNED:
+            in_state = in_set(in_state, after, goal, True)
+        index = replace(index, in_state=in_state)
+    touches = state.touches.and_(Touch(Part.GOAL, goal))
+    for subject in was ^ now:  # whoever carries it is reserved for this goal, or no longer
+        if (where := place_of(state.fact(AT, subject))) is not None:
+            touches = touches.and_(Touch(Part.ROBOT, where))
+    return replace(state, goal_states=goal_states, index=index, touches=touches)
 
 
 def mark_goals(
@@ -83,10 +184,7 @@ def mark_goals(
 
 def active_plan_of(state: State, goal: str) -> str | None:
     """The plan that works on a goal and has not ended."""
-    for plan, entry in state.plans.items():
-        if not entry.ended and goal in entry.wanted_goals:
-            return plan
-    return None
+    return next(iter(state.index.plans_of.get(goal, ())), None)
 
 
 def open_goals(state: State, entry: PlanEntry) -> list[str]:
@@ -114,18 +212,99 @@ def without_goal(state: State, plan: Plan, goal: str) -> Plan:
     return replace(plan, goals=rest, conditions=conditions_of(state, rest))
 
 
+# --- plans ---------------------------------------------------------------------------------------
+
+
 def set_entry(state: State, entry: PlanEntry) -> State:
     """Change what is kept of a plan."""
-    plan = entry.plan.plan
-    state = replace(state, plans=state.plans.set(plan, replace(entry, changed_s=state.time_s)))
-    if not entry.ended:
-        return state
-    return replace(state, perhaps_over_plans=(*state.perhaps_over_plans, plan))
+    name = entry.plan.plan
+    known = state.plans.get(name)
+    entry = replace(entry, changed_s=state.time_s).indexed(known, state.skills)
+    touches = state.touches.and_(Touch(Part.PLAN, name))
+    if known is None or known.records is not entry.records:
+        touches = touches.and_(Touch(Part.RECORDS, name))
+    index = _entry_changed(state, name, known, entry)
+    return replace(state, plans=state.plans.set(name, entry), index=index, touches=touches)
+
+
+def forget_entry(state: State, name: str) -> State:
+    """Drop a plan."""
+    touches = state.touches.and_(Touch(Part.PLAN, name)).and_(Touch(Part.RECORDS, name))
+    index = _entry_changed(state, name, state.plans.get(name), None)
+    return replace(state, plans=state.plans.without(name), index=index, touches=touches)
+
+
+def _entry_changed(
+    state: State, name: str, old: PlanEntry | None, new: PlanEntry | None
+) -> FleetIndex:
+    """The index after an entry changed."""
+    index = state.index
+    was = old.wanted_goals if old is not None and not old.ended else ()
+    now = new.wanted_goals if new is not None and not new.ended else ()
+    if was is not now:
+        plans_of = index.plans_of
+        for goal in set(was) ^ set(now):
+            rest = tuple(plan for plan in plans_of.get(goal, ()) if plan != name)
+            plans = (*rest, name) if goal in now else rest
+            plans_of = plans_of.set(goal, plans) if plans else plans_of.delete(goal)
+        index = replace(index, plans_of=plans_of)
+    if new is None or new.ended:
+        index = replace(index, active=index.active.without(name))
+    elif was is not now or name not in index.active:
+        index = replace(index, active=index.active.set(name, priority_of(new, state.goals)))
+    before = old.index.outstanding if old is not None else Table()
+    after = new.index.outstanding if new is not None else Table()
+    if before is after:
+        return index
+    for task in before:
+        if task not in after:
+            assert old is not None
+            index = _order_changed(index, old.records[task], False)
+    for task in after:
+        if task not in before:
+            assert new is not None
+            index = _order_changed(index, new.records[task], True)
+    return index
+
+
+def _order_changed(index: FleetIndex, record: TaskRecord, there: bool) -> FleetIndex:
+    work, order = index.work, (record.plan, record.task)
+    for robot in robots_of(record):
+        orders = work.get(robot)
+        if there:
+            work = work.set(robot, (orders or NO_ORDERS).set(order, None))
+        elif orders is not None and order in orders:
+            rest = orders.delete(order)
+            work = work.set(robot, rest) if rest else work.delete(robot)
+    return replace(index, work=work)
 
 
 def set_record(state: State, entry: PlanEntry, record: TaskRecord) -> State:
-    """Change what is kept of a task."""
-    return set_entry(state, replace(entry, records=entry.records.set(record.task, record)))
+    """Change what is kept of a task; of the rest of its plan as `entry` says."""
+    name = entry.plan.plan
+    if state.plans.get(name) is not entry:
+        state = set_entry(state, entry)
+        entry = state.plans[name]
+    old = entry.records[record.task]
+    records = entry.records.set(record.task, record)
+    entry = replace(entry, records=records, index=entry.index.moved(old, record, records))
+    index = state.index
+    if (old.state in OUTSTANDING) != (record.state in OUTSTANDING):
+        index = _order_changed(index, record, record.state in OUTSTANDING)
+    touches = state.touches.and_(Touch(Part.RECORD, name, record.task))
+    return replace(state, plans=state.plans.set(name, entry), index=index, touches=touches)
+
+
+def set_late_bound(state: State, entry: PlanEntry, late_s: float) -> State:
+    """Note that no task of the plan becomes late before `late_s`, on the fleet's clock."""
+    entry = replace(entry, index=replace(entry.index, late_s=late_s))
+    return replace(state, plans=state.plans.set(entry.plan.plan, entry))
+
+
+def set_given_out(state: State, entry: PlanEntry, task: str) -> State:
+    """Note that a task was ordered while the plan's job is in work; this has no other effect."""
+    entry = replace(entry, given_out=entry.given_out.set(task, None))
+    return replace(state, plans=state.plans.set(entry.plan.plan, entry))
 
 
 def cancel(state: State, entry: PlanEntry) -> State:
@@ -174,6 +353,9 @@ def give_up(state: State, entry: PlanEntry, reason: str, to: GoalState = GoalSta
     return mark_goals(state, entry.plan.goals, to, plan, reason)
 
 
+# --- requests ------------------------------------------------------------------------------------
+
+
 def answer(
     state: State,
     request: str | None,
@@ -188,4 +370,10 @@ def answer(
     reply = Answer(
         request=request, accepted=accepted, sentence=sentence, plan=plan, violations=violations
     )
-    return replace(state, answers=state.answers.set(request, reply))
+    return put_answer(state, reply)
+
+
+def put_answer(state: State, reply: Answer) -> State:
+    """Give an answer."""
+    state = replace(state, answers=state.answers.set(reply.request, reply))
+    return touch(state, Touch(Part.ANSWER, reply.request))

@@ -14,12 +14,14 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.clocks import at_time_of, with_clock_of_new_run
 from fleet.core.dispatch import dispatcher
-from fleet.core.effects import Effect, effects_between
+from fleet.core.effects import Effect, all_touches, effects_between
 from fleet.core.events import Event
 from fleet.core.handlers import goals, plan_results, reports, requests, robots, statements, world
 from fleet.core.over import SINCE_LOGIC, everything_perhaps_over, let_go
 from fleet.core.state import State
+from fleet.core.state_updates import touch
 from fleet.core.table import Table
+from fleet.core.touches import UNTOUCHED, Part, Touch
 from keyexpr_schema.payloads.goals import ENDED_GOALS
 
 
@@ -27,7 +29,7 @@ def _planner_started(state: State, event: events.PlannerStarted) -> State:
     if state.logic < SINCE_LOGIC <= event.logic:
         state = everything_perhaps_over(state)
     state = with_clock_of_new_run(state, event)
-    return replace(
+    started = replace(
         state,
         epoch=event.epoch,
         incarnation=event.incarnation,
@@ -36,13 +38,18 @@ def _planner_started(state: State, event: events.PlannerStarted) -> State:
         logic=event.logic,
         lineage=state.lineage or event.lineage,
     )
+    if started.skills != state.skills:
+        started = started.reindexed()
+    for plan in started.index.active:
+        started = touch(started, Touch(Part.PLAN, plan))
+    return touch(started, Touch(Part.EPOCH))
 
 
 def _prior_state_loaded(state: State, event: events.PriorStateLoaded) -> State:
     """Take over what an earlier planner left, so that nothing is done a second time."""
     answers = {answer.request: answer for answer in event.answers}
     goals = {status.goal: status for status in event.goals if status.state in ENDED_GOALS}
-    return replace(
+    state = replace(
         state,
         answers=Table({**answers, **state.answers}),
         durations={**{known.model: known for known in event.durations}, **state.durations},
@@ -52,6 +59,9 @@ def _prior_state_loaded(state: State, event: events.PriorStateLoaded) -> State:
         ),
         past_plans=(*state.past_plans, *(p for p in event.plans if p not in state.plans)),
     )
+    for touched in all_touches(State(), state):
+        state = touch(state, touched)
+    return state
 
 
 _Handler = Callable[[State, Any], State]
@@ -94,7 +104,9 @@ def step(state: State, event: Event) -> tuple[State, tuple[Effect, ...]]:
     settled = let_go(dispatcher.advance(handled))
     if settled is now and now.era == state.era:
         return state, ()
-    return settled, effects_between(state, settled)
+    touches = settled.touches.since(UNTOUCHED)
+    settled = replace(settled, touches=UNTOUCHED)
+    return settled, effects_between(state, settled, touches)
 
 
 def replay(journal: Iterable[Event], state: State | None = None) -> State:

@@ -3,26 +3,70 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Collection, Iterator
 from typing import Any
 
 from fleet.core.effects import Publish, Retract, effects_of
 from fleet.core.events import At, PriorStateLoaded
 from fleet.core.state import State
-from keyexpr_schema.key import Key
+from fleet.service.event_translation import WATCHED
+from keyexpr_schema.facts import FactKey
+from keyexpr_schema.key import Address, Key
 from keyexpr_schema.keyspace import (
     ANSWER,
     DURATIONS,
+    FACT,
+    GOAL_SPEC,
     GOAL_STATUS,
+    OBJECT,
     ORDER,
+    PLACE,
     PLAN_SPEC,
     PLAN_STATUS,
+    ROBOT_SPEC,
+    STATEMENT,
     STATEMENT_STATUS,
     TASK_RECORD,
 )
-from keyexpr_schema.transport.session import Session, TokenWatch, Watch
+from keyexpr_schema.payloads.goals import GoalAddress
+from keyexpr_schema.payloads.robots import RobotAddress
+from keyexpr_schema.payloads.world import (
+    FactAddress,
+    ObjectAddress,
+    PlaceAddress,
+    StatementAddress,
+)
+from keyexpr_schema.transport.session import Change, Session, TokenWatch, Watch
 
-OWN: tuple[Key[Any, Any], ...] = (ORDER, TASK_RECORD, PLAN_SPEC, PLAN_STATUS, GOAL_STATUS)
+OWN: tuple[Key[Any, Any], ...] = (TASK_RECORD, PLAN_SPEC, PLAN_STATUS, GOAL_STATUS)
+"""What the planner writes, but for its orders."""
+
+
+def open_plans(state: State) -> list[str]:
+    """The plans whose reports still matter."""
+    return [plan for plan, entry in state.plans.items() if not entry.ended or entry.outstanding()]
+
+
+def known_keys(
+    state: State, unconfirmed: Collection[FactKey]
+) -> Iterator[tuple[Key[Any, Any], Address]]:
+    """The keys that a state has its names and facts from: one that is gone was deleted.
+
+    Facts that the planner concluded, and perhaps never published, were perhaps never on their key.
+    """
+    yield from ((GOAL_SPEC, GoalAddress(goal)) for goal in state.goals)
+    statements = {**state.statements, **state.statement_states}
+    yield from ((STATEMENT, StatementAddress(name)) for name in statements)
+    yield from ((PLACE, PlaceAddress(place)) for place in state.places)
+    yield from ((OBJECT, ObjectAddress(thing)) for thing in state.objects)
+    yield from ((ROBOT_SPEC, RobotAddress(robot)) for robot in state.robots)
+    yield from ((FACT, FactAddress.of(key)) for key in state.facts if key not in unconfirmed)
+
+
+def in_order(changes: list[Change[Any, Any]]) -> list[Change[Any, Any]]:
+    """What is stored, in the order that costs least: names before the sentences that use them."""
+    rank = {key.name: number for number, key in enumerate(WATCHED)}
+    return sorted(changes, key=lambda change: rank.get(change.key.name, -1))
 
 
 async def prior_state(session: Session, at: At) -> PriorStateLoaded:
@@ -43,11 +87,12 @@ async def prior_state(session: Session, at: At) -> PriorStateLoaded:
     )
 
 
-async def stale_documents(session: Session, state: State) -> list[Retract]:
+async def stale_documents(session: Session, state: State, *, all_of_them: bool) -> list[Retract]:
     """Documents of the planner in the store that the state does not have.
 
-    A planner that was killed between its journal and a deletion leaves such; one that lost its
-    journal leaves its orders, which nobody would ever follow up.
+    Orders, whatever happened: nobody would ever follow them up, and there are no more of them than
+    there is work under way. All others only where the journal is lost: with a journal there are
+    none, it remembers what is to be deleted until that is confirmed.
     """
     wanted = {
         effect.key.build(effect.address)
@@ -56,8 +101,8 @@ async def stale_documents(session: Session, state: State) -> list[Retract]:
     }
     return [
         Retract(key, address)
-        for key in OWN
-        for address in await session.list(key, timeout_s=60.0)
+        for key in (ORDER, *(OWN if all_of_them else ()))
+        for address in await session.list(key)
         if key.build(address) not in wanted
         and (key is ORDER or getattr(address, "plan", None) not in state.past_plans)
     ]

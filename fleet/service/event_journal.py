@@ -1,42 +1,60 @@
-"""The planner's event journal: every event that changed its state, in order, in SQLite.
+"""The planner's event journal: the events that changed its state, in order, in SQLite.
 
 An event is on disk before its effects leave the process, so a planner killed at any moment
-replays to where it was. From time to time the whole state is kept beside it, so that a start takes
-no longer the longer the planner has lived.
+replays to where it was. Now and then the state is kept in a snapshot, and the events below the
+last two snapshots are deleted: neither a start nor the file grows with the planner's past. An
+event that the core could not handle is set aside, with what went wrong, and is not handled again
+by the same logic.
 """
 
 from __future__ import annotations
 
 import fcntl
+import hashlib
 import sqlite3
+import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TextIO
+from typing import NamedTuple, TextIO
 
-import msgspec
+from msgspec.structs import replace
 
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.state import State
-from fleet.core.table import decode_table, encode_table
+from fleet.core.state import LOGIC, State
 from fleet.errors import FleetError
+from fleet.service.snapshots import KEPT, Snapshot, SnapshotFiles, decode_snapshot
 
-SNAPSHOT_FORMAT = 4
-"""Counts up whenever a field of the state gets another name or meaning."""
-_READABLE = frozenset({2, 3, SNAPSHOT_FORMAT})
-"""Formats that decode; in format 2 a state had no skills, before format 4 no reasons and wishes."""
-SNAPSHOT_EVERY = 2000
-"""Events between two snapshots; replaying this many takes well under a second."""
-
-
-class _Snapshot(msgspec.Struct, frozen=True, kw_only=True):
-    """A kept state. What was kept before there was a format does not decode."""
-
-    format: int
-    state: State
+SET_ASIDE_KEPT = 1000
+"""Events set aside that are remembered; the oldest are forgotten first."""
+_PAGES_WORTH_IT = 1000
+"""A file with so many unused pages, four times those in use, is made small again."""
+_TABLES = """
+CREATE TABLE IF NOT EXISTS events (number INTEGER PRIMARY KEY, event BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS set_aside (
+    number INTEGER PRIMARY KEY AUTOINCREMENT,
+    digest TEXT NOT NULL UNIQUE,
+    logic INTEGER NOT NULL,
+    wall_time_s REAL NOT NULL,
+    times INTEGER NOT NULL,
+    event BLOB NOT NULL,
+    traceback TEXT NOT NULL
+);
+"""
 
 
 class JournalInUse(FleetError):
     """Another planner works with this folder."""
+
+
+class JournalUnreadable(FleetError):
+    """The journal needs another version of this program."""
+
+
+class JournalEntry(NamedTuple):
+    """An event and its number."""
+
+    number: int
+    event: Event
 
 
 class EventJournal:
@@ -49,7 +67,7 @@ class EventJournal:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._lock: TextIO | None = None
-        self._since_snapshot = 0
+        self._snapshots = SnapshotFiles(folder)
 
     def __enter__(self) -> EventJournal:
         self._folder.mkdir(parents=True, exist_ok=True)
@@ -65,12 +83,18 @@ class EventJournal:
         self._db = sqlite3.connect(self._folder / "events.db", isolation_level=None)
         self._db.execute("PRAGMA journal_mode=WAL")
         self._db.execute("PRAGMA synchronous=NORMAL")
-        self._db.execute(
-            "CREATE TABLE IF NOT EXISTS events (number INTEGER PRIMARY KEY, event BLOB NOT NULL)"
-        )
-        self._db.execute(
-            "CREATE TABLE IF NOT EXISTS snapshots (number INTEGER PRIMARY KEY, state BLOB NOT NULL)"
-        )
+        self._db.execute("PRAGMA journal_size_limit=4194304")
+        self._db.executescript(_TABLES)
+        self._snapshots.tidy()
+        last: int = self._db.execute("SELECT coalesce(max(number), 0) FROM events").fetchone()[0]
+        self.last: int = max(last, *self._snapshots.numbers(), 0)
+        """The number of the newest event."""
+        self._set_aside = {
+            digest
+            for (digest,) in self._db.execute(
+                "SELECT digest FROM set_aside WHERE logic = ?", (LOGIC,)
+            )
+        }
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -78,67 +102,106 @@ class EventJournal:
         if self._lock is not None:
             self._lock.close()
 
-    def append(self, event: Event, state: State) -> None:
-        """Keep an event, and now and then the state that it led to."""
-        cursor = self._db.execute("INSERT INTO events (event) VALUES (?)", (encode_event(event),))
-        self._since_snapshot += 1
-        if self._since_snapshot >= SNAPSHOT_EVERY:
-            self._since_snapshot = 0
-            kept = _Snapshot(format=SNAPSHOT_FORMAT, state=state)
-            self._db.execute("BEGIN")
-            self._db.execute("DELETE FROM snapshots")
-            self._db.execute(
-                "INSERT INTO snapshots (number, state) VALUES (?, ?)",
-                (cursor.lastrowid, msgspec.msgpack.encode(kept, enc_hook=encode_table)),
-            )
-            self._db.execute("COMMIT")
-
     @property
     def empty(self) -> bool:
         """Whether nothing was ever kept here."""
-        return self._db.execute("SELECT 1 FROM events LIMIT 1").fetchone() is None
+        return self.last == 0
 
-    def snapshot(self) -> tuple[int, State]:
-        """The newest kept state and the number of the event that led to it (0: none is kept).
+    # --- events ----------------------------------------------------------------------------------
 
-        A snapshot in another format, by an older version of the planner, counts as none.
-        """
-        row = self._db.execute("SELECT number, state FROM snapshots").fetchone()
-        if row is None:
-            return 0, State()
-        try:
-            read = msgspec.msgpack.decode(row[1])
-            if read["format"] < SNAPSHOT_FORMAT:
-                read["state"]["plans"] = {
-                    plan: _with_reasons(entry) for plan, entry in read["state"]["plans"].items()
-                }
-            kept = msgspec.convert(read, _Snapshot, dec_hook=decode_table)
-        except (msgspec.DecodeError, LookupError, TypeError, AttributeError):
-            return 0, State()
-        return (int(row[0]), kept.state) if kept.format in _READABLE else (0, State())
+    def append(self, event: Event) -> None:
+        """Keep an event; it is on disk when this returns."""
+        self.append_encoded(encode_event(event))
 
-    def events(self, after: int = 0) -> Iterator[Event]:
+    def append_encoded(self, data: bytes) -> None:
+        """Keep an event that is encoded already."""
+        self._db.execute("INSERT INTO events VALUES (?, ?)", (self.last + 1, data))
+        self.last += 1
+
+    def events(self, after: int = 0) -> Iterator[JournalEntry]:
         """Every event with a higher number than `after`, in order."""
-        for (data,) in self._db.execute(
-            "SELECT event FROM events WHERE number > ? ORDER BY number", (after,)
+        for number, data in self._db.execute(
+            "SELECT number, event FROM events WHERE number > ? ORDER BY number", (after,)
         ):
-            yield decode_event(data)
+            yield JournalEntry(number, decode_event(data))
 
+    # --- snapshots -------------------------------------------------------------------------------
 
-def _with_reasons(entry: dict[str, Any]) -> dict[str, Any]:
-    """What was kept of a plan before format 4: one reason to make it again, and one task to add."""
-    job, replan, task = entry.get("job") or {}, entry.get("replan"), entry.get("amendment")
-    found = {reason["number"]: reason for reason in (job.get("reason"), replan) if reason}
-    wishes = []
-    if task is not None:
-        number = max(found)
-        del found[number]
-        wish = {"wish": "TaskAdded", "number": number, "request": entry["amendment_request"]}
-        args = {name: value for name, value in task["args"].items() if name != "robot"}
-        robot = entry["plan"]["pins"].get(task["actor"])
-        wishes.append(
-            {**wish, "skill": task["skill"], "args": args, "after": task["after"], "robot": robot}
+    def snapshot(self) -> Snapshot:
+        """The newest snapshot that can be read; one of an empty state where all events are there.
+
+        Raises:
+            JournalUnreadable: none can be read, and the events before them are gone.
+        """
+        snapshot = self._snapshots.newest() or self._snapshot_in_table()
+        if snapshot is not None:
+            return snapshot
+        (first,) = self._db.execute("SELECT min(number) FROM events").fetchone()
+        if self._snapshots.numbers() and first != 1:
+            raise JournalUnreadable(
+                f"the planner's snapshots in {self._folder} cannot be read by this version: start "
+                "the version that wrote them, or move the folder away to begin with what the store "
+                "has"
+            )
+        return Snapshot(state=State())
+
+    def _snapshot_in_table(self) -> Snapshot | None:
+        """What earlier versions kept: a snapshot in a table, above all of its events."""
+        if not self._db.execute("PRAGMA table_info(snapshots)").fetchone():
+            return None
+        row = self._db.execute("SELECT number, state FROM snapshots").fetchone()
+        snapshot = decode_snapshot(row[1]) if row is not None else None
+        return replace(snapshot, number=int(row[0])) if snapshot is not None else None
+
+    def write_snapshot(self, snapshot: Snapshot) -> None:
+        """Keep a snapshot; may be called in a thread. `cut` follows it, in the journal's own.
+
+        Raises:
+            OSError: it could not be written; those there were are still there.
+        """
+        self._snapshots.write(snapshot)
+
+    def cut(self) -> None:
+        """Delete the events that no kept snapshot needs, and give room back that is not used."""
+        numbers = self._snapshots.numbers()
+        if len(numbers) < KEPT:
+            return  # the events are what a first snapshot is fallen back from
+        self._db.execute("DELETE FROM events WHERE number <= ?", (min(numbers),))
+        self._db.execute("DROP TABLE IF EXISTS snapshots")
+        (unused,) = self._db.execute("PRAGMA freelist_count").fetchone()
+        (pages,) = self._db.execute("PRAGMA page_count").fetchone()
+        if unused > _PAGES_WORTH_IT and unused > 0.8 * pages:
+            self._db.execute("VACUUM")
+
+    # --- events set aside ------------------------------------------------------------------------
+
+    def set_aside(self, event: Event, traceback: str) -> int:
+        """Keep an event that the core could not handle beside the journal; how many there are."""
+        digest = _digest(event)
+        self._db.execute(
+            "INSERT INTO set_aside (digest, logic, wall_time_s, times, event, traceback) "
+            "VALUES (?, ?, ?, 1, ?, ?) ON CONFLICT (digest) DO UPDATE SET logic = excluded.logic, "
+            "wall_time_s = excluded.wall_time_s, times = times + 1, traceback = excluded.traceback",
+            (digest, LOGIC, time.time(), encode_event(event), traceback),
         )
-    if job.get("reason"):
-        job = {**job, "request": None, "takes_up": [job["reason"]["number"]]}
-    return {**entry, "job": job or None, "reasons": list(found.values()), "wishes": wishes}
+        self._db.execute(
+            "DELETE FROM set_aside WHERE number <= (SELECT max(number) FROM set_aside) - ?",
+            (SET_ASIDE_KEPT,),
+        )
+        self._set_aside.add(digest)
+        (count,) = self._db.execute("SELECT count(*) FROM set_aside").fetchone()
+        return int(count)
+
+    def is_set_aside(self, event: Event) -> bool:
+        """Whether this logic of the core could not handle the same event before."""
+        return bool(self._set_aside) and _digest(event) in self._set_aside
+
+    def drop(self, number: int) -> None:
+        """Take an event out of the journal."""
+        self._db.execute("DELETE FROM events WHERE number = ?", (number,))
+
+
+def _digest(event: Event) -> str:
+    """What tells an event from others, whenever it comes."""
+    timeless = replace(event, time_s=0.0, wall_time_s=0.0, monotonic_s=None)
+    return hashlib.sha256(encode_event(timeless)).hexdigest()

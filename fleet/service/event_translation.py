@@ -7,8 +7,7 @@ from typing import Any
 
 from fleet.core import events
 from fleet.core.events import At, Event
-from fleet.core.state import State
-from keyexpr_schema.key import Key
+from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
     CONTROL_REQUEST,
     FACT,
@@ -24,19 +23,20 @@ from keyexpr_schema.keyspace import (
 )
 from keyexpr_schema.transport.watch import Change
 
-_PUT: dict[Key[Any, Any], Callable[[Any, At], Event]] = {
-    PLACE: lambda v, at: events.PlacePut(place=v, **at),
-    OBJECT: lambda v, at: events.ObjectPut(object=v, **at),
-    ROBOT_SPEC: lambda v, at: events.RobotRegistered(spec=v, **at),
-    STATEMENT: lambda v, at: events.StatementPut(statement=v, **at),
-    FACT: lambda v, at: events.FactPut(fact=v, **at),
-    GOAL_SPEC: lambda v, at: events.GoalPut(goal=v, **at),
-    REPORT: lambda v, at: events.ReportReceived(report=v, **at),
-    PLAN_PROPOSAL: lambda v, at: events.PlanProposed(plan=v, **at),
-    PLAN_REQUEST: lambda v, at: events.PlanRequested(request=v, **at),
-    REPLAN_REQUEST: lambda v, at: events.ReplanRequested(request=v, **at),
-    CONTROL_REQUEST: lambda v, at: events.ControlRequested(request=v, **at),
+_PUT: dict[Key[Any, Any], tuple[type[Event], str]] = {
+    PLACE: (events.PlacePut, "place"),
+    OBJECT: (events.ObjectPut, "object"),
+    ROBOT_SPEC: (events.RobotRegistered, "spec"),
+    STATEMENT: (events.StatementPut, "statement"),
+    FACT: (events.FactPut, "fact"),
+    GOAL_SPEC: (events.GoalPut, "goal"),
+    REPORT: (events.ReportReceived, "report"),
+    PLAN_PROPOSAL: (events.PlanProposed, "plan"),
+    PLAN_REQUEST: (events.PlanRequested, "request"),
+    REPLAN_REQUEST: (events.ReplanRequested, "request"),
+    CONTROL_REQUEST: (events.ControlRequested, "request"),
 }
+"""The event that a value means, and its field that has the value."""
 _DELETED: dict[Key[Any, Any], Callable[[Any, At], Event]] = {
     GOAL_SPEC: lambda a, at: events.GoalDeleted(goal=a.goal, **at),
     FACT: lambda a, at: events.FactDeleted(subject=a.subject, relation=a.relation, **at),
@@ -45,6 +45,7 @@ _DELETED: dict[Key[Any, Any], Callable[[Any, At], Event]] = {
     OBJECT: lambda a, at: events.ObjectDeleted(object=a.object, **at),
     ROBOT_SPEC: lambda a, at: events.RobotUnregistered(robot=a.robot, **at),
 }
+_KEYS = {kind: (key, field) for key, (kind, field) in _PUT.items()}
 WATCHED = tuple(_PUT)
 """Keys the planner listens to; names come before the sentences that use them."""
 
@@ -60,17 +61,15 @@ def event_of(change: Change[Any, Any], at: At) -> Event | None:
     for field in change.address.__struct_fields__:
         if getattr(change.value, field, None) != getattr(change.address, field):
             return None
-    return _PUT[change.key](change.value, at)
+    kind, field = _PUT[change.key]
+    return kind(**{field: change.value}, **at)
 
 
-def missed_deletions(state: State, seen: set[str], at: At) -> list[Event]:
-    """Events for what the state knows and a complete listing (`seen`, key expressions) lacks."""
-    known: list[tuple[Key[Any, Any], Any]] = [
-        *((GOAL_SPEC, GOAL_SPEC.address(goal)) for goal in state.goals),
-        *((STATEMENT, STATEMENT.address(name)) for name in state.statements),
-        *((STATEMENT, STATEMENT.address(name)) for name in state.statement_states),
-        *((PLACE, PLACE.address(place)) for place in state.places),
-        *((OBJECT, OBJECT.address(thing)) for thing in state.objects),
-        *((ROBOT_SPEC, ROBOT_SPEC.address(robot)) for robot in state.robots),
-    ]
-    return [_DELETED[key](address, at) for key, address in known if key.build(address) not in seen]
+def key_behind(event: Event) -> tuple[Key[Any, Any], Address, Payload] | None:
+    """The key that an event came from, and the value there; None: from none, or it was deleted."""
+    found = _KEYS.get(type(event))
+    if found is None:
+        return None
+    key, field = found
+    value = getattr(event, field)
+    return key, key.address(*(getattr(value, f) for f in key.address.__struct_fields__)), value

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Iterable, Iterator
 from contextlib import asynccontextmanager
+from itertools import chain
 
 from fleet.core.effects import Publish, Retract
 from keyexpr_schema.errors import SchemaError, UndecodablePayload
@@ -30,6 +31,7 @@ class Outbox:
         self._wanted: dict[str, Publish | Retract] = {}
         self._busy: dict[str, asyncio.Task[None]] = {}
         """Keys that are being written, or are about to be."""
+        self._writing: dict[str, Publish | Retract] = {}
         self._room = asyncio.Semaphore(IN_FLIGHT)
 
     @asynccontextmanager
@@ -42,6 +44,11 @@ class Outbox:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
+
+    @property
+    def unconfirmed(self) -> Iterator[Publish | Retract]:
+        """What was sent and is not confirmed."""
+        return chain(self._writing.values(), self._wanted.values())
 
     def send(self, effects: Iterable[Publish | Retract]) -> None:
         """Want these values at their keys."""
@@ -60,6 +67,7 @@ class Outbox:
     async def _write(self, keyexpr: str) -> None:
         async with self._room:
             while (effect := self._wanted.pop(keyexpr, None)) is not None:
+                self._writing[keyexpr] = effect
                 try:
                     if isinstance(effect, Publish):
                         await self._session.confirm(
@@ -73,4 +81,5 @@ class Outbox:
                     log.warning("%s", error)
                     self._wanted.setdefault(keyexpr, effect)
                     await asyncio.sleep(_RETRY_S)
+                del self._writing[keyexpr]
         del self._busy[keyexpr]

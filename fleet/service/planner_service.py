@@ -6,39 +6,53 @@ import asyncio
 import logging
 import time
 import uuid
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import AsyncExitStack
 from typing import Any
 
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.dispatch.dispatcher import next_timer
-from fleet.core.effects import Archive as ToArchive
 from fleet.core.effects import DropJob, Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import At, Event
 from fleet.core.model.skills import Skills, phrases_of
 from fleet.core.state import LOGIC, Policy, State
-from fleet.core.step import step
 from fleet.errors import Superseded
 from fleet.history.archive import Archive
 from fleet.history.retention import Retention
-from fleet.service.catch_up import prior_state, stale_documents, until_synced
+from fleet.service.catch_up import (
+    in_order,
+    known_keys,
+    open_plans,
+    prior_state,
+    stale_documents,
+    until_synced,
+)
+from fleet.service.diagnostics import Diagnostics
 from fleet.service.event_journal import EventJournal
-from fleet.service.event_translation import WATCHED, event_of, missed_deletions
+from fleet.service.event_translation import WATCHED, event_of
 from fleet.service.fleet_clock import FleetClock
+from fleet.service.journaled_core import JournaledCore
 from fleet.service.outbox import Outbox
 from fleet.service.past import Past
 from fleet.service.planning.pool import PlanningPool
+from fleet.service.recovery import Recovered
+from fleet.service.timers import Timers
+from keyexpr_schema.facts import FactKey
 from keyexpr_schema.keyspace import (
+    FACT,
     PLANNER_ALIVE,
     PLANNER_STATUS,
+    REPORT,
     ROBOT_ALIVE,
     SIM_CLOCK,
     SIM_SCENE,
 )
 from keyexpr_schema.payloads.system import PlannerAddress, PlannerAliveAddress, PlannerStatus
-from keyexpr_schema.transport.session import Session, TokenWatch, Watch
+from keyexpr_schema.payloads.world import FactAddress
+from keyexpr_schema.transport.session import Narrowed, Session, TokenWatch, Watch
+
+SNAPSHOT_CHECK_S = 0.5
 
 log = logging.getLogger(__name__)
 CHARGE_S = 3600.0
@@ -65,11 +79,12 @@ class PlannerService:
         self._skills = dict(skills)
         self._policy = replace(policy, skill_phrases=phrases_of(skills))
         self._incarnation = uuid.uuid4().hex[:12]
-        self._state = State()
         self._clock = FleetClock()
         self._outbox = Outbox(session)
+        self._diagnostics = Diagnostics(session, self._outbox)
+        self._core = JournaledCore(journal, self._diagnostics.set_aside)
         self._past = Past(
-            session, archive, self._outbox, retention or Retention(), lambda: self._state
+            session, archive, self._outbox, retention or Retention(), lambda: self._core.state
         )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
         self._held: list[Effect] | None = []
@@ -78,7 +93,7 @@ class PlannerService:
     @property
     def state(self) -> State:
         """What the planner knows now."""
-        return self._state
+        return self._core.state
 
     async def run(self, ready: asyncio.Event | None = None) -> None:
         """Plan until cancelled; sets `ready` once everything that is stored was taken in.
@@ -86,29 +101,34 @@ class PlannerService:
         Raises:
             Superseded: a planner with a higher epoch is in charge.
         """
-        number, snapshot = self._journal.snapshot()
-        if not snapshot.skills:  # in journals of earlier versions no event brings them
-            snapshot = replace(snapshot, skills=self._skills)
         first_run = self._journal.empty
-        self._state = self._replayed(number, snapshot)
+        recovered = self._core.recover(self._skills, self._past.keep)
         async with AsyncExitStack() as stack:
-            watch = await stack.enter_async_context(
-                self._session.watch(*WATCHED, SIM_CLOCK, PLANNER_STATUS)
-            )
-            tokens = await stack.enter_async_context(self._session.watch_tokens(ROBOT_ALIVE))
             await stack.enter_async_context(self._outbox.running())
             await stack.enter_async_context(self._past.running())
+            watch = await stack.enter_async_context(
+                self._session.watch(
+                    *(key for key in WATCHED if key is not REPORT),
+                    Narrowed(REPORT, "plan", lambda: open_plans(self.state)),
+                    SIM_CLOCK,
+                    PLANNER_STATUS,
+                    known=known_keys(self.state, recovered.concluded),
+                    on_trouble=self._diagnostics.store,
+                )
+            )
+            tokens = await stack.enter_async_context(self._session.watch_tokens(ROBOT_ALIVE))
             scenes = await self._session.list(SIM_SCENE)
-            self._clock.resume(self._state.time_s, bool(scenes))
+            self._clock.resume(self.state.time_s, bool(scenes))
             if first_run:
                 self._apply(await prior_state(self._session, self._at()))
             await self._take_charge()
             await stack.enter_async_context(
                 self._session.token(PLANNER_ALIVE, PlannerAliveAddress(self._incarnation))
             )
-            await self._catch_up(watch, tokens)
-            stale = await stale_documents(self._session, self._state)
-            self._go_live()
+            await self._catch_up(watch, tokens, recovered.concluded)
+            stale = await stale_documents(self._session, self.state, all_of_them=first_run)
+            await self._diagnostics.start()
+            self._go_live(recovered)
             self._carry_out(stale)
             if ready is not None:
                 ready.set()
@@ -118,19 +138,12 @@ class PlannerService:
                     tasks.create_task(self._watch_workers(tokens))
                     tasks.create_task(self._take_events())
                     tasks.create_task(self._take_answers())
+                    tasks.create_task(self._keep_snapshots())
                     tasks.create_task(self._past.delete_keys_in_time())
             except* Superseded as group:
                 raise group.exceptions[0] from None
-
-    def _replayed(self, number: int, snapshot: State) -> State:
-        """The state after all that is journaled; what became over on the way is archived, if an
-        earlier run was killed before it could."""
-        state = snapshot
-        self._past.keep(ToArchive(record) for record in snapshot.over)
-        for event in self._journal.events(number):
-            state, effects = step(state, event)
-            self._past.keep(effects)
-        return state
+            finally:
+                self._core.keep_last_snapshot(self._outbox.unconfirmed)
 
     def _at(self) -> At:
         return self._clock.at()
@@ -145,7 +158,7 @@ class PlannerService:
 
         def next_epoch(status: PlannerStatus | None) -> PlannerStatus:
             return PlannerStatus(
-                epoch=1 + max(self._state.epoch, status.epoch if status else 0),
+                epoch=1 + max(self.state.epoch, status.epoch if status else 0),
                 incarnation=self._incarnation,
                 planners=tuple(parts.planners_wait_s),
                 strategies=parts.strategies,
@@ -168,38 +181,56 @@ class PlannerService:
             )
         )
 
-    async def _catch_up(self, watch: Watch, tokens: TokenWatch[Any]) -> None:
-        """Hear of everything stored, and of what went away while no planner was there."""
-        seen: set[str] = set()
-        async for change in until_synced(watch):
-            seen.add(change.key.build(change.address))
-            self._on_change(change)
-        for event in missed_deletions(self._state, seen, self._at()):
-            self._apply(event)
+    async def _catch_up(
+        self, watch: Watch, tokens: TokenWatch[Any], concluded: Collection[FactKey]
+    ) -> None:
+        """Hear of everything stored that matters, and of what went away meanwhile.
+
+        What the planner `concluded` itself, and may not have published, is not overruled by an
+        older word.
+        """
+        for change in in_order([change async for change in until_synced(watch)]):
+            if not (change.key is FACT and self._outdated(change, concluded)):
+                self._on_change(change)
         here: set[tuple[str, str]] = set()
         async for token in until_synced(tokens):
             self._on_token(token)
             if token.alive:
                 here.add((token.address.robot, token.address.incarnation))
-        for robot, runs in self._state.connected.items():
+        for robot, runs in self.state.connected.items():
             for run in runs:
                 if (robot, run) not in here:
                     self._apply(
                         events.WorkerDisconnected(robot=robot, incarnation=run, **self._at())
                     )
-
         while not self._inbox.empty():
             self._apply(self._inbox.get_nowait())
 
-    def _go_live(self) -> None:
+    def _outdated(self, change: Any, concluded: Collection[FactKey]) -> bool:
+        own = self.state.concluded.get(change.address.key)
+        return (
+            change.address.key in concluded
+            and own is not None
+            and change.value is not None
+            and change.value.time_s < own.time_s
+        )
+
+    def _go_live(self, recovered: Recovered) -> None:
         """From now on effects are carried out; those of the catching up all at once.
 
-        Until here nothing was ordered, since a report that is not read yet could forbid it.
+        Until here nothing was ordered, since a report that is not read yet could forbid it. What
+        an earlier run may not have done is done again, where the state says nothing else by now.
         """
         held = [e for e in self._held or () if isinstance(e, Publish | Retract)]
         self._held = None
         self._past.publish_unsettled()
-        self._carry_out((*held, *effects_of(self._state)))
+        state = self.state
+        facts = (
+            Publish(FACT, FactAddress.of(key), own)
+            for key in recovered.concluded
+            if (own := state.concluded.get(key)) is not None and own == state.facts.get(key)
+        )
+        self._carry_out((*recovered.retracted, *facts, *held, *effects_of(state)))
 
     async def _listen(self, watch: Watch) -> None:
         async for change in watch:
@@ -211,7 +242,7 @@ class PlannerService:
                 self._clock.ticked(change.value.time_s)
         elif change.key is PLANNER_STATUS:
             other = change.value
-            if other is not None and other.epoch > self._state.epoch:
+            if other is not None and other.epoch > self.state.epoch:
                 raise Superseded(
                     f"planner {other.incarnation} took charge of realm "
                     f"{self._session.config.realm} (epoch {other.epoch}); this one stops"
@@ -233,25 +264,31 @@ class PlannerService:
 
     async def _take_events(self) -> None:
         """Take events one after the other; wake up when a timer of the state runs out."""
+        timers = Timers()
         while True:
-            timer = next_timer(self._state)
+            timer_s = timers.next(self.state)
             try:
-                async with asyncio.timeout(None if timer is None else timer - time.monotonic()):
+                async with asyncio.timeout(None if timer_s is None else timer_s - time.monotonic()):
                     event = await self._inbox.get()
             except TimeoutError:
                 event = events.TimerFired(**self._at())
+                timers.fired(time.monotonic())
             self._apply(event)
 
     def _apply(self, event: Event) -> None:
-        if (news := self._past.news(event)) is None:
-            return
-        state, effects = step(self._state, news)
-        if state is self._state:
-            return
-        self._journal.append(news, state)
-        self._past.keep(effects)
-        self._state = state
-        self._carry_out(effects)
+        if (news := self._past.news(event)) is not None:
+            effects = self._core.apply(news)
+            self._past.keep(effects)
+            self._carry_out(effects)
+
+    async def _keep_snapshots(self) -> None:
+        """Keep a snapshot whenever there is much to replay, or nothing else to do."""
+        before = self._core.replayable
+        while True:
+            await asyncio.sleep(SNAPSHOT_CHECK_S)
+            if self._core.snapshot_due(idle=self._core.replayable == before):
+                await self._core.keep_snapshot(self._outbox.unconfirmed)
+            before = self._core.replayable
 
     def _carry_out(self, effects: Sequence[Effect]) -> None:
         if self._held is not None:

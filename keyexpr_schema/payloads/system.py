@@ -35,11 +35,36 @@ class UndecodableAddress(Address, frozen=True):
 
 
 class UndecodableValue(Payload, frozen=True, kw_only=True):
-    """A value that was put on a key and is not what the key promises."""
+    """A value that was put on a key and is not what the key promises.
+
+    `digest` is set where it can be decoded, and could not be used all the same: the SHA-256 of the
+    value as it is written. While the key holds that value, the report stands.
+    """
 
     component: Id
     keyexpr: str
     reason: str
+    count: int = 1
+    digest: str | None = None
+
+
+class DiagnosticAddress(Address, frozen=True):
+    """One thing that `component` looks after, named by `check`."""
+
+    component: str
+    check: str
+
+
+class Diagnostic(Payload, frozen=True, kw_only=True):
+    """What is wrong with a component now, in a sentence; the key is deleted when it is over.
+
+    `since_s` is Unix time, `count` how often it happened in this run of the component.
+    """
+
+    component: Id
+    check: Id
+    sentence: str
+    since_s: float
     count: int = 1
 
 

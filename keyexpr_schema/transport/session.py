@@ -241,6 +241,10 @@ class Session:
         """Report a value that means nothing to us, once for each distinct one of a key."""
         self._undecodable.report(keyexpr, data, reason)
 
+    def report_unusable(self, key: Key[A, P], address: A, value: P, reason: str) -> None:
+        """Report a value that can be read, but not be used, once for each distinct one."""
+        self._undecodable.report(key.build(address), key.encode(value), reason, decodes=True)
+
     def watch(
         self,
         *selections: Key[Any, Any] | tuple[Key[Any, Any], dict[str, str | int]] | Narrowed,

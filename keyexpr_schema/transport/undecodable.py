@@ -18,8 +18,11 @@ class UndecodableReports:
         self._link, self._component, self._trace = link, component, trace
         self._reported: dict[str, tuple[str, int]] = {}
 
-    def report(self, keyexpr: str, data: bytes, reason: str) -> None:
-        """Report `data`, found at `keyexpr`, unless that was the last to be reported there."""
+    def report(self, keyexpr: str, data: bytes, reason: str, *, decodes: bool = False) -> None:
+        """Report `data`, found at `keyexpr`, unless that was the last to be reported there.
+
+        `decodes`: it can be read, and is of no use all the same.
+        """
         value = hashlib.sha256(reason.encode() + b"\0" + data).hexdigest()
         last, count = self._reported.get(keyexpr, ("", 0))
         if last == value:
@@ -29,8 +32,17 @@ class UndecodableReports:
         where = UNDECODABLE.build(UndecodableAddress(self._component, digest))
         payload = UNDECODABLE.encode(
             UndecodableValue(
-                component=self._component, keyexpr=keyexpr, reason=reason, count=count + 1
+                component=self._component,
+                keyexpr=keyexpr,
+                reason=reason,
+                count=count + 1,
+                digest=digest_of(data) if decodes else None,
             )
         )
         self._trace.note("put", UNDECODABLE, where)
         self._link.send_soon(where, payload, encoding_of(UNDECODABLE), block=True)
+
+
+def digest_of(data: bytes) -> str:
+    """What tells one value from others, in `UndecodableValue.digest`."""
+    return hashlib.sha256(data).hexdigest()

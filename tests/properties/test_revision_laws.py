@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from fleet.core import events
 from fleet.core.events import Event
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry, PlanningJob
+from fleet.core.plan_entry import PlanEntry, PlanningJob
+from fleet.core.plan_index import OUTSTANDING
 from fleet.core.planning_input import PlanningInput
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.revision.reconcile import Revision, reconcile
@@ -21,7 +22,7 @@ from fleet.core.revision.residual_plan import residual_plan
 from keyexpr_schema.facts import HOLDING, NOTHING
 from keyexpr_schema.ids import bound
 from keyexpr_schema.payloads.plans import Plan, Task
-from keyexpr_schema.payloads.requests import ReplanRequest
+from keyexpr_schema.payloads.requests import Control, ControlRequest, ReplanRequest
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
 from tests.support.fleet_model import Answer, FleetModel
 from tests.support.household import bring, carrier, manipulator
@@ -168,6 +169,8 @@ INTERESTING = (
     "done already",
     "work ended meanwhile",
     "another reason meanwhile",
+    "ordered while a plan was made",
+    "ordered meanwhile, and goes on",
 )
 
 Step = tuple[str, int]
@@ -175,7 +178,7 @@ STEPS = st.lists(
     st.tuples(
         st.sampled_from(
             ["succeed", "succeed", "succeed", "start", "answer", "answer", "fail", "lose", "return",
-             "move", "delete", "replan", "confirm", "late"]
+             "move", "delete", "replan", "add", "join", "confirm", "late"]
         ),
         st.integers(0, 11),
     ),
@@ -214,6 +217,16 @@ def do(model: Watched, what: str, pick: int, away: set[str]) -> None:
     elif what == "replan":
         request = ReplanRequest(request=f"q{len(model.journal)}", plan="plan-1", reason="so")
         model.receive(events.ReplanRequested, request=request)
+    elif what == "add":
+        added = ControlRequest(
+            request=f"q{len(model.journal)}", control=Control.ADD_TASK, plan="plan-1",
+            skill="navigate", args={"to": ("kitchen", "hallway", "living_room")[pick // 4]},
+        )  # fmt: skip
+        model.receive(events.ControlRequested, request=added)
+    elif what == "join" and "r9" not in model.state.robots:
+        model.receive(events.RobotRegistered, spec=manipulator("r9"))
+        model.receive(events.WorkerConnected, robot="r9", incarnation="i1")
+        model.learn("r9", "holding", "nothing")
     elif what == "late":
         model.time_s += 1000.0
         model.receive(events.TimerFired)

@@ -61,6 +61,6 @@ if __name__ == "__main__":
     if len(sys.argv) == 3:
         data, made = Path(sys.argv[1]), sys.argv[2]
         with EventJournal(data) as kept:
-            lines = [encode_event(event) for event in kept.events()]
+            lines = [encode_event(event) for _, event in kept.events()]
         (HERE / f"{made}.events.jsonl").write_bytes(b"\n".join(lines) + b"\n")
     _write_effects(sys.argv[-1])

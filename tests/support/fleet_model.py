@@ -13,7 +13,8 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.core import events
 from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_index import OUTSTANDING
 from fleet.core.planning_input import PlanningInput
 from fleet.core.state import LOGIC, Policy, State
 from fleet.core.step import step
@@ -26,6 +27,7 @@ from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskState
 from keyexpr_schema.payloads.world import Fact
+from tests.support.derived import check_derived
 from tests.support.household import PLACES, SKILLS, bring, carrier, cup, manipulator
 
 Answer = events.PlanningSucceeded | events.PlanningFailed
@@ -38,6 +40,9 @@ COMPOSITION: Composition = replace(
 
 
 BOTH = (bring(1, "hallway"), bring(2, "living_room"))
+
+CHECK_EVERY = 5
+"""Events between two looks at what the core keeps up: each derives everything anew."""
 
 
 class FleetModel:
@@ -102,11 +107,15 @@ class FleetModel:
         if self.state is before:
             assert effects == ()
             return
+        if len(self.journal) % CHECK_EVERY == 0:
+            check_derived(before, self.state, effects)
         self.journal.append(encode_event(event))
         for plan, entry in self.state.plans.items():
             old = before.plans.get(plan)
             if old is not None and entry.plan.revision > old.plan.revision:
                 check_revision(old, entry)
+                self.met["ordered meanwhile, and goes on"] += check_given_out(old, entry)
+            self.met["discarded"] += old is not None and entry.discarded > old.discarded
         self._take(effects)
 
     def _take(self, effects: tuple[Effect, ...]) -> None:
@@ -168,6 +177,7 @@ class FleetModel:
         entry = self.state.plans[order.plan]
         record = entry.records[order.task]
         if new:
+            self.met["ordered while a plan was made"] += entry.job is not None
             assert record.goal in (None, *self.state.goals), "ordered for a goal that is no more"
         for before in (*record.after, *record.behind):
             if before in entry.records:
@@ -340,6 +350,20 @@ def check_revision(old: PlanEntry, new: PlanEntry) -> None:
         was, now = old.records[name], new.records[name]
         if was.state in OUTSTANDING and now.state in OUTSTANDING:
             assert (was.robot, was.attempt) == (now.robot, now.attempt), "running work disturbed"
+
+
+def check_given_out(old: PlanEntry, new: PlanEntry) -> bool:
+    """What was ordered while the revision was made is part of it; says whether there was any."""
+    asked_for = set(old.job.under_way if old.job is not None else ())
+    given_out = [
+        name
+        for name in old.given_out.keys() - asked_for - set(old.unwanted)
+        if old.records[name].state in {TaskState.SUCCEEDED, *OUTSTANDING}
+    ]
+    names = {task.task for task in new.plan.tasks}
+    assert names.issuperset(given_out), "done, and not in the plan: it would be done again"
+    assert not set(given_out) & set(new.unwanted), "given out, and cancelled at once"
+    return bool(given_out)
 
 
 def _robots(order: Order, state: State) -> set[str]:

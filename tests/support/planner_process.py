@@ -129,7 +129,8 @@ async def next_order(session: Session, done: set[str]) -> Order:
 
 
 async def carry_out(session: Session, order: Order, took_s: float | None = None) -> None:
-    """Report an order as done, with the facts that follow, and perhaps how long it took."""
+    """Do an order as a worker does: the facts that follow, then a report that it is done, and
+    perhaps how long it took."""
     facts = tuple(
         fact(literal.variable.subject, literal.variable.relation, str(literal.value), order.robot)
         for literal in SKILLS[order.skill].ground(order.args).after
@@ -140,6 +141,8 @@ async def carry_out(session: Session, order: Order, took_s: float | None = None)
         state=ReportState.SUCCEEDED, facts=facts,
         started_s=None if took_s is None else 100.0, ended_s=100.0 + (took_s or 0.0),
     )  # fmt: skip
+    for known in facts:
+        await session.confirm(FACT, FactAddress.of(known.key), known)
     await session.confirm(REPORT, ReportAddress.of(report), report)
 
 

@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.plan_index import robots_of
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import set_entry
-from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
+from fleet.core.state_updates import set_entry, touch
+from fleet.core.touches import Part, Touch
+from keyexpr_schema.payloads.tasks import TaskState
 
 SINCE_LOGIC = 1
 """Before this logic of the core, what a lost robot had an order for had failed."""
@@ -37,9 +38,9 @@ def give_up_work_of_lost_robots(state: State) -> State:
         reason = f"robot {robot} has been away for {state.policy.lost_after_s:g} s"
         if robot not in state.robots:
             reason = f"robot {robot} was unregistered"
-        for entry in state.plans.values():
-            if not entry.ended and _counts_on(entry, robot):
-                state = _give_up(state, entry, robot, reason)
+        for plan in state.index.active:
+            if _counts_on(state, plan, robot):
+                state = _give_up(state, plan, robot, reason)
         if robot not in state.robots and not state.connected.get(robot):
             state = _write_off(state, robot, reason)
     return state
@@ -47,26 +48,32 @@ def give_up_work_of_lost_robots(state: State) -> State:
 
 def next_loss(state: State) -> float | None:
     """When, by `State.monotonic_s`, a robot that is away becomes lost to a plan that needs it."""
+    if not state.gone_since:
+        return None
+    active = (state.plans[plan] for plan in state.index.active)
     counting = [
-        entry
-        for entry in state.plans.values()
-        if not entry.ended and entry.job is None and (entry.replan is None or entry.cancelling)
+        entry.plan.plan
+        for entry in active
+        if entry.job is None and (entry.replan is None or entry.cancelling)
     ]
     times = [
         since + state.policy.lost_after_s
         for robot, since in state.gone_since.items()
-        if not lost(state, robot) and any(_counts_on(entry, robot) for entry in counting)
+        if not lost(state, robot) and any(_counts_on(state, plan, robot) for plan in counting)
     ]
     return min(times, default=None)
 
 
-def _give_up(state: State, entry: PlanEntry, robot: str, reason: str) -> State:
+def _give_up(state: State, plan: str, robot: str, reason: str) -> State:
+    entry = state.plans[plan]
     under_way = [
         record
         for record in entry.outstanding()
-        if _concerns(record, robot) and record.task not in entry.unwanted
+        if robot in robots_of(record) and record.task not in entry.unwanted
     ]
-    if not under_way and (entry.replan is not None or entry.cancelling):
+    if not under_way and entry.cancelling:
+        return touch(state, Touch(Part.PLAN, plan))  # it waits for that robot no longer
+    if not under_way and entry.replan is not None:
         return state
     if state.logic < SINCE_LOGIC:
         given_up = [replace(record, state=TaskState.FAILED, reason=reason) for record in under_way]
@@ -81,7 +88,8 @@ def _give_up(state: State, entry: PlanEntry, robot: str, reason: str) -> State:
 
 def _write_off(state: State, robot: str, reason: str) -> State:
     """Nobody will ever report on these orders."""
-    for entry in state.plans.values():
+    for plan in sorted({plan for plan, _ in state.index.work.get(robot, ())}):
+        entry = state.plans[plan]
         written_off = {
             record.task: replace(record, state=TaskState.CANCELLED, reason=reason)
             for record in entry.outstanding()
@@ -92,17 +100,12 @@ def _write_off(state: State, robot: str, reason: str) -> State:
     return state
 
 
-def _counts_on(entry: PlanEntry, robot: str) -> bool:
+def _counts_on(state: State, plan: str, robot: str) -> bool:
     """Whether the plan has something to do for a robot that was not given up."""
-    return any(
-        record.state not in ENDED_TASKS
-        and _concerns(record, robot)
-        and (
-            entry.cancelling or record.state not in OUTSTANDING or record.task not in entry.unwanted
-        )
-        for record in entry.current()
+    entry = state.plans[plan]
+    return robot in entry.index.needs or any(
+        name == plan
+        and task in entry.index.graph.position
+        and (entry.cancelling or task not in entry.unwanted)
+        for name, task in state.index.work.get(robot, ())
     )
-
-
-def _concerns(record: TaskRecord, robot: str) -> bool:
-    return robot in (record.robot, *record.args.values())

@@ -1,46 +1,71 @@
 """The ready set: tasks whose turn has come and whose robots are free, ordered at once.
 
-The dispatcher asks for each waiting task, plans by priority and tasks in the plan's order.
+The dispatcher asks when a task's predecessors are done, and when a robot may have become free.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from heapq import merge
+
 from msgspec.structs import replace
 
-from fleet.core.dispatch.while_replanning import waits_for_new_plan
+from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
 from fleet.core.model.preconditions import action_of, unmet_before
 from fleet.core.model.skills import Action
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import conditions_of, give_up, open_goals, set_entry, set_record
+from fleet.core.state_updates import give_up, set_entry, set_given_out, set_record
 from keyexpr_schema.facts import AT
-from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.plans import PlanState
+from keyexpr_schema.payloads.tasks import TaskState
 
 
-def by_priority(state: State) -> list[str]:
-    """The plans in the order in which their ready tasks are given robots."""
-
-    def rank(plan: str) -> tuple[int, str]:
-        goals = [state.goals[g] for g in state.plans[plan].plan.goals if g in state.goals]
-        return -max((goal.priority for goal in goals), default=0), plan
-
-    return sorted(state.plans, key=rank)
+def by_priority(state: State, plans: Iterable[str]) -> list[str]:
+    """Plans that have not ended, in the order in which their ready tasks are given robots."""
+    active = state.index.active
+    return sorted((plan for plan in plans if plan in active), key=lambda p: (-active[p], p))
 
 
-def order_if_ready(state: State, plan: str, record: TaskRecord, reservations: bool = True) -> State:
+def order_ready(state: State, plan: str, tasks: Iterable[str], robots: Iterable[str]) -> State:
+    """Order of `tasks`, and of what is ready for `robots`, what can be, in the plan's order.
+
+    Nothing else can have become ready: what a task waits for is its predecessors and its robots.
+    """
+    entry = state.plans[plan]
+    position = entry.index.graph.position
+    now = [state]
+
+    def ready_for(robot: str) -> Iterator[tuple[int, str]]:
+        for task in entry.index.ready.get(robot, ()):
+            if not _is_free(now[0], robot, plan, reservations=True):
+                return
+            yield position[task], task
+
+    first = sorted((position[task], task) for task in tasks if task in entry.index.open)
+    for _, task in merge(first, *(ready_for(robot) for robot in sorted(robots))):
+        now[0] = order_if_ready(now[0], plan, task)
+        if not may_order(now[0], now[0].plans[plan]):
+            break
+    return now[0]
+
+
+def may_order(state: State, entry: PlanEntry) -> bool:
+    """Whether tasks of the plan are given out now, if nothing else holds them back."""
+    running = entry.state is PlanState.RUNNING and not entry.cancelling
+    return running and not stands_still(state, entry)
+
+
+def order_if_ready(state: State, plan: str, task: str, reservations: bool = True) -> State:
     """Order a waiting task if nothing holds it back; replan if the world is not as it must be.
 
     See `_is_free` for `reservations`.
     """
     entry = state.plans[plan]
-    befores = (*record.after, *record.behind)
-    if any(
-        entry.records[before].state is not TaskState.SUCCEEDED
-        for before in befores
-        if before in entry.records
-    ):
+    if entry.index.open.get(task) != 0:
         return state
+    record = entry.records[task]
     action = action_of(record, state.skills)
     if action is None:
         reason = f"{record.task} cannot start: there is no skill {record.skill} any more"
@@ -68,8 +93,8 @@ def order_if_ready(state: State, plan: str, record: TaskRecord, reservations: bo
         way_s=_way_s(state, action),
     )
     if entry.job is not None:
-        entry = replace(entry, given_out=entry.given_out.set(record.task, None))
-    return set_record(state, entry, ordered)
+        state = set_given_out(state, entry, task)
+    return set_record(state, state.plans[plan], ordered)
 
 
 def _touches_unwanted_work(state: State, action: Action) -> bool:
@@ -80,9 +105,8 @@ def _touches_unwanted_work(state: State, action: Action) -> bool:
     variables = action.variables
     for entry in state.plans.values():
         for task in entry.unwanted:
-            record = entry.records[task]
-            if record.state in OUTSTANDING:
-                other = action_of(record, state.skills)
+            if task in entry.index.outstanding:
+                other = action_of(entry.records[task], state.skills)
                 if other is None or variables & other.variables:
                     return True
     return False
@@ -108,30 +132,25 @@ def _is_free(state: State, robot: str, plan: str, reservations: bool) -> bool:
     """
     if not state.connected.get(robot):
         return False
-    carries = _carries_for(state, robot, state.plans[plan])
-    for entry in state.plans.values():
-        begun: set[str] = set()
-        unfinished: set[str] = set()
-        for record in entry.records.values():
-            if robot not in (record.robot, *record.args.values()):
-                continue
-            if record.state in OUTSTANDING:
-                return False
-            if record.robot == robot and record.state is TaskState.SUCCEEDED:
-                begun.add(record.actor)
-            elif record.robot == robot and record.state is TaskState.WAITING:
-                unfinished.add(record.actor)
-        if entry.plan.plan == plan or entry.ended or carries:
+    if robot in state.index.work:
+        return False
+    if _carries_for(state, robot, plan):
+        return True
+    for other in state.index.active:
+        if other == plan:
             continue
-        if (reservations and begun & unfinished) or _carries_for(state, robot, entry):
+        if reservations and robot in state.plans[other].index.reserved:
+            return False
+        if _carries_for(state, robot, other):
             return False
     return True
 
 
-def _carries_for(state: State, robot: str, entry: PlanEntry) -> bool:
+def _carries_for(state: State, robot: str, plan: str) -> bool:
     """Whether a robot has something with it that an open goal of the plan is about."""
+    index = state.index
     return any(
-        (fact := state.fact(AT, subject)) is not None and fact.value == robot
-        for condition in conditions_of(state, open_goals(state, entry))
-        for subject in condition.subjects
+        plan in index.plans_of.get(goal, ())
+        for subject in index.things_at.get(robot, ())
+        for goal in index.goals_about.get(subject, ())
     )

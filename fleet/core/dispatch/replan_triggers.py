@@ -9,19 +9,15 @@ and the shell runs that: `planners.plan_repair` first, a new plan otherwise.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from msgspec.structs import replace
-
-from fleet.core.dispatch.delays import late_task
 from fleet.core.model.preconditions import action_of
 from fleet.core.model.skills import Action
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_index import OUTSTANDING
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import GoalState
-from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
+from keyexpr_schema.payloads.tasks import TaskRecord
 from keyexpr_schema.payloads.world import Fact
 
 
@@ -30,67 +26,48 @@ def contradicted(state: State, entry: PlanEntry, fact: Fact) -> PlanEntry | None
     otherwise, and nothing before it changes it.
 
     What a robot says of the work it is doing is part of that work. So is what anybody says that
-    the work is just making true, and what was so before it began and is heard of only now.
+    the work is just making true, or that it found when it began and is heard of only now.
     """
     known = fact.key
-    unfinished = {
-        record.task: (record, action)
-        for record in entry.current()
-        if record.state not in ENDED_TASKS
-        and (action := action_of(record, state.skills)) is not None
-    }
-    under_way = [each for each in unfinished.values() if each[0].state in OUTSTANDING]
-    making = any(_is_of_its_making(record, action, fact) for record, action in under_way)
-    if making and state.plans_while_acting:
-        return None
-    for record, action in unfinished.values():
-        needed = [literal for literal in action.before if literal.variable == known]
+    for task in entry.index.exposed.get(known, ()):
+        record = entry.records[task]
+        action = action_of(record, state.skills)
+        needed = [row for row in action.before if row.variable == known] if action else []
         if not needed or needed[0].value == fact.value:
             continue
         if record.state in OUTSTANDING and fact.source == record.robot:
             continue
-        if not any(
-            known == literal.variable
-            for before in _before(record.task, unfinished)
-            for literal in unfinished[before][1].after
-        ):
-            sentence = f"{record.task} needs {needed[0]}, and {fact.source} says otherwise"
-            return entry.to_replan(
-                ReplanScope.REPAIR,
-                sentence,
-                goals=(record.goal,),
-                tasks=(record.task,),
-                variables=(known,),
-            )
+        if state.plans_while_acting and _is_being_made(state, entry, fact):
+            return None
+        sentence = f"{record.task} needs {needed[0]}, and {fact.source} says otherwise"
+        return entry.to_replan(
+            ReplanScope.REPAIR,
+            sentence,
+            goals=(record.goal,),
+            tasks=(record.task,),
+            variables=(known,),
+        )
     return None
 
 
+def _is_being_made(state: State, entry: PlanEntry, fact: Fact) -> bool:
+    under_way = (r for r in entry.outstanding() if r.task in entry.index.graph.position)
+    actions = ((record, action_of(record, state.skills)) for record in under_way)
+    return any(action and _is_of_its_making(record, action, fact) for record, action in actions)
+
+
 def _is_of_its_making(record: TaskRecord, action: Action, fact: Fact) -> bool:
-    """Whether a fact says what a task under way makes true, or is from before the task began."""
-    if fact.key not in action.variables:
-        return False
+    """Whether a fact says what a task under way makes true, or what it found when it began."""
+    said = (fact.key, fact.value)
+    if said in action.after:
+        return True
     begun_s = record.ordered_s if record.started_s is None else record.started_s
-    return (begun_s is not None and fact.time_s < begun_s) or any(
-        literal == (fact.key, fact.value) for literal in action.after
-    )
-
-
-def _before(task: str, unfinished: Mapping[str, tuple[TaskRecord, Action]]) -> set[str]:
-    """The unfinished tasks that come before a task."""
-    befores: set[str] = set()
-    ahead = [task]
-    while ahead:
-        record = unfinished[ahead.pop()][0]
-        for before in (*record.after, *record.behind):
-            if before in unfinished and before not in befores:
-                befores.add(before)
-                ahead.append(before)
-    return befores
+    return said in action.before and begun_s is not None and 0.0 < fact.time_s < begun_s
 
 
 def unforeseen(state: State, entry: PlanEntry) -> PlanEntry | None:
     """The entry with what has come up that the plan does not provide for, if anything has."""
-    return _found_or_not_done(state, entry) or _new_robots(state, entry) or _late(state, entry)
+    return _found_or_not_done(state, entry) or _new_robots(state, entry)
 
 
 def _found_or_not_done(state: State, entry: PlanEntry) -> PlanEntry | None:
@@ -100,7 +77,7 @@ def _found_or_not_done(state: State, entry: PlanEntry) -> PlanEntry | None:
         if where is not None:
             sentence = f"{thing} was found: it is at {where}"
             return entry.to_replan(ReplanScope.REPAIR, sentence, whole=True)
-    if all(record.state is TaskState.SUCCEEDED for record in entry.current()):
+    if entry.index.unfinished == 0:
         for goal in entry.plan.goals:
             status = state.goal_states.get(goal)
             if status is None or status.state is GoalState.REACHED:
@@ -118,20 +95,12 @@ def _new_robots(state: State, entry: PlanEntry) -> PlanEntry | None:
     More of a kind that is there already can share what is left. A new kind may help in ways that
     the plan knows nothing of, so that everything is planned again.
     """
+    if not entry.team or entry.team == state.team() or not entry.index.waiting:
+        return None
     new = sorted(set(state.team()) - set(entry.team))
-    if not entry.team or not new or all(r.state is not TaskState.WAITING for r in entry.current()):
+    if not new:
         return None
     sentence = f"{' and '.join(new)} can help now"
     kinds = {state.robots[robot].model for robot in entry.team if robot in state.robots}
     of_known_kinds = all(state.robots[robot].model in kinds for robot in new)
     return entry.to_replan(ReplanScope.REALLOCATE if of_known_kinds else ReplanScope.ANEW, sentence)
-
-
-def _late(state: State, entry: PlanEntry) -> PlanEntry | None:
-    late = late_task(state, entry)
-    if late is None:
-        return None
-    sentence = f"{late.robot} is late with {late.task} ({late.skill})"
-    entry = replace(entry, late=(*entry.late, late.task))
-    robots = () if late.robot is None else (late.robot,)
-    return entry.to_replan(ReplanScope.REALLOCATE, sentence, robots=robots)

@@ -10,10 +10,10 @@ each time less is given out meanwhile.
 from __future__ import annotations
 
 from fleet.core.model.skills import Action
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanReason
 from fleet.core.state import State
-from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.tasks import TaskRecord
 
 
 def stands_still(state: State, entry: PlanEntry) -> bool:
@@ -32,7 +32,7 @@ def waits_for_new_plan(state: State, entry: PlanEntry, record: TaskRecord, actio
         return True
     if entry.job is None or (entry.discarded == 0 and _keeps_actors(entry)):
         return False
-    return entry.discarded > 1 or not _has_begun(entry, record)
+    return entry.discarded > 1 or not _has_begun(state, entry, record)
 
 
 def _touches(reason: ReplanReason, record: TaskRecord, action: Action) -> bool:
@@ -52,11 +52,11 @@ def _keeps_actors(entry: PlanEntry) -> bool:
     return job is not None and (job.residual is not None or job.proposal is not None)
 
 
-def _has_begun(entry: PlanEntry, record: TaskRecord) -> bool:
+def _has_begun(state: State, entry: PlanEntry, record: TaskRecord) -> bool:
     """Whether the task goes on with what its robot has begun."""
+    if record.robot is not None and (record.robot, record.actor) in entry.index.begun:
+        return True
     return any(
-        other.actor == record.actor
-        and other.robot == record.robot
-        and (other.state in OUTSTANDING or other.state is TaskState.SUCCEEDED)
-        for other in entry.records.values()
+        plan == record.plan and entry.records[task].actor == record.actor
+        for plan, task in state.index.work.get(record.robot or "", ())
     )

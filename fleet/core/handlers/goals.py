@@ -10,7 +10,16 @@ from fleet.core.over import goal_taken_back
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import GoalsAdded, ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import cancel, conclude, set_entry, set_goal, without_goal
+from fleet.core.state_updates import (
+    cancel,
+    conclude,
+    set_entry,
+    set_goal,
+    set_spec,
+    touch,
+    without_goal,
+)
+from fleet.core.touches import Part, Touch
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, read_goal
 from keyexpr_schema.facts import AT, NOTHING, SEARCHED, Value
@@ -24,7 +33,7 @@ def goal_put(state: State, event: events.GoalPut) -> State:
     if state.goals.get(goal.goal) == goal:
         return state
     known_ended = goal.goal not in state.goals and goal.goal in state.goal_states
-    state = replace(state, goals=state.goals.set(goal.goal, goal))
+    state = set_spec(state, goal)
     if known_ended:
         return state  # under an earlier planner
     return _take_goal(state, goal)
@@ -35,9 +44,8 @@ def goal_deleted(state: State, event: events.GoalDeleted) -> State:
     if event.goal not in state.goals:
         return state
     state = goal_taken_back(state, event.goal)
-    for entry in state.plans.values():
-        if not entry.ended and event.goal in entry.wanted_goals:
-            state = _goal_taken_out(state, entry, event.goal)
+    for plan in state.index.plans_of.get(event.goal, ()):
+        state = _goal_taken_out(state, state.plans[plan], event.goal)
     return state
 
 
@@ -86,9 +94,10 @@ def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
 
 def understand_again(state: State) -> State:
     """Read goals' sentences again, now that there are other names."""
-    for goal in state.goals.values():
+    names = [name for known in state.index.in_state.values() for name in known]
+    for goal in sorted((state.goals[n] for n in names if n in state.goals), key=_in_order):
         status = state.goal_states[goal.goal]
-        read = _understand(state, goal, status)
+        read, _ = _understand(state, goal, status)
         if status.state is GoalState.REJECTED and read.reason != status.reason:
             state = _take_goal(state, goal, status)
         elif status.state is GoalState.WAITING and read.stages and read.stages != status.stages:
@@ -115,13 +124,15 @@ def next_stage(state: State, goal: str) -> State:
 
 def _take_goal(state: State, goal: Goal, known: GoalStatus | None = None) -> State:
     """Say what a goal means; a sentence that the grammar refuses may go to a language model."""
-    status = _understand(state, goal, known)
+    status, reading = _understand(state, goal, known)
     state = set_goal(state, status)
-    if status.state is GoalState.WAITING:
-        state = _presume(state, goal.goal, _reading(state, goal))
+    if reading is not None:
+        state = _presume(state, goal.goal, reading)
     if status.state is GoalState.REJECTED and state.policy.interpreter and not goal.conditions:
         state = set_goal(state, replace(status, state=GoalState.READING))
-        return replace(state, interpreting=tuple({*state.interpreting, goal.goal}))
+        interpreting = tuple(dict.fromkeys([*state.interpreting, goal.goal]))
+        state = replace(state, interpreting=interpreting)
+        return touch(state, Touch(Part.INTERPRETING, goal.goal))
     return _begin_stage(state, goal.goal)
 
 
@@ -139,8 +150,15 @@ def _begin_stage(state: State, goal: str) -> State:
     return state
 
 
-def _understand(state: State, goal: Goal, known: GoalStatus | None) -> GoalStatus:
-    """How a goal stands, read now; `known` is how it stood, if it is not a new one."""
+def _in_order(goal: Goal) -> tuple[int, str]:
+    return goal.ordinal, goal.goal
+
+
+def _understand(
+    state: State, goal: Goal, known: GoalStatus | None
+) -> tuple[GoalStatus, Reading | None]:
+    """How a goal stands, read now, and its reading if it has one; `known` is how it stood, if it is
+    not a new one."""
     status = GoalStatus(
         goal=goal.goal,
         state=GoalState.WAITING,
@@ -154,8 +172,9 @@ def _understand(state: State, goal: Goal, known: GoalStatus | None) -> GoalStatu
             for name in (*condition.subjects, condition.value):
                 _check_name(state, name)
     except NotUnderstood as error:
-        return replace(status, state=GoalState.REJECTED, reason=str(error))
-    return replace(status, conditions=stages[0], stages=stages, note=_note(state, reading))
+        return replace(status, state=GoalState.REJECTED, reason=str(error)), None
+    status = replace(status, conditions=stages[0], stages=stages, note=_note(state, reading))
+    return status, reading
 
 
 def _reading(state: State, goal: Goal) -> Reading:
@@ -185,8 +204,10 @@ def _presume(state: State, goal: str, reading: Reading) -> State:
 
 
 def _check_name(state: State, name: Value) -> None:
-    known = {**state.places, **state.objects, **state.robots}
-    if isinstance(name, str) and name not in known and name != NOTHING:
+    if not isinstance(name, str) or name == NOTHING:
+        return
+    if not any(name in known for known in (state.places, state.objects, state.robots)):
+        known = (*state.places, *state.objects, *state.robots)
         raise NotUnderstood(
             f"{name!r} is nothing that is known; known are {', '.join(sorted(known)) or 'none'}"
         )

@@ -13,7 +13,16 @@ from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.replan_reasons import ReplanReason, Wish
 from fleet.core.revision.reconcile import reconcile
 from fleet.core.state import State
-from fleet.core.state_updates import answer, give_up, mark_goals, set_entry, without_goal
+from fleet.core.state_updates import (
+    answer,
+    give_up,
+    mark_goals,
+    put_answer,
+    set_entry,
+    touch,
+    without_goal,
+)
+from fleet.core.touches import Part, Touch
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Answer
@@ -151,18 +160,19 @@ def _show(state: State, job: PlanningJob, event: events.PlanningSucceeded) -> St
         preview=event.plan,
         preview_status=status_of(entry),
     )
-    return replace(
-        state,
-        previews=state.previews.without(job.request),
-        answers=state.answers.set(job.request, reply),
-    )
+    return put_answer(_without_preview(state, job.request), reply)
+
+
+def _without_preview(state: State, request: str) -> State:
+    state = replace(state, previews=state.previews.without(request))
+    return touch(state, Touch(Part.PREVIEW, request))
 
 
 def planning_failed(state: State, event: events.PlanningFailed) -> State:
     """A job failed: a first plan is rejected, a running one goes on or is given up."""
     if (preview := _preview_of(state, event.job)) is not None:
         assert preview.request is not None
-        state = replace(state, previews=state.previews.without(preview.request))
+        state = _without_preview(state, preview.request)
         return answer(state, preview.request, False, event.reason, violations=event.violations)
     entry = next(
         (b for b in state.plans.values() if b.job is not None and b.job.job == event.job), None

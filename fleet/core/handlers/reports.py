@@ -9,7 +9,8 @@ from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.model.durations import learn
 from fleet.core.model.preconditions import action_of, effects_hold, unmet_before
 from fleet.core.model.skills import Action
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_index import OUTSTANDING
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import (
@@ -18,10 +19,11 @@ from fleet.core.state_updates import (
     give_up,
     mark_goals,
     open_goals,
-    set_entry,
     set_record,
+    touch,
     without_goal,
 )
+from fleet.core.touches import Part, Touch
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.tasks import Report, ReportState, TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact
@@ -97,31 +99,23 @@ def _succeeded(state: State, entry: PlanEntry, record: TaskRecord, report: Repor
         if literal.variable not in reported:
             time_s = report.ended_s or state.time_s
             state = conclude(state, Fact.of(literal, PLANNER_SOURCE, time_s))
-    entry = replace(
-        entry,
-        records=entry.records.set(record.task, _ended(record, report, TaskState.SUCCEEDED)),
-    )
+    state = set_record(state, entry, _ended(record, report, TaskState.SUCCEEDED))
     if record.task in entry.unwanted:
-        entry = _counting_late_success(entry, record)
-    return set_entry(state, entry)
+        entry = state.plans[entry.plan.plan]
+        if (again := _wanted_again(entry, record)) is not None:
+            state = set_record(state, entry, again)
+    return state
 
 
-def _counting_late_success(entry: PlanEntry, done: TaskRecord) -> PlanEntry:
+def _wanted_again(entry: PlanEntry, done: TaskRecord) -> TaskRecord | None:
     """What was done after it had been given up need not be done again, if it is still wanted."""
     for record in entry.current():
-        if (
-            record.state is TaskState.WAITING
-            and (record.skill, record.args) == (done.skill, done.args)
-            and all(
-                entry.records[before].state is TaskState.SUCCEEDED
-                for before in (*record.after, *record.behind)
-                if before in entry.records
-            )
+        if (record.skill, record.args) == (done.skill, done.args) and not entry.index.open.get(
+            record.task, 1
         ):
             reason = f"{done.robot} had done it as {done.task}"
-            again = replace(record, state=TaskState.SUCCEEDED, reason=reason)
-            return replace(entry, records=entry.records.set(record.task, again))
-    return entry
+            return replace(record, state=TaskState.SUCCEEDED, reason=reason)
+    return None
 
 
 def _learned(state: State, record: TaskRecord, report: Report, action: Action | None) -> State:
@@ -137,7 +131,9 @@ def _learned(state: State, record: TaskRecord, report: Report, action: Action | 
         return state
     took_s = report.ended_s - report.started_s
     known = learn(state.durations, spec.model, action.skill, took_s, record.way_s, report.ended_s)
-    return state if known is state.durations else replace(state, durations=dict(known))
+    if known is state.durations:
+        return state
+    return touch(replace(state, durations=dict(known)), Touch(Part.DURATIONS, spec.model))
 
 
 def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) -> State:

@@ -15,10 +15,13 @@ from fleet.core.state_updates import (
     active_plan_of,
     answer,
     cancel,
+    forget_entry,
     mark_goals,
     refuse_wishes,
     set_entry,
+    touch,
 )
+from fleet.core.touches import Part, Touch
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest, ReplanRequest
@@ -33,12 +36,13 @@ def plan_requested(state: State, event: events.PlanRequested) -> State:
 
 def plan_waiting_goals(state: State) -> State:
     """Goals that wait go into the running plan, or, where none runs, into a new one."""
+    active = [state.plans[plan] for plan in state.index.active]
+    if any(entry.state is PlanState.PLANNING for entry in active):
+        return state  # what comes meanwhile goes into the plan that is being made
     waiting = tuple(g for g in _waiting_goals(state) if state.goal_states[g].reason is None)
     if not waiting:
         return state
-    if any(entry.state is PlanState.PLANNING for entry in state.plans.values()):
-        return state  # what comes meanwhile goes into the plan that is being made
-    for entry in state.plans.values():
+    for entry in active:
         if entry.state is PlanState.RUNNING and not entry.cancelling:
             return set_entry(state, entry.wishing(GoalsAdded(goals=waiting)))
     plan = Plan(plan=_new_plan_name(state), goals=waiting, conditions=(), tasks=())
@@ -65,7 +69,9 @@ def _start_planning(state: State, ask: PlanRequest) -> State:
     job = PlanningJob.of(state.jobs + 1, plan, ask.planner)
     job = replace(job, request=ask.request, dry_run=ask.dry_run)
     if ask.dry_run:
-        return replace(state, jobs=job.job, previews=state.previews.set(ask.request, job))
+        previews = state.previews.set(ask.request, job)
+        state = replace(state, jobs=job.job, previews=previews)
+        return touch(state, Touch(Part.PREVIEW, ask.request))
     return _planning(state, plan, job)
 
 
@@ -120,8 +126,9 @@ def _why_not_plan(state: State, plan: str | None, goals: tuple[str, ...]) -> str
 
 def _waiting_goals(state: State) -> Iterator[str]:
     """Goals that no plan works on, in their order."""
-    for goal in sorted(state.goals, key=lambda g: (state.goals[g].ordinal, g)):
-        if state.goal_states[goal].state is GoalState.WAITING and not active_plan_of(state, goal):
+    waiting = (g for g in state.index.in_state.get(GoalState.WAITING, ()) if g in state.goals)
+    for goal in sorted(waiting, key=lambda g: (state.goals[g].ordinal, g)):
+        if not active_plan_of(state, goal):
             yield goal
 
 
@@ -223,7 +230,7 @@ def _delete(state: State, entry: PlanEntry, ask: ControlRequest) -> State | str:
         )
     state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None)
     state = refuse_wishes(state, entry, f"plan {ask.plan} was deleted")
-    state = replace(state, plans=state.plans.without(ask.plan))
+    state = forget_entry(state, ask.plan)
     return answer(state, ask.request, True, f"plan {ask.plan} is deleted")
 
 

@@ -7,6 +7,7 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.handlers.world import vocabulary_changed
 from fleet.core.state import State
+from fleet.core.state_updates import robot_changed
 
 
 def robot_registered(state: State, event: events.RobotRegistered) -> State:
@@ -18,18 +19,19 @@ def robot_registered(state: State, event: events.RobotRegistered) -> State:
     if state.connected.get(robot):
         gone = gone.without(robot)
     state = replace(state, robots=state.robots.set(robot, event.spec), gone_since=gone)
-    return vocabulary_changed(state)
+    return vocabulary_changed(robot_changed(state, robot))
 
 
 def robot_unregistered(state: State, event: events.RobotUnregistered) -> State:
     """What the robot was doing is as with one that has been away for too long."""
     if event.robot not in state.robots:
         return state
-    return replace(
+    state = replace(
         state,
         robots=state.robots.without(event.robot),
         gone_since=state.gone_since.set(event.robot, state.monotonic_s),
     )
+    return robot_changed(state, event.robot)
 
 
 def worker_connected(state: State, event: events.WorkerConnected) -> State:
@@ -38,9 +40,9 @@ def worker_connected(state: State, event: events.WorkerConnected) -> State:
     if event.incarnation in runs:
         return state
     state = replace(state, connected=state.connected.set(event.robot, (*runs, event.incarnation)))
-    if event.robot not in state.robots:
-        return state
-    return replace(state, gone_since=state.gone_since.without(event.robot))
+    if event.robot in state.robots:
+        state = replace(state, gone_since=state.gone_since.without(event.robot))
+    return robot_changed(state, event.robot)
 
 
 def worker_disconnected(state: State, event: events.WorkerDisconnected) -> State:
@@ -52,4 +54,5 @@ def worker_disconnected(state: State, event: events.WorkerDisconnected) -> State
     state = replace(state, connected=state.connected.set(event.robot, rest))
     if rest:
         return state
-    return replace(state, gone_since=state.gone_since.set(event.robot, state.monotonic_s))
+    state = replace(state, gone_since=state.gone_since.set(event.robot, state.monotonic_s))
+    return robot_changed(state, event.robot)

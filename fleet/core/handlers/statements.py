@@ -7,7 +7,8 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.state import State
-from fleet.core.state_updates import conclude
+from fleet.core.state_updates import conclude, touch
+from fleet.core.touches import Part, Touch
 from fleet.errors import NotUnderstood
 from fleet.language import statement_facts
 from keyexpr_schema.payloads.world import Fact, Statement, StatementStatus
@@ -34,11 +35,12 @@ def statement_deleted(state: State, event: events.StatementDeleted) -> State:
     """Drop the statement. Facts once read out of it stay: they may have been confirmed since."""
     if event.statement not in state.statements and event.statement not in state.statement_states:
         return state
-    return replace(
+    state = replace(
         state,
         statements=state.statements.without(event.statement),
         statement_states=state.statement_states.without(event.statement),
     )
+    return touch(state, Touch(Part.STATEMENT, event.statement))
 
 
 def understand_again(state: State) -> State:
@@ -67,4 +69,6 @@ def _read_statement(state: State, statement: Statement) -> State:
 def _set_status(state: State, status: StatementStatus) -> State:
     if state.statement_states.get(status.statement) == status:
         return state
-    return replace(state, statement_states=state.statement_states.set(status.statement, status))
+    statement_states = state.statement_states.set(status.statement, status)
+    state = replace(state, statement_states=statement_states)
+    return touch(state, Touch(Part.STATEMENT, status.statement))

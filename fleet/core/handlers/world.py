@@ -9,7 +9,7 @@ from fleet.core.dispatch.replan_triggers import contradicted
 from fleet.core.dispatch.while_replanning import stands_still
 from fleet.core.handlers import goals, statements
 from fleet.core.state import State
-from fleet.core.state_updates import believe, set_entry
+from fleet.core.state_updates import believe, forget_fact, set_entry
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.payloads.plans import PlanState
 
@@ -21,7 +21,8 @@ def fact_put(state: State, event: events.FactPut) -> State:
     if changed is state:
         return state
     state = changed
-    for entry in state.plans.values():
+    for plan in state.index.active:
+        entry = state.plans[plan]
         if entry.state is not PlanState.RUNNING or stands_still(state, entry):
             continue
         said_again = known is not None and known.value == fact.value
@@ -34,12 +35,7 @@ def fact_put(state: State, event: events.FactPut) -> State:
 
 def fact_deleted(state: State, event: events.FactDeleted) -> State:
     """No longer believe anything of that variable."""
-    key = FactKey(event.relation, event.subject)
-    if key not in state.facts:
-        return state
-    return replace(
-        state, facts=state.facts.without(key), older_facts=state.older_facts.without(key)
-    )
+    return forget_fact(state, FactKey(event.relation, event.subject))
 
 
 def place_put(state: State, event: events.PlacePut) -> State:

@@ -9,13 +9,14 @@ work` and of `r * pace`; both go into running means that forget (exponentially w
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite, sqrt
+from math import inf, isfinite, sqrt
 
 from msgspec.structs import replace
 
 from fleet.core.model.skills import SkillModel
 from keyexpr_schema.facts import AT, FactKey, Literal
 from keyexpr_schema.payloads.durations import Durations, Estimate
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 FULL_ATTEMPTS = 20.0
 """Attempts after which a mean forgets as fast as it learns."""
@@ -26,6 +27,19 @@ ASSUMED_WAY_S = 10.0
 """How much the skill model and the top speed count for, before anything was observed."""
 SLOWEST, FASTEST = 10.0, 0.1
 """Bounds of the pace: beyond them something else than driving was measured."""
+
+
+FACTOR = 2.0
+MARGIN_S = 30.0
+"""A task is late when it has taken this many times its predicted duration, and this long besides:
+a second try, or a while at a busy door, is nothing to change a plan for."""
+
+
+def late_at_s(record: TaskRecord) -> float:
+    """When a task counts as late, on the fleet's clock [s]; infinity if it is not running."""
+    if record.state is not TaskState.RUNNING or record.started_s is None:
+        return inf
+    return record.started_s + FACTOR * record.duration_s + MARGIN_S
 
 
 def work_s(durations: Durations | None, skill: SkillModel) -> float:

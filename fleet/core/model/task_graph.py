@@ -72,6 +72,23 @@ class TaskGraph:
         """Whether `first` ends before `second` starts in every order the graph allows."""
         return bool(self._ancestors[self._index[second]] >> self._index[first] & 1)
 
+    def mask(self, tasks: Iterable[str]) -> int:
+        """These tasks as a bit set; `last_before` takes it."""
+        bits = 0
+        for task in tasks:
+            bits |= 1 << self._index[task]
+        return bits
+
+    def last_before(self, task: str, mask: int) -> tuple[str, ...]:
+        """Of the tasks in `mask`, those before `task` with no other of them in between."""
+        rest = self._ancestors[self._index[task]] & mask
+        found = []
+        while rest:
+            index = rest.bit_length() - 1
+            found.append(self.order[index])
+            rest &= ~(self._ancestors[index] | 1 << index)
+        return tuple(found)
+
     def reduced(self) -> dict[str, tuple[str, ...]]:
         """The fewest edges with the same meaning: task to the tasks it waits for directly."""
         result: dict[str, tuple[str, ...]] = {}

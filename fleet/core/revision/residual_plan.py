@@ -7,7 +7,8 @@ from collections.abc import Set
 from msgspec.structs import replace
 
 from fleet.core.model.task_graph import TaskGraph
-from fleet.core.plan_entry import OUTSTANDING, PlanEntry
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_index import OUTSTANDING
 from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -27,6 +28,8 @@ ALTERNATIVES = 4
 UNLOADING_S = 30.0
 """What it counts for, in seconds, that an object ends in a basket and not on a table: somebody
 still has to take it out, which is about one more task for a hand."""
+MAX_FULL_HANDS = 2
+"""Robots of a kind looked at that would have to put something down first."""
 MAX_OBJECTS = 8
 """Objects looked at as possible tools where a subgoal cannot be reached without one."""
 REUSE_CHARGE_S = 200.0
@@ -125,22 +128,18 @@ def _different_solutions(
 ) -> list[Solution]:
     """The cheapest sequence, and others made different by charging for what was used before."""
     subject = condition.subject
-    robots = _representatives({subject, condition.value}, subject, facts, world)
+    robots = _representatives(condition, facts, world)
     start: Facts = dict(facts)
     for robot in world.robots.keys() - settled:
         start[FactKey(AT, robot)] = None
-    held = {
-        value
-        for robot in robots
-        if isinstance(value := facts.get(FactKey(HOLDING, robot)), str) and value != NOTHING
-    }
-    objects = sorted(held | ({subject} & world.objects.keys()))
+    objects = sorted(_held(robots, facts) | ({subject} & world.objects.keys()))
     results = _cheapest_few(condition, robots, objects, start, facts, world, budget)
     if results or not _needs_a_tool(condition, world):
         return results
     # Something else may be needed for it, such as a tool.
     known = [thing for thing in world.objects if facts.get(FactKey(AT, thing)) is not None]
-    wider = sorted({*objects, *known[:MAX_OBJECTS]})
+    robots = _representatives(condition, facts, world, tools=True)
+    wider = sorted({*objects, *_held(robots, facts), *known[:MAX_OBJECTS]})
     return _cheapest_few(condition, robots, wider, start, facts, world, budget)
 
 
@@ -192,19 +191,35 @@ def _cheapest_few(
     return solutions
 
 
-def _representatives(named: Set[Value], subject: str, facts: Facts, world: WorldModel) -> list[str]:
-    """One robot of each kind that is interchangeable now, and those that are spoken of."""
+def _representatives(
+    condition: Condition, facts: Facts, world: WorldModel, tools: bool = False
+) -> list[str]:
+    """One robot of each kind that is interchangeable now, and those that are spoken of.
+
+    What a hand holds, if not the subject, only has to be put down, and each thing more would
+    multiply the states to be looked at: a few such robots stand for all. With `tools` what they
+    hold may be of use.
+    """
+    subject = condition.subject
     kinds: dict[object, str] = {}
+    full: Counter[object] = Counter()
     for robot in world.team:
         spec = world.robots[robot]
-        kind = (
-            spec.skills,
-            tuple(sorted(spec.capabilities.items())),
-            facts.get(FactKey(HOLDING, robot)),
-            robot if robot in named or facts.get(FactKey(AT, subject)) == robot else None,
-        )
-        kinds.setdefault(kind, robot)
+        holds = facts.get(FactKey(HOLDING, robot))
+        named = robot in (subject, condition.value) or facts.get(FactKey(AT, subject)) == robot
+        able = spec.skills, tuple(sorted(spec.capabilities.items()))
+        if not (named or tools or holds in (None, NOTHING, subject)):
+            full[able] += 1
+            if full[able] > MAX_FULL_HANDS:
+                continue
+        kinds.setdefault((able, holds, robot if named else None), robot)
     return sorted(kinds.values())
+
+
+def _held(robots: Sequence[str], facts: Facts) -> set[str]:
+    """What these robots have in their hands."""
+    values = (facts.get(FactKey(HOLDING, robot)) for robot in robots)
+    return {value for value in values if isinstance(value, str) and value != NOTHING}
 
 
 def exploration_for(

@@ -14,7 +14,7 @@ from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
 from fleet.planners.plan_repair import repair_plan
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from keyexpr_schema.payloads.goals import Goal
-from tests.support.household import at, bring, drives, fact, home
+from tests.support.household import at, bring, drives, fact, home, manipulator
 
 PLANNER = SymbolicPlanner()
 ROOMS = ("hallway", "living_room")
@@ -107,3 +107,14 @@ def test_a_plan_is_repaired_though_the_time_does_not_suffice_for_a_new_goal() ->
     assert again is not None
     assert again.plan.goals == ("driven", "g1")
     assert not again.incomplete
+
+
+@pytest.mark.parametrize("number", [2, 12])
+def test_full_hands_do_not_multiply_what_is_looked_at(number: int) -> None:
+    robots = tuple(manipulator(f"r{n}") for n in range(1, number + 1))
+    holding = [fact(f"r{n}", "holding", f"cup_{n}") for n in range(1, number + 1)]
+    held = [fact(f"cup_{n}", "at", f"r{n}") for n in range(1, number + 1)]
+    world = home(robots, number + 1, (*holding, *held))
+    for wanted in (bring(1, "hallway"), bring(number + 1, "hallway")):
+        made = PLANNER.plan(PlanningProblem("p", (wanted,), world, budget=steps(10_000)))
+        assert isinstance(made, CheckedPlan), made

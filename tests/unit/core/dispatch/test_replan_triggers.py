@@ -51,6 +51,33 @@ def test_a_fact_that_contradicts_the_plan_leads_to_a_new_one() -> None:
     assert model.goal_state("g1") is GoalState.REACHED
 
 
+def test_what_a_running_task_is_just_making_true_is_no_news() -> None:
+    model = fleet()
+    model.late = True
+    model.plan(bring(1, "hallway"))
+    model.answer()
+    while (order := model.orders()[0]).skill != "place":
+        model.succeed(order)
+    model.start(order)
+    for fact in model.facts_after(order):
+        model.learn(fact.subject, fact.relation, fact.value)  # seen by another, before the report
+    assert not model.answers, "that is what the plan is about"
+    model.succeed(order)
+    assert model.goal_state("g1") is GoalState.REACHED
+    assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
+
+
+def test_what_somebody_else_says_against_a_running_task_is_news() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    while (order := model.orders()[0]).skill != "place":
+        model.succeed(order)
+    model.start(order)
+    model.late = True
+    model.learn("hsr", "at", "living_room")
+    assert model.answers
+
+
 def test_what_nobody_can_look_for_is_told() -> None:
     model = FleetModel((manipulator(),), cups=1)
     blind = manipulator().__class__(

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.effects import DropJob, MakePlan
-from fleet.core.plan_entry import OUTSTANDING
+from fleet.core.plan_index import OUTSTANDING
 from fleet.core.planning_input import PlanningInput
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import PlanState
@@ -77,8 +77,7 @@ def test_a_running_plan_without_an_answer_ends_and_its_goals_wait() -> None:
     model = short()
     model.plan(*BOTH)
     model.lost = True
-    ask = ReplanRequest(request="q", plan="plan-1", reason="so")
-    model.receive(events.ReplanRequested, request=ask)
+    model.fail(model.orders()[0])
     assert waits(model, "g1")
     assert waits(model, "g2")
     for order in model.orders():

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from fleet.core import events
-from fleet.core.dispatch.delays import FACTOR, MARGIN_S, next_lateness
+from fleet.core.dispatch.delays import next_lateness
 from fleet.core.dispatch.dispatcher import next_timer
+from fleet.core.model.durations import FACTOR, MARGIN_S
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.state import Policy
 from keyexpr_schema.facts import HOLDING, FactKey

@@ -1,0 +1,93 @@
+"""Whom a change concerns: which plans, goals, tasks and robots dispatch has to look at again."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from fleet.core.fleet_index import place_of, subjects_of
+from fleet.core.plan_index import robots_of
+from fleet.core.state import State
+from fleet.core.touches import Part, Touch
+from keyexpr_schema.facts import AT, FactKey
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+
+
+@dataclass
+class Concerns:
+    """What may have come to be otherwise.
+
+    `plans` are looked at as a whole; of others `goals` that may be reached and `tasks` that may be
+    ready. `robots` may be free, or planned with, now.
+    """
+
+    plans: set[str] = field(default_factory=set)
+    goals: defaultdict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
+    tasks: defaultdict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
+    robots: set[str] = field(default_factory=set)
+
+    @classmethod
+    def of(cls, state: State, touches: Iterable[Touch]) -> Concerns:
+        """What these changes concern."""
+        found = cls()
+        for part, name, task in touches:
+            match part:
+                case Part.TEAM:
+                    found.plans.update(state.index.active)
+                case Part.ROBOT:
+                    found.robots.add(name)
+                case Part.PLAN:
+                    found._plan(state, name)
+                case Part.RECORD:
+                    found._record(state, name, task)
+                case Part.GOAL:
+                    found._goals(state, [name])
+                case Part.FACT:
+                    found._fact(state, name)
+        return found
+
+    def _plan(self, state: State, plan: str) -> None:
+        entry = state.plans.get(plan)
+        if entry is None:
+            return
+        self.plans.add(plan)
+        if entry.ended:
+            self.robots.update(entry.outcome.allocation.values())
+            for goal in entry.plan.goals:
+                for subject in subjects_of(state.goal_states.get(goal)):
+                    if (where := place_of(state.fact(AT, subject))) is not None:
+                        self.robots.add(where)
+        else:
+            self.robots.update(entry.index.ready)
+
+    def _record(self, state: State, plan: str, task: str) -> None:
+        entry = state.plans.get(plan)
+        record: TaskRecord | None = entry.records.get(task) if entry is not None else None
+        if entry is None or record is None or task in entry.index.outstanding:
+            return
+        index = entry.index
+        self.robots.update(robots_of(record))
+        if record.state is TaskState.WAITING:
+            self.tasks[plan].add(task)
+        elif record.state is TaskState.SUCCEEDED:
+            self.tasks[plan].update(index.graph.successors.get(task, ()))
+            if record.goal is not None and record.goal not in index.goal_open:
+                self.goals[plan].add(record.goal)
+        if index.unfinished == 0 or index.broken or entry.cancelling:
+            self.plans.add(plan)
+        if task in entry.unwanted:  # what is about the same facts may start now
+            for other in state.index.active:
+                self.robots.update(state.plans[other].index.ready)
+
+    def _goals(self, state: State, goals: Iterable[str]) -> None:
+        for goal in goals:
+            for plan in state.index.plans_of.get(goal, ()):
+                self.goals[plan].add(goal)
+
+    def _fact(self, state: State, key: FactKey) -> None:
+        index, subject = state.index, key.subject
+        for about in (subject, *index.things_at.get(subject, ())):
+            self._goals(state, index.goals_about.get(about, ()))
+        if key.relation == AT:
+            self.plans.update(p for p in index.active if subject in state.plans[p].plan.seeks)

@@ -1,0 +1,134 @@
+"""What is derived from the state as a whole, so that an event need not walk through it.
+
+`fleet.core.state_updates` keeps it up; `index_of` derives it anew. Both come to the same, which is
+a test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TypeVar
+
+import immutables
+import msgspec
+
+from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_index import robots_of
+from fleet.core.table import Table
+from keyexpr_schema.facts import AT, FactKey
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.world import Fact
+
+Names = immutables.Map[str, None]
+"""A set of names. It has no order: nothing may depend on how it is walked through."""
+EMPTY: Names = immutables.Map()
+Sets = immutables.Map[str, Names]
+S = TypeVar("S")
+Order = tuple[str, str]
+"""A plan and one of its tasks."""
+Orders = immutables.Map[Order, None]
+NO_ORDERS: Orders = immutables.Map()
+
+
+class FleetIndex(msgspec.Struct, frozen=True, eq=False):
+    """Who does what, and what is about whom.
+
+    `active` has the plans that have not ended, with the priority in which their tasks get robots.
+    `work` has, by robot, the orders that may be carried out with it, `things_at` the subjects of
+    `at` facts by value, `goals_about` the goals that have not ended by the subjects of their
+    conditions, `plans_of` the active plans by goal. `in_state` has the goals that wait, or were
+    rejected. `team` are the robots that can be planned with.
+    """
+
+    active: Table[str, int] = Table()
+    work: immutables.Map[str, Orders] = immutables.Map()
+    things_at: Sets = immutables.Map()
+    goals_about: Sets = immutables.Map()
+    plans_of: immutables.Map[str, tuple[str, ...]] = immutables.Map()
+    in_state: immutables.Map[GoalState, Names] = immutables.Map()
+    team: tuple[str, ...] = ()
+
+    def __eq__(self, other: object) -> bool:
+        # Derived: two states that are otherwise equal have equal indexes.
+        return isinstance(other, FleetIndex)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def in_set(
+    sets: immutables.Map[S, Names], name: S, member: str, there: bool
+) -> immutables.Map[S, Names]:
+    """The sets, with `member` in that of `name` or not."""
+    known = sets.get(name, EMPTY)
+    if (member in known) == there:
+        return sets
+    if there:
+        return sets.set(name, known.set(member, None))
+    rest = known.delete(member)
+    return sets.set(name, rest) if rest else sets.delete(name)
+
+
+def place_of(fact: Fact | None) -> str | None:
+    """Where a fact says that its subject is, in a place or at a robot."""
+    if fact is None or fact.relation != AT or not isinstance(fact.value, str):
+        return None
+    return fact.value
+
+
+def subjects_of(status: GoalStatus | None) -> frozenset[str]:
+    """What the conditions of a goal that has not ended are about."""
+    if status is None or status.state in ENDED_GOALS:
+        return frozenset()
+    return frozenset(subject for c in status.conditions for subject in c.subjects)
+
+
+UNPLANNED = frozenset({GoalState.WAITING, GoalState.REJECTED})
+"""States of goals that are listed."""
+
+
+def priority_of(entry: PlanEntry, goals: Mapping[str, Goal]) -> int:
+    """The highest priority of a plan's goals; 0 where it has none."""
+    return max((goals[goal].priority for goal in entry.plan.goals if goal in goals), default=0)
+
+
+def index_of(
+    plans: Mapping[str, PlanEntry],
+    goals: Mapping[str, Goal],
+    goal_states: Mapping[str, GoalStatus],
+    facts: Mapping[FactKey, Fact],
+    team: Iterable[str],
+) -> FleetIndex:
+    """The index of these plans, goals and facts, derived anew."""
+    work: dict[str, dict[Order, None]] = {}
+    plans_of: dict[str, list[str]] = {}
+    for plan, entry in plans.items():
+        for record in entry.outstanding():
+            for robot in robots_of(record):
+                work.setdefault(robot, {})[plan, record.task] = None
+        if not entry.ended:
+            for goal in entry.wanted_goals:
+                plans_of.setdefault(goal, []).append(plan)
+    things_at: Sets = immutables.Map()
+    for fact in facts.values():
+        if (place := place_of(fact)) is not None:
+            things_at = in_set(things_at, place, fact.subject, True)
+    goals_about: Sets = immutables.Map()
+    in_state: immutables.Map[GoalState, Names] = immutables.Map()
+    for goal, status in goal_states.items():
+        if status.state in UNPLANNED:
+            in_state = in_set(in_state, status.state, goal, True)
+        for subject in subjects_of(status):
+            goals_about = in_set(goals_about, subject, goal, True)
+    return FleetIndex(
+        active=Table({p: priority_of(e, goals) for p, e in plans.items() if not e.ended}),
+        work=immutables.Map({robot: Orders(orders) for robot, orders in work.items()}),
+        things_at=things_at,
+        goals_about=goals_about,
+        plans_of=immutables.Map({goal: tuple(names) for goal, names in plans_of.items()}),
+        in_state=in_state,
+        team=tuple(team),
+    )
+
+
+NO_FLEET = FleetIndex()
+"""That of a state that knows nothing."""

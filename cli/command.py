@@ -122,43 +122,65 @@ def command(
     """Register `body(call, …)`, plain or async, as a command of `app` with the global options."""
 
     def register(body: Body) -> Body:
-        signature = inspect.signature(body, eval_str=True)
-        own = list(signature.parameters.values())[1:]
-
-        @functools.wraps(body)
-        def run(
-            *,
-            ctx: typer.Context,
-            router: list[str] | None,
-            realm: str | None,
-            json: bool,
-            **arguments: object,
-        ) -> None:
-            before = ctx.obj if isinstance(ctx.obj, GlobalFlags) else GlobalFlags()
-            with one_sentence_errors():
-                settings = load_settings(
-                    list(router or before.routers), realm or before.realm, json or before.json
-                )
-                outcome = body(Call(settings), **arguments)
-                if inspect.iscoroutine(outcome):
-                    import asyncio
-
-                    asyncio.run(outcome)
-
-        keyword = inspect.Parameter.KEYWORD_ONLY
-        parameters = [
-            inspect.Parameter("ctx", keyword, annotation=typer.Context),
-            *(parameter.replace(kind=keyword) for parameter in own),
-            inspect.Parameter("router", keyword, default=None, annotation=RouterOption),
-            inspect.Parameter("realm", keyword, default=None, annotation=RealmOption),
-            inspect.Parameter("json", keyword, default=False, annotation=JsonOption),
-        ]
-        run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
-        run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-        app.command(name, cls=cls)(run)
+        app.command(name, cls=cls)(_with_global_options(body))
         return body
 
     return register
+
+
+def without_command(app: typer.Typer) -> Callable[[Body], Body]:
+    """Register `body(call, …)` as what the group `app` does where none of its commands is named."""
+
+    def register(body: Body) -> Body:
+        app.callback(invoke_without_command=True)(_with_global_options(body))
+        app.info.no_args_is_help = False
+        return body
+
+    return register
+
+
+def _with_global_options(body: Body) -> Callable[..., None]:
+    """`body` as typer runs it: with the global options, which become its `Call`."""
+    signature = inspect.signature(body, eval_str=True)
+    own = list(signature.parameters.values())[1:]
+
+    @functools.wraps(body)
+    def run(
+        *,
+        ctx: typer.Context,
+        router: list[str] | None = None,
+        realm: str | None = None,
+        json: bool = False,
+        **arguments: object,
+    ) -> None:
+        before = ctx.obj if isinstance(ctx.obj, GlobalFlags) else GlobalFlags()
+        flags = GlobalFlags(
+            routers=tuple(router or before.routers),
+            realm=realm or before.realm,
+            json=json or before.json,
+        )
+        if ctx.invoked_subcommand is not None:
+            ctx.obj = flags
+            return
+        with one_sentence_errors():
+            settings = load_settings(list(flags.routers), flags.realm, flags.json)
+            outcome = body(Call(settings), **arguments)
+            if inspect.iscoroutine(outcome):
+                import asyncio
+
+                asyncio.run(outcome)
+
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    parameters = [
+        inspect.Parameter("ctx", keyword, annotation=typer.Context),
+        *(parameter.replace(kind=keyword) for parameter in own),
+        inspect.Parameter("router", keyword, default=None, annotation=RouterOption),
+        inspect.Parameter("realm", keyword, default=None, annotation=RealmOption),
+        inspect.Parameter("json", keyword, default=False, annotation=JsonOption),
+    ]
+    run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return run
 
 
 class one_sentence_errors:  # noqa: N801 - used like a function, as contextlib's are

@@ -32,6 +32,8 @@ class PlannerSettings:
     approval: bool | None = None
     auto_plan: bool | None = None
     lost_after_s: float | None = None
+    keep_days: float | None = None
+    keep: int | None = None
     planning_limit_s: float | None = None
     llm_config: Path | None = None
     skills: tuple[Path, ...] = ()
@@ -158,13 +160,16 @@ def _planner(section: object, path: Path) -> PlannerSettings:
 
     for name in ("approval", "auto_plan"):
         check(name, isinstance(written.get(name), bool), "true or false")
+    keep = written.get("keep")
+    is_count = isinstance(keep, int) and not isinstance(keep, bool) and keep >= 0
+    check("keep", is_count, "a whole number from 0 up")
 
-    def seconds(name: str, least_s: float) -> float | None:
+    def number(name: str, least: float, unit: str = "seconds") -> float | None:
         value = written.get(name)
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        number = float(value or 0.0) if is_number else -math.inf
-        check(name, least_s <= number < math.inf, f"a number of seconds from {least_s:g} up")
-        return None if value is None else number
+        found = float(value or 0.0) if is_number else -math.inf
+        check(name, least <= found < math.inf, f"a number of {unit} from {least:g} up")
+        return None if value is None else found
 
     check("llm_config", isinstance(written.get("llm_config"), str), "the name of a file")
     skills = written.get("skills") or []
@@ -175,8 +180,10 @@ def _planner(section: object, path: Path) -> PlannerSettings:
     return PlannerSettings(
         approval=written.get("approval"),
         auto_plan=written.get("auto_plan"),
-        lost_after_s=seconds("lost_after_s", 0.0),
-        planning_limit_s=seconds("planning_limit_s", LEAST_PLANNING_LIMIT_S),
+        lost_after_s=number("lost_after_s", 0.0),
+        keep_days=number("keep_days", 0.0, "days"),
+        keep=keep,
+        planning_limit_s=number("planning_limit_s", LEAST_PLANNING_LIMIT_S),
         llm_config=None if llm is None else path.parent / Path(llm).expanduser(),
         skills=tuple(path.parent / Path(each).expanduser() for each in skills),
     )

@@ -143,8 +143,30 @@ async def show(call: Call, goal: GoalArgument) -> None:
 
 
 @command(app, "delete")
-async def delete(call: Call, goal: GoalArgument) -> None:
-    """Take a goal back; its plan goes on without it, and ends if it had no other goal."""
+async def delete(
+    call: Call,
+    goal: Annotated[str | None, typer.Argument(metavar="[GOAL]", help="Its name.")] = None,
+    ended: Annotated[
+        bool, typer.Option("--ended", help="All that were reached, failed or rejected.")
+    ] = False,
+    older_than: Annotated[
+        str | None,
+        typer.Option("--older-than", metavar="SPAN", help="With --ended: so long ago, as 2h, 7d."),
+    ] = None,
+) -> None:
+    """Take a goal back; its plan goes on without it, and ends if it had no other goal.
+
+    With --ended, delete the keys of those that are over; `history` keeps them.
+    """
+    from cli.errors import BadArgument
+
+    if (goal is None) != ended:
+        raise BadArgument("name the goal to delete, or say --ended for all that have ended")
+    if older_than is not None and not ended:
+        raise BadArgument("--older-than goes with --ended")
+    if goal is None:
+        await _delete_ended(call, older_than)
+        return
     from cli.client.planner_requests import check_goals
     from keyexpr_schema.keyspace import GOAL_SPEC
     from keyexpr_schema.payloads.goals import GoalAddress
@@ -153,3 +175,15 @@ async def delete(call: Call, goal: GoalArgument) -> None:
         await check_goals(session, [goal])
         await session.delete(GOAL_SPEC, GoalAddress(goal))
     call.show({"deleted": goal}, lambda: f"deleted goal {goal}")
+
+
+async def _delete_ended(call: Call, older_than: str | None) -> None:
+    from cli.client.history import retire
+    from cli.times import parse_span
+    from cli.views.history import retired_sentence
+    from keyexpr_schema.payloads.history import RetireQuery
+
+    older_s = 0.0 if older_than is None else parse_span(older_than, "--older-than")
+    async with call.session() as session:
+        gone = await retire(session, RetireQuery(goals=True, older_than_s=older_s))
+    call.show(gone, lambda: retired_sentence(gone))

@@ -219,9 +219,28 @@ async def cancel(call: Call, plan: PlanArgument) -> None:
 
 
 @command(app, "delete")
-async def delete(call: Call, plan: PlanArgument) -> None:
-    """Forget a plan and its tasks."""
-    await _control(call, "delete", plan)
+async def delete(
+    call: Call,
+    plan: Annotated[str | None, typer.Argument(metavar="[PLAN]", help="Its name.")] = None,
+    ended: Annotated[
+        bool, typer.Option("--ended", help="All that have ended, with the goals they ended.")
+    ] = False,
+) -> None:
+    """Delete the keys of a plan, with its tasks and reports; `history` keeps what ended."""
+    from cli.errors import BadArgument
+
+    if (plan is None) != ended:
+        raise BadArgument("name the plan to delete, or say --ended for all that have ended")
+    if plan is not None:
+        await _control(call, "delete", plan)
+        return
+    from cli.client.history import retire
+    from cli.views.history import retired_sentence
+    from keyexpr_schema.payloads.history import RetireQuery
+
+    async with call.session() as session:
+        gone = await retire(session, RetireQuery(plans=True))
+    call.show(gone, lambda: retired_sentence(gone))
 
 
 @single

@@ -96,6 +96,24 @@ def planner(
             help="A robot whose worker is gone for longer is lost; else 30.",
         ),
     ] = None,
+    keep_days: Annotated[
+        float | None,
+        typer.Option(
+            "--keep-days",
+            metavar="DAYS",
+            min=0.0,
+            help="How long what is over keeps its keys; else 7. `history` keeps it for good.",
+        ),
+    ] = None,
+    keep: Annotated[
+        int | None,
+        typer.Option(
+            "--keep",
+            metavar="N",
+            min=0,
+            help="Of no more than so many ended plans, though; else 200.",
+        ),
+    ] = None,
     planning_limit_s: Annotated[
         float | None,
         typer.Option(
@@ -112,9 +130,10 @@ def planner(
     """
     from cli.demo.child_processes import end_with_parent
     from fleet.core.state import Policy
+    from fleet.history.retention import Retention
     from fleet.service.planner_process import run
 
-    settings, default = call.settings.planner, Policy()
+    settings, default, kept = call.settings.planner, Policy(), Retention()
     end_with_parent()
     run(
         endpoints=call.settings.routers,
@@ -129,6 +148,10 @@ def planner(
             planning_limit_s=_first(
                 planning_limit_s, settings.planning_limit_s, default.planning_limit_s
             ),
+        ),
+        retention=Retention(
+            days=_first(keep_days, settings.keep_days, kept.days),
+            count=_first(keep, settings.keep, kept.count),
         ),
     )
 

@@ -175,7 +175,8 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
     `durations_s` and `extra_after` are by task, `sequence` lists each robot's actors in order.
     `repaired` says that the residual plan goes on, perhaps with goals planned anew beside it,
     `left_out` which goals the plan does without since they cannot be reached, and why, `postponed`
-    those for which the time did not suffice.
+    those for which the time did not suffice, `for_robots` those that a robot which is not connected
+    could help with.
     """
 
     job: int
@@ -191,6 +192,7 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
     repaired: bool = msgspec.field(default=False, name="mended")
     left_out: dict[str, str] = {}
     postponed: dict[str, str] = {}
+    for_robots: dict[str, str] = {}
 
     @property
     def outcome(self) -> PlanOutcome:
@@ -202,6 +204,7 @@ class PlanningFailed(Event, frozen=True, kw_only=True):
     """A planning job ended without a plan.
 
     `postponed`: nothing is known against one, only the time (or the process) did not suffice.
+    `for_robots`: the goals for which there would be one if all robots were connected.
     """
 
     job: int
@@ -209,6 +212,7 @@ class PlanningFailed(Event, frozen=True, kw_only=True):
     violations: tuple[Violation, ...] = ()
     planning_time_s: float = 0.0
     postponed: bool = False
+    for_robots: tuple[str, ...] = ()
 
 
 class GoalInterpreted(Event, frozen=True, kw_only=True):

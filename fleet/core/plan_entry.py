@@ -39,6 +39,8 @@ class PlanningJob(msgspec.Struct, frozen=True, kw_only=True):
     allocator: str
     first_task: int = 1
     proposal: Plan | None = None
+    team_number: int = 0
+    """`State.team_number` when the job was given."""
     request: str | None = None
     dry_run: bool = False
     partial: bool = False
@@ -105,6 +107,9 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     discarded: int = 0
     late: tuple[str, ...] = ()
     failures: Table[str, int] = Table()
+    waits_for_team: int | None = None
+    """What `State.team_number` was when no robot could go on with the plan; it is not made again
+    before another comes, or something else happens."""
     unwanted: tuple[str, ...] = ()
     team: tuple[str, ...] = ()
     change: PlanChange | None = None
@@ -201,13 +206,15 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             if reason.number in taken
             or replace(new, number=reason.number, sentence=reason.sentence) != reason
         )
-        return replace(self, reasons=(*others, new), replan_reasons=new.number)
+        return replace(self, reasons=(*others, new), replan_reasons=new.number, waits_for_team=None)
 
     def wishing(self, wish: Wish) -> PlanEntry:
         """The entry with one more wish, which is numbered here."""
         number = self.replan_reasons + 1
         wish = replace(wish, number=number)
-        return replace(self, wishes=(*self.wishes, wish), replan_reasons=number)
+        return replace(
+            self, wishes=(*self.wishes, wish), replan_reasons=number, waits_for_team=None
+        )
 
     def job_ended(self) -> tuple[PlanEntry, tuple[ReplanReason, ...], tuple[Wish, ...]]:
         """The entry without its job and what that took up; the reasons and the wishes taken up."""

@@ -23,7 +23,7 @@ from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
-LOGIC = 1
+LOGIC = 2
 """Counts up whenever the core comes to handle an event otherwise than before."""
 
 
@@ -79,6 +79,10 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The runs of each robot's worker that are connected."""
     gone_since: Table[str, float] = Table()
     """When the last worker of a robot went away, on the clock of `monotonic_s`."""
+    team_number: int = 0
+    """Counts the times that a robot has come, or came to be planned with."""
+    waiting_for_robots: Table[str, int] = Table()
+    """Goals without a plan that no robot could help with, and `team_number` then."""
     plans: Table[str, PlanEntry] = Table()
     past_plans: tuple[str, ...] = ()
     plans_made: int = 0
@@ -122,7 +126,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             places=self.places,
             objects=self.objects,
             robots=self.robots,
-            available=frozenset(self.index.team),
+            available=self.index.available,
             facts=FactValues(self.facts),
             durations=self.durations,
         )

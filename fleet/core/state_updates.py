@@ -104,7 +104,9 @@ def robot_changed(state: State, robot: str) -> State:
     if ready == (robot in team):
         return state
     team = tuple(sorted({*team, robot} if ready else {*team} - {robot}))
-    return touch(replace(state, index=replace(state.index, team=team)), Touch(Part.TEAM))
+    state = replace(state, team_number=state.team_number + ready)
+    index = replace(state.index, team=team, available=frozenset(team))
+    return touch(replace(state, index=index), Touch(Part.TEAM))
 
 
 def touch(state: State, what: Touch) -> State:

@@ -99,7 +99,7 @@ def step(state: State, event: Event) -> tuple[State, tuple[Effect, ...]]:
 
     An event that changes nothing gives back the very same state and no effects.
     """
-    now = at_time_of(state, event)
+    now = replace(at_time_of(state, event), over=())
     handled = _HANDLERS[type(event)](now, event)
     settled = let_go(dispatcher.advance(handled))
     if settled is now and now.era == state.era:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from enum import Enum, auto
+from enum import IntEnum, auto
 from typing import Any, NamedTuple
 
 
-class Part(Enum):
+class Part(IntEnum):
     """A part of the state; names within it say what of it was changed."""
 
     EPOCH = auto()

@@ -170,7 +170,7 @@ class Archive:
         for goal, past in zip(goals, entry.goals, strict=True):
             over = past.outcome is not HistoryOutcome.OPEN
             self._db.execute(
-                "INSERT INTO goals VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+                "INSERT OR IGNORE INTO goals VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
                 (
                     past.goal,
                     number,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Collection, Iterator
+from collections.abc import AsyncIterator, Callable, Collection, Iterator
 from typing import Any
 
 from fleet.core.effects import Publish, Retract, effects_of
@@ -13,7 +13,6 @@ from fleet.service.event_translation import WATCHED
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.key import Address, Key
 from keyexpr_schema.keyspace import (
-    ANSWER,
     DURATIONS,
     FACT,
     GOAL_SPEC,
@@ -70,16 +69,12 @@ def in_order(changes: list[Change[Any, Any]]) -> list[Change[Any, Any]]:
 
 
 async def prior_state(session: Session, at: At) -> PriorStateLoaded:
-    """Without a journal: what an earlier planner answered and ended is not done again, and what it
+    """Without a journal: names that an earlier planner gave are not given again, and what it
     learned is not forgotten."""
-    answers = await session.list(ANSWER)
-    goals = await session.list(GOAL_STATUS)
     plans = await session.list(PLAN_STATUS)
     durations = await session.list(DURATIONS)
     statements = await session.list(STATEMENT_STATUS)
     return PriorStateLoaded(
-        answers=tuple(answers.values()),
-        goals=tuple(goals.values()),
         plans=tuple(address.plan for address in plans),
         statements=tuple(statements.values()),
         durations=tuple(durations.values()),
@@ -87,8 +82,11 @@ async def prior_state(session: Session, at: At) -> PriorStateLoaded:
     )
 
 
-async def stale_documents(session: Session, state: State, *, all_of_them: bool) -> list[Retract]:
-    """Documents of the planner in the store that the state does not have.
+async def stale_documents(
+    session: Session, state: State, is_over: Callable[[Address], bool], *, all_of_them: bool
+) -> list[Retract]:
+    """Documents of the planner in the store that the state does not have, and of nothing that is
+    over: that keeps its keys for a while.
 
     Orders, whatever happened: nobody would ever follow them up, and there are no more of them than
     there is work under way. All others only where the journal is lost: with a journal there are
@@ -103,8 +101,7 @@ async def stale_documents(session: Session, state: State, *, all_of_them: bool) 
         Retract(key, address)
         for key in (ORDER, *(OWN if all_of_them else ()))
         for address in await session.list(key)
-        if key.build(address) not in wanted
-        and (key is ORDER or getattr(address, "plan", None) not in state.past_plans)
+        if key.build(address) not in wanted and (key is ORDER or not is_over(address))
     ]
 
 

@@ -22,10 +22,12 @@ from fleet.core.effects import Effect, Retract, documents_of
 from fleet.core.events import Event
 from fleet.core.state import State
 from fleet.history.archive import PLAN, Archive
+from fleet.history.inheritance import inherited
 from fleet.history.queries import page, stats
 from fleet.history.retention import Retention, Retirement
 from fleet.service.outbox import Outbox
 from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.key import Address
 from keyexpr_schema.keyspace import (
     GOAL_STATUS,
     HISTORY,
@@ -114,6 +116,17 @@ class Past:
         """Archive what is over by these effects; it is on disk when this returns."""
         if records := _records(effects):
             self._archive.add(records)
+
+    async def inherit(self, wall_time_s: float) -> None:
+        """Archive what an earlier planner left on the keys, and is over."""
+        self._archive.add(await inherited(self._session, wall_time_s))
+
+    def has(self, address: Address) -> bool:
+        """Whether a key is about something that is over and still has its keys."""
+        plan, goal = getattr(address, "plan", None), getattr(address, "goal", None)
+        if plan is not None:
+            return self._archive.live_plan(plan) is not None
+        return goal is not None and self._archive.goal(goal) is not None
 
     def sent(self, effects: Iterable[Effect]) -> None:
         """These effects are with the outbox: note when the keys of what is over are as they are

@@ -120,13 +120,16 @@ class PlannerService:
             scenes = await self._session.list(SIM_SCENE)
             self._clock.resume(self.state.time_s, bool(scenes))
             if first_run:
+                await self._past.inherit(self._at()["wall_time_s"])
                 self._apply(await prior_state(self._session, self._at()))
             await self._take_charge()
             await stack.enter_async_context(
                 self._session.token(PLANNER_ALIVE, PlannerAliveAddress(self._incarnation))
             )
             await self._catch_up(watch, tokens, recovered.concluded)
-            stale = await stale_documents(self._session, self.state, all_of_them=first_run)
+            stale = await stale_documents(
+                self._session, self.state, self._past.has, all_of_them=first_run
+            )
             await self._diagnostics.start()
             self._go_live(recovered)
             self._carry_out(stale)

@@ -34,7 +34,9 @@ def leaf(words: list[str]) -> tuple[typer.core.TyperCommand, list[str]]:
     module, _, attribute = COMMANDS[words[0]][0].partition(":")
     command = typer.main.get_command(getattr(importlib.import_module(module), attribute))
     rest = words[1:]
-    while isinstance(command, typer.core.TyperGroup):
+    while isinstance(command, typer.core.TyperGroup) and (
+        (rest[:1] and rest[0] in command.commands) or not command.invoke_without_command
+    ):
         command, rest = command.commands[rest[0]], rest[1:]  # type: ignore[assignment]
     return command, rest  # type: ignore[return-value]
 
@@ -89,6 +91,7 @@ def test_the_table_has_every_command() -> None:
     for name, (where, _) in COMMANDS.items():
         module, _, attribute = where.partition(":")
         command = typer.main.get_command(getattr(importlib.import_module(module), attribute))
-        names = getattr(command, "commands", None)
-        leaves |= {name} if names is None else {f"{name} {inner}" for inner in names}
+        leaves |= {f"{name} {inner}" for inner in getattr(command, "commands", ())}
+        if getattr(command, "invoke_without_command", True):
+            leaves.add(name)
     assert {command for command, _ in SYNOPSES} == leaves

@@ -108,7 +108,7 @@ class Undisturbed(RuleBasedStateMachine):
 
     @rule(robot=st.sampled_from(["hsr", "locobot", None]), after=st.booleans())
     def a_person_wants_one_more_task(self, robot: str | None, after: bool) -> None:
-        entry = self.model.state.plans.get("plan-1")
+        entry = self.model.plans.get("plan-1")
         request = ControlRequest(
             request=f"task-{len(self.model.journal)}",
             control=Control.ADD_TASK,
@@ -123,9 +123,9 @@ class Undisturbed(RuleBasedStateMachine):
 
     @rule(plan=st.sampled_from(["plan-1", "plan-2", "plan-3"]))
     def a_person_cancels_a_plan_that_is_being_made(self, plan: str) -> None:
-        entry = self.model.state.plans.get(plan)
+        entry = self.model.plans.get(plan)
         if entry is not None and entry.job is not None:
-            number = len(self.model.state.answers)
+            number = len(self.model.replies)
             request = ControlRequest(request=f"stop-{number}", control=Control.CANCEL, plan=plan)
             self.model.receive(events.ControlRequested, request=request)
             self.a_plan_was_cancelled = True
@@ -174,23 +174,24 @@ class Undisturbed(RuleBasedStateMachine):
             self.model.return_(robot)
         self.model.finish()
         self.met.update(self.model.met)
-        state = self.model.state
-        for entry in state.plans.values():
+        plans = self.model.plans
+        for entry in plans.values():
             assert entry.state in ENDED_PLANS, f"{entry.plan.plan} is {entry.state}: it never ends"
             assert not entry.outstanding()
         for request in self.asked:
-            assert request in state.answers, f"{request} was never answered"
-        met = [goals for request, goals in self.asked.items() if state.answers[request].accepted]
+            assert request in self.model.replies, f"{request} was never answered"
+        met = [
+            goals for request, goals in self.asked.items() if self.model.replies[request].accepted
+        ]
         promised = {goal for goals in met for goal in goals}
-        for goal, status in state.goal_states.items():
+        for goal, status in self.model.goal_states.items():
             assert (
                 goal not in promised
                 or self.a_plan_was_cancelled
-                or any(goal in entry.plan.goals for entry in state.plans.values())
+                or any(goal in entry.plan.goals for entry in plans.values())
             ), f"{goal} was asked for while a plan was being made, and is in none"
             waits = all(
-                goal not in entry.plan.goals or entry.state in UNDONE
-                for entry in state.plans.values()
+                goal not in entry.plan.goals or entry.state in UNDONE for entry in plans.values()
             )
             assert status.state in ENDED_GOALS or waits, f"{goal} is {status.state} for ever"
             if self.reaches_everything and not waits:
@@ -202,7 +203,7 @@ class Undisturbed(RuleBasedStateMachine):
     def finished_work_stays_finished(self) -> None:
         if not hasattr(self, "model"):
             return
-        for plan, entry in self.model.state.plans.items():
+        for plan, entry in self.model.plans.items():
             for record in entry.records.values():
                 if (plan, record.task) in self.finished:
                     assert record.state is TaskState.SUCCEEDED, "finished work was undone"

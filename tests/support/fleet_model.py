@@ -9,20 +9,25 @@ from collections import Counter
 from dataclasses import replace
 from typing import Any
 
+import msgspec
+
 from fleet.allocators.makespan import MakespanAllocator
 from fleet.core import events
-from fleet.core.effects import Effect, MakePlan, Publish, Retract, effects_of
+from fleet.core.effects import Archive, Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
-from fleet.core.plan_entry import PlanEntry
+from fleet.core.plan_entry import PlanEntry, PlanOutcome
 from fleet.core.plan_index import OUTSTANDING
 from fleet.core.planning_input import PlanningInput
 from fleet.core.state import LOGIC, Policy, State
 from fleet.core.step import step
+from fleet.core.table import Table
 from fleet.service.composition import Composition, compose
 from fleet.service.planning.planning_job import run_planning_job
 from keyexpr_schema.facts import Value
 from keyexpr_schema.keyspace import ORDER
-from keyexpr_schema.payloads.goals import Goal, GoalState
+from keyexpr_schema.payloads import requests
+from keyexpr_schema.payloads.goals import OVER_GOALS, Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.history import Ended, GoalRecord, PlanRecord, RequestRecord
 from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState, TaskState
@@ -51,7 +56,10 @@ class FleetModel:
     With `late` answers, what planning jobs came to waits in `answers` until `answer` is called.
     """
 
-    def __init__(self, robots: tuple[RobotSpec, ...], cups: int, late: bool = False) -> None:
+    def __init__(
+        self, robots: tuple[RobotSpec, ...], cups: int, late: bool = False, logic: int = LOGIC
+    ) -> None:
+        self._logic = logic
         self.late = late
         self.answers: list[Answer] = []
         self.given_answers: list[Answer] = []
@@ -68,6 +76,8 @@ class FleetModel:
         self.started: dict[tuple[str, str, int], float] = {}
         """When each attempt was started."""
         self.reports: list[Report] = []
+        self.past: list[Ended] = []
+        """What is over."""
         self._truth: dict[tuple[str, str], Value] = {}
         self._start(epoch=1, incarnation="one")
         for place in PLACES:
@@ -86,7 +96,7 @@ class FleetModel:
             epoch=epoch,
             incarnation=incarnation,
             skills=dict(SKILLS),
-            logic=LOGIC,
+            logic=self._logic,
             lineage=incarnation,
         )
 
@@ -129,6 +139,7 @@ class FleetModel:
                 self.documents[keyexpr] = effect.payload
             elif isinstance(effect, Retract):
                 self.documents.pop(effect.key.build(effect.address), None)
+        self.past += [effect.record for effect in effects if isinstance(effect, Archive)]
         for effect in effects:
             if isinstance(effect, MakePlan):
                 answer = self.run(effect.given)
@@ -219,7 +230,29 @@ class FleetModel:
 
     def goal_state(self, goal: str) -> GoalState:
         """How a goal stands."""
-        return self.state.goal_states[goal].state
+        return self.goal_states[goal].state
+
+    @property
+    def plans(self) -> dict[str, PlanEntry]:
+        """Every plan there ever was, those that are over as they were in the end."""
+        past = (record for record in self.past if isinstance(record, PlanRecord))
+        return {**{record.spec.plan: _entry(record) for record in past}, **self.state.plans}
+
+    @property
+    def goal_states(self) -> dict[str, GoalStatus]:
+        """How every goal stands, or stood when it was over, unless it was deleted."""
+        over: list[GoalRecord] = []
+        for record in self.past:
+            over += record.goals if isinstance(record, PlanRecord) else ()
+            over += (record,) if isinstance(record, GoalRecord) and not record.deleted else ()
+        past = {goal.spec.goal: goal.status for goal in over if goal.status.state in OVER_GOALS}
+        return {**past, **self.state.goal_states}
+
+    @property
+    def replies(self) -> dict[str, requests.Answer]:
+        """The planner's answers, by request."""
+        past = (record.answer for record in self.past if isinstance(record, RequestRecord))
+        return {**{answer.request: answer for answer in past}, **self.state.answers}
 
     def report(self, order: Order, state: ReportState, **more: Any) -> None:
         """A worker reports on an order."""
@@ -331,6 +364,20 @@ class FleetModel:
         self.state = state
         self._start(epoch=state.epoch + 1, incarnation="again")
         self._take(effects_of(self.state))
+
+
+def _entry(record: PlanRecord) -> PlanEntry:
+    """What a plan that is over looked like, as far as it is kept."""
+    status = record.status
+    return PlanEntry(
+        plan=record.spec,
+        state=status.state,
+        records=Table({task.task: task for task in record.tasks}),
+        outcome=msgspec.convert(status, PlanOutcome, from_attributes=True),
+        change=status.change,
+        reason=status.reason,
+        violations=status.violations,
+    )
 
 
 def fleet() -> FleetModel:

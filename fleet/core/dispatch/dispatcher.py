@@ -32,8 +32,7 @@ def advance(state: State) -> State:
     looked = UNTOUCHED
     while True:
         state = react_to_delays(give_up_work_of_lost_robots(state))
-        if state.policy.auto_plan:
-            state = plan_waiting_goals(state)
+        state = plan_waiting_goals(state)
         if state.touches is looked:
             return state
         concerns = Concerns.of(state, state.touches.since(looked))
@@ -89,7 +88,8 @@ def _cancel_or_make_again(state: State, entry: PlanEntry) -> State:
     if entry.cancelling:
         return _cancel(state, entry)
     if entry.job is None and entry.replan is not None:
-        return start_replanning(state, entry)
+        waits = entry.waits_for_team == state.team_number
+        return state if waits else start_replanning(state, entry)
     return state
 
 

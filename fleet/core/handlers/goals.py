@@ -44,6 +44,7 @@ def goal_deleted(state: State, event: events.GoalDeleted) -> State:
     if event.goal not in state.goals:
         return state
     state = goal_taken_back(state, event.goal)
+    state = replace(state, waiting_for_robots=state.waiting_for_robots.without(event.goal))
     for plan in state.index.plans_of.get(event.goal, ()):
         state = _goal_taken_out(state, state.plans[plan], event.goal)
     return state

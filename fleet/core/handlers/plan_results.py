@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sized
+from collections.abc import Mapping, Sized
 
 from msgspec.structs import replace
 
@@ -17,6 +17,7 @@ from fleet.core.state_updates import (
     answer,
     give_up,
     mark_goals,
+    open_goals,
     put_answer,
     set_entry,
     touch,
@@ -49,6 +50,7 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
         state = mark_goals(state, (goal,), GoalState.FAILED, entry.plan.plan, reason)
     for goal, reason in event.postponed.items():
         state = mark_goals(state, (goal,), GoalState.WAITING, None, reason)
+    state = _wait_for_robots(state, job, event.for_robots)
     first = event.plan.revision == 1
     to = entry.state
     if first:
@@ -65,6 +67,7 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
         unwanted=tuple(dict.fromkeys([*entry.unwanted, *revision.unwanted])),
         change=None if first else revision.change,
         discarded=0,
+        waits_for_team=None,
         team=team,
         fruitless_replans=entry.fruitless_replans + fruitless,
         reason=None,
@@ -97,6 +100,7 @@ def _as_it_was(entry: PlanEntry, job: PlanningJob, event: events.PlanningSucceed
         and job.residual is not None
         and not event.left_out
         and not event.postponed
+        and not event.for_robots
         and event.allocation.items() <= job.previous_allocation.items()
         and len(event.plan.tasks) == len(job.residual.tasks)
         and not any(
@@ -137,7 +141,7 @@ def _made_sentence(event: events.PlanningSucceeded) -> str:
     sentences = [f"plan {plan.plan} has {tasks} for {goals}"]
     if plan.making.fallback:
         sentences.append(plan.making.fallback)
-    missing = {**event.left_out, **event.postponed}
+    missing = {**event.left_out, **event.postponed, **event.for_robots}
     sentences += [f"goal {goal} is left out: {reason}" for goal, reason in missing.items()]
     return "; ".join(sentences)
 
@@ -193,12 +197,17 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
         entry = replace(entry, state=PlanState.REJECTED, reason=event.reason)
         state = set_entry(state, entry)
         state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None, event.reason)
+        if job.partial:  # nobody has asked for this plan who now knows better
+            state = _wait_for_robots(state, job, dict.fromkeys(event.for_robots, event.reason))
         return answer(state, job.request, False, event.reason, entry.plan.plan, event.violations)
     for wish in wishes:
         sentence = f"{wish.refusal}: {event.reason}"
         plan = entry.plan.plan
         state = answer(state, wish.request, False, sentence, plan, event.violations)
         state = mark_goals(state, wish.goals, GoalState.WAITING, None, event.reason)
+        if wish.request is None:
+            waiting = [goal for goal in wish.goals if goal in event.for_robots]
+            state = _wait_for_robots(state, job, dict.fromkeys(waiting, event.reason))
     if not reasons:
         return set_entry(state, entry)  # the plan as it was still stands
     if wishes or (entry.replan is not None and state.plans_while_acting):
@@ -208,5 +217,31 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
             fruitless_replans=entry.fruitless_replans + 1,
         )
         return set_entry(state, again)
+    if event.for_robots:
+        entry = replace(entry, reasons=(*reasons, *entry.reasons))
+        return _wait_with_plan(state, entry, job, event)
     to = GoalState.WAITING if event.postponed else GoalState.FAILED
     return give_up(state, entry, event.reason, to)
+
+
+def _wait_for_robots(state: State, job: PlanningJob, goals: Mapping[str, str]) -> State:
+    """Goals that only a robot which is not there can help with wait for one, with the reason."""
+    for goal, reason in goals.items():
+        state = mark_goals(state, (goal,), GoalState.WAITING, None, reason)
+        waiting = state.waiting_for_robots.set(goal, job.team_number)
+        state = replace(state, waiting_for_robots=waiting)
+    return state
+
+
+def _wait_with_plan(
+    state: State, entry: PlanEntry, job: PlanningJob, event: events.PlanningFailed
+) -> State:
+    """A plan that only robots which are not there could go on with waits for them."""
+    plan = entry.plan
+    hopeless = [g for g in open_goals(state, entry) if g in job.goals and g not in event.for_robots]
+    for goal in hopeless:
+        state = mark_goals(state, (goal,), GoalState.FAILED, plan.plan, event.reason)
+        plan = without_goal(state, plan, goal)
+    state = mark_goals(state, plan.goals, GoalState.WAITING, plan.plan, event.reason)
+    entry = replace(entry, plan=plan, waits_for_team=job.team_number, reason=event.reason)
+    return set_entry(state, entry)

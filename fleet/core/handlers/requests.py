@@ -35,19 +35,41 @@ def plan_requested(state: State, event: events.PlanRequested) -> State:
 
 
 def plan_waiting_goals(state: State) -> State:
-    """Goals that wait go into the running plan, or, where none runs, into a new one."""
+    """Goals that wait go into the running plan, or, where none runs, into a new one.
+
+    Those that waited for robots do so when one has come, others where the policy says so.
+    """
+    if not state.policy.auto_plan and not state.waiting_for_robots:
+        return state
     active = [state.plans[plan] for plan in state.index.active]
     if any(entry.state is PlanState.PLANNING for entry in active):
         return state  # what comes meanwhile goes into the plan that is being made
-    waiting = tuple(g for g in _waiting_goals(state) if state.goal_states[g].reason is None)
+    waiting = tuple(goal for goal in _waiting_goals(state) if _is_due(state, goal))
     if not waiting:
         return state
+    state = _taken_up(state, waiting)
     for entry in active:
         if entry.state is PlanState.RUNNING and not entry.cancelling:
             return set_entry(state, entry.wishing(GoalsAdded(goals=waiting)))
     plan = Plan(plan=_new_plan_name(state), goals=waiting, conditions=(), tasks=())
     job = PlanningJob.of(state.jobs + 1, plan, "symbolic")
-    return _planning(state, plan, replace(job, partial=True))
+    job = replace(job, partial=True, team_number=state.team_number)
+    return _planning(state, plan, job)
+
+
+def _taken_up(state: State, goals: tuple[str, ...]) -> State:
+    """These goals wait for nobody any more: a plan is made for them."""
+    rest = state.waiting_for_robots
+    for goal in goals:
+        rest = rest.without(goal)
+    return state if rest is state.waiting_for_robots else replace(state, waiting_for_robots=rest)
+
+
+def _is_due(state: State, goal: str) -> bool:
+    number = state.waiting_for_robots.get(goal)
+    if number is not None:
+        return number != state.team_number
+    return state.policy.auto_plan and state.goal_states[goal].reason is None
 
 
 def _start_planning(state: State, ask: PlanRequest) -> State:
@@ -100,7 +122,8 @@ def _planning(state: State, plan: Plan, job: PlanningJob) -> State:
         begun_wall_s=state.wall_time_s,
     )
     made = max(state.plans_made, _plan_number(plan.plan))
-    return set_entry(replace(state, jobs=job.job, plans_made=made), entry)
+    state = replace(_taken_up(state, plan.goals), jobs=job.job, plans_made=made)
+    return set_entry(state, entry)
 
 
 def _why_not_plan(state: State, plan: str | None, goals: tuple[str, ...]) -> str | None:
@@ -164,7 +187,8 @@ def replan_requested(state: State, event: events.ReplanRequested) -> State:
         return answer(state, ask.request, False, entry)
     wish = ReplanAsked(request=ask.request, sentence=ask.reason, goals=ask.goals)
     # What a person asks for is no sign that the world does not go along: counting begins anew.
-    return set_entry(state, replace(entry.wishing(wish), fruitless_replans=0))
+    entry = replace(entry.wishing(wish), fruitless_replans=0)
+    return set_entry(_taken_up(state, ask.goals), entry)
 
 
 def _entry_to_replan(state: State, ask: ReplanRequest) -> PlanEntry | str:

@@ -7,7 +7,8 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.handlers.world import vocabulary_changed
 from fleet.core.state import State
-from fleet.core.state_updates import robot_changed
+from fleet.core.state_updates import robot_changed, touch
+from fleet.core.touches import Part, Touch
 
 
 def robot_registered(state: State, event: events.RobotRegistered) -> State:
@@ -18,8 +19,13 @@ def robot_registered(state: State, event: events.RobotRegistered) -> State:
     gone = state.gone_since
     if state.connected.get(robot):
         gone = gone.without(robot)
-    state = replace(state, robots=state.robots.set(robot, event.spec), gone_since=gone)
-    return vocabulary_changed(robot_changed(state, robot))
+    state = replace(
+        state,
+        robots=state.robots.set(robot, event.spec),
+        gone_since=gone,
+        team_number=state.team_number + 1,
+    )
+    return vocabulary_changed(touch(robot_changed(state, robot), Touch(Part.TEAM)))
 
 
 def robot_unregistered(state: State, event: events.RobotUnregistered) -> State:

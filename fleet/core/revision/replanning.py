@@ -58,6 +58,7 @@ def _replanning_job(
     return replace(
         PlanningJob.of(state.jobs + 1, plan, entry.planner),
         first_task=entry.next_task_number,
+        team_number=state.team_number,
         partial=True,
         # What is being cancelled is not what a new plan could go on with, though it wants the same.
         under_way=tuple(r.task for r in entry.outstanding() if r.task not in entry.unwanted),

@@ -36,10 +36,18 @@ def run_planning_job(
     `clock` is what the planner's share of the time limit goes by.
     """
     started = time.perf_counter()
-    result = _result(given, composition, TimeBudget(PLANNERS_SHARE * given.limit_s, clock))
+    budget = TimeBudget(PLANNERS_SHARE * given.limit_s, clock)
+    result = _result(given, composition, budget)
+    for_robots = _goals_for_robots(given, composition.feasibility, result, budget)
     took_s = time.perf_counter() - started
     if isinstance(result, PlanningSucceeded):
-        return replace(result, planning_time_s=took_s)
+        left_out = result.left_out
+        return replace(
+            result,
+            planning_time_s=took_s,
+            left_out={g: reason for g, reason in left_out.items() if g not in for_robots},
+            for_robots={g: reason for g, reason in left_out.items() if g in for_robots},
+        )
     return PlanningFailed(
         time_s=given.time_s,
         wall_time_s=given.wall_time_s,
@@ -48,6 +56,7 @@ def run_planning_job(
         violations=result.violations,
         planning_time_s=took_s,
         postponed=result.postponed,
+        for_robots=for_robots,
     )
 
 
@@ -74,6 +83,50 @@ def _result(
         return NoPlan(f"there is no planner {job.planner}: choose one of {choices}")
     run = _Run(given, given.world(), planner, composition.feasibility, allocator, budget)
     return run.repaired() or run.planned()
+
+
+def _goals_for_robots(
+    given: PlanningInput,
+    feasibility: Planner,
+    result: PlanningSucceeded | NoPlan,
+    budget: TimeBudget,
+) -> tuple[str, ...]:
+    """Of goals without a plan, those that could be reached if all robots were connected, or, where
+    none is, might be."""
+    if not given.job.partial:
+        return ()
+    if isinstance(result, PlanningSucceeded):
+        missing = set(result.left_out)
+    else:
+        missing = set() if result.postponed else {goal.goal for goal in given.goals}
+    open_goals = [g for g in given.goals if g.goal in missing and g.goal not in given.reached]
+    if not given.available:
+        return tuple(goal.goal for goal in open_goals)
+    if not open_goals or len(given.available) == len(given.robots):
+        return ()
+    world = given.world()
+    everybody = changed(world, available=frozenset(world.robots))
+    problem = changed(_problem(given, everybody, budget), strategy=feasibility.strategies[0])
+    return tuple(
+        goal.goal
+        for goal in open_goals
+        if isinstance(feasibility.plan(changed(problem, goals=(goal,))), CheckedPlan)
+    )
+
+
+def _problem(given: PlanningInput, world: WorldModel, budget: TimeBudget) -> PlanningProblem:
+    job = given.job
+    return PlanningProblem(
+        plan=job.plan,
+        goals=given.goals,
+        world=world,
+        revision=job.revision,
+        strategy=job.strategy,
+        allocator=job.allocator,
+        first_task=job.first_task,
+        searched=frozenset(given.searched),
+        budget=budget,
+    )
 
 
 @dataclass(frozen=True)
@@ -173,18 +226,7 @@ class _Run:
         return plan if isinstance(plan, NoPlan) else PartialPlan.of(plan, problem)
 
     def _problem(self) -> PlanningProblem:
-        job = self.given.job
-        return PlanningProblem(
-            plan=job.plan,
-            goals=self.given.goals,
-            world=self.world,
-            revision=job.revision,
-            strategy=job.strategy,
-            allocator=job.allocator,
-            first_task=job.first_task,
-            searched=frozenset(self.given.searched),
-            budget=self.budget,
-        )
+        return _problem(self.given, self.world, self.budget)
 
     def _reached(self) -> frozenset[str]:
         return frozenset(self.given.reached)

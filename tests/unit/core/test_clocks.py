@@ -48,7 +48,7 @@ def test_a_simulation_that_begins_anew_makes_nothing_late() -> None:
     model.finish()
     assert model.state.era == 1
     assert model.state.time_s < 100.0
-    assert model.state.plans["plan-1"].plan.revision == 1
+    assert model.plans["plan-1"].plan.revision == 1
     assert model.goal_state("g2") is GoalState.REACHED
 
 
@@ -59,7 +59,7 @@ def test_what_runs_when_the_clock_is_set_back_counts_from_there() -> None:
     model.start(model.orders()[0])
     model.time_s = 0.0
     model.receive(events.TimerFired)
-    started = [r.started_s for r in model.state.plans["plan-1"].records.values()]
+    started = [r.started_s for r in model.plans["plan-1"].records.values()]
     assert 1.0 in started
     assert all(s is None or s < 10.0 for s in started)
 

@@ -22,9 +22,9 @@ def test_a_mission_from_goals_to_reached() -> None:
     model.plan(*BOTH)
     assert {order.robot for order in model.orders()} == {"hsr", "locobot"}
     model.finish()
-    assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
+    assert model.plans["plan-1"].state is PlanState.SUCCEEDED
     assert [model.goal_state(g) for g in ("g1", "g2")] == [GoalState.REACHED] * 2
-    assert model.state.answers["r0"].accepted
+    assert model.replies["r0"].accepted
 
 
 def test_a_goal_is_reached_as_soon_as_it_is_and_not_when_the_plan_ends() -> None:
@@ -32,7 +32,7 @@ def test_a_goal_is_reached_as_soon_as_it_is_and_not_when_the_plan_ends() -> None
     model.plan(*BOTH)
     while model.goal_state("g2") is not GoalState.REACHED:
         model.succeed(model.orders()[-1])
-    assert model.state.plans["plan-1"].state is PlanState.RUNNING
+    assert model.plans["plan-1"].state is PlanState.RUNNING
 
 
 def test_a_crash_of_the_planner_changes_nothing_but_the_epoch_of_orders() -> None:
@@ -44,7 +44,7 @@ def test_a_crash_of_the_planner_changes_nothing_but_the_epoch_of_orders() -> Non
     assert [(o.task, o.attempt) for o in before] == [(o.task, o.attempt) for o in after]
     assert {order.epoch for order in after} == {2}
     model.finish()
-    assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
+    assert model.plans["plan-1"].state is PlanState.SUCCEEDED
 
 
 def test_a_planner_without_a_journal_does_nothing_a_second_time() -> None:
@@ -54,8 +54,8 @@ def test_a_planner_without_a_journal_does_nothing_a_second_time() -> None:
     fresh = State()
     remembered = events.PriorStateLoaded(
         time_s=0.0, wall_time_s=0.0,
-        answers=tuple(model.state.answers.values()),
-        goals=tuple(model.state.goal_states.values()),
+        answers=tuple(model.replies.values()),
+        goals=tuple(model.goal_states.values()),
         plans=("plan-1",),
     )  # fmt: skip
     fresh, _ = step(fresh, remembered)
@@ -64,9 +64,7 @@ def test_a_planner_without_a_journal_does_nothing_a_second_time() -> None:
         if isinstance(event, events.PlanRequested | events.GoalPut):
             fresh, effects = step(fresh, event)
             assert not any(isinstance(effect, MakePlan) for effect in effects)
-    proposed = events.PlanProposed(
-        plan=model.state.plans["plan-1"].plan, time_s=0.0, wall_time_s=0.0
-    )
+    proposed = events.PlanProposed(plan=model.plans["plan-1"].plan, time_s=0.0, wall_time_s=0.0)
     fresh, effects = step(fresh, proposed)
     assert effects == ()
     assert fresh.goal_states["g1"].state is GoalState.REACHED

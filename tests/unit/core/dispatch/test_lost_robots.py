@@ -57,7 +57,7 @@ def test_the_order_of_a_lost_robot_is_cancelled_and_what_it_handles_stays_reserv
 def test_what_a_lost_robot_did_is_no_failure_of_the_goal() -> None:
     model, order = picking()
     model.lose(order.robot)
-    entry = model.state.plans["plan-1"]
+    entry = model.plans["plan-1"]
     assert entry.failures == {}
     assert entry.records[order.task].state is TaskState.RUNNING
     assert "has been away" in (entry.records[order.task].reason or "")
@@ -68,10 +68,10 @@ def test_success_that_is_reported_late_counts() -> None:
     model.lose(order.robot)
     model.return_(order.robot)
     model.succeed(order)
-    assert model.state.plans["plan-1"].records[order.task].state is TaskState.SUCCEEDED
+    assert model.plans["plan-1"].records[order.task].state is TaskState.SUCCEEDED
     model.finish()
     assert model.goal_state("g1") is GoalState.REACHED
-    records = model.state.plans["plan-1"].records.values()
+    records = model.plans["plan-1"].records.values()
     assert [r.robot for r in records if r.skill == "pick" and r.attempt] == [order.robot]
 
 
@@ -97,10 +97,10 @@ def test_a_plan_can_be_cancelled_though_a_robot_of_it_is_lost() -> None:
     model, order = picking()
     model.receive(events.WorkerDisconnected, robot=order.robot, incarnation="i1")
     assert control(model, Control.CANCEL)[0]
-    assert model.state.plans["plan-1"].state is PlanState.RUNNING
+    assert model.plans["plan-1"].state is PlanState.RUNNING
     model.wall_s += model.state.policy.lost_after_s + 1.0
     model.receive(events.TimerFired)
-    assert model.state.plans["plan-1"].state is PlanState.CANCELLED
+    assert model.plans["plan-1"].state is PlanState.CANCELLED
     assert [o.cancelled for o in model.orders()] == [True]
     # Another plan about the same cup waits for what the lost robot has to say of it.
     model.plan()
@@ -147,9 +147,9 @@ def test_reports_of_another_planners_attempts_bring_facts_only() -> None:
     model = fleet()
     model.plan(bring(1, "hallway"))
     (order,) = model.orders()
-    before = model.state.plans
+    before = model.plans
     for planner in ("another", "two"):
         model.report(order, ReportState.SUCCEEDED, facts=model.facts_after(order), planner=planner)
-    assert model.state.plans == before
+    assert model.plans == before
     model.report(order, ReportState.STARTED, started_s=1.0, planner=None)
-    assert model.state.plans["plan-1"].records[order.task].state is TaskState.RUNNING
+    assert model.plans["plan-1"].records[order.task].state is TaskState.RUNNING

@@ -29,15 +29,7 @@ def test_a_worker_that_comes_back_in_time_keeps_its_work() -> None:
     model.receive(events.TimerFired)
     model.receive(events.WorkerConnected, robot="hsr", incarnation="i2")
     assert model.orders() == [order]
-    assert model.state.plans["plan-1"].plan.revision == 1
-
-
-def test_when_nobody_is_left_goals_fail_and_say_why() -> None:
-    model = FleetModel((manipulator(),), cups=1)
-    model.plan(bring(1, "hallway"))
-    model.lose("hsr")
-    assert model.goal_state("g1") is GoalState.FAILED
-    assert "no robot is connected" in (model.state.goal_states["g1"].reason or "")
+    assert model.plans["plan-1"].plan.revision == 1
 
 
 def test_a_fact_that_contradicts_the_plan_leads_to_a_new_one() -> None:
@@ -45,7 +37,7 @@ def test_a_fact_that_contradicts_the_plan_leads_to_a_new_one() -> None:
     model.plan(bring(1, "hallway"))
     model.learn("cup_1", "at", "living_room")
     model.succeed(model.orders()[0])
-    entry = model.state.plans["plan-1"]
+    entry = model.plans["plan-1"]
     assert entry.plan.revision == 2
     model.finish()
     assert model.goal_state("g1") is GoalState.REACHED
@@ -64,7 +56,7 @@ def test_what_a_running_task_is_just_making_true_is_no_news() -> None:
     assert not model.answers, "that is what the plan is about"
     model.succeed(order)
     assert model.goal_state("g1") is GoalState.REACHED
-    assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
+    assert model.plans["plan-1"].state is PlanState.SUCCEEDED
 
 
 def test_what_somebody_else_says_against_a_running_task_is_news() -> None:
@@ -86,10 +78,10 @@ def test_what_nobody_can_look_for_is_told() -> None:
     model.receive(events.RobotRegistered, spec=blind)
     model.receive(events.FactDeleted, subject="cup_1", relation="at")
     model.plan(bring(1, "hallway"))
-    assert not model.state.answers["r0"].accepted
-    assert "where cup_1 is" in model.state.answers["r0"].sentence
+    assert not model.replies["r0"].accepted
+    assert "where cup_1 is" in model.replies["r0"].sentence
     assert model.goal_state("g1") is GoalState.WAITING
-    assert model.state.plans["plan-1"].state is PlanState.REJECTED
+    assert model.plans["plan-1"].state is PlanState.REJECTED
 
 
 def test_a_discovery_ends_the_search_and_leads_to_the_goal() -> None:
@@ -101,7 +93,7 @@ def test_a_discovery_ends_the_search_and_leads_to_the_goal() -> None:
     while not any(o.robot == "locobot" and o.skill == "search" for o in model.orders()):
         model.succeed(next(o for o in model.orders() if o.robot == "locobot"))
     model.learn("cup_1", "at", "living_room")
-    entry = model.state.plans["plan-1"]
+    entry = model.plans["plan-1"]
     assert entry.plan.revision == 2
     assert "pick" in {task.skill for task in entry.plan.tasks}
     for order in model.orders():
@@ -117,7 +109,7 @@ def test_what_is_found_nowhere_ends_the_goal_with_where_it_was_looked_for() -> N
     model.plan(bring(1, "hallway"))
     model.finish()
     assert model.goal_state("g1") is GoalState.FAILED
-    reason = model.state.goal_states["g1"].reason or ""
+    reason = model.goal_states["g1"].reason or ""
     assert "looked for in hallway, kitchen, living_room" in reason
 
 
@@ -142,9 +134,9 @@ def test_a_new_robot_is_given_a_share() -> None:
     model.receive(events.RobotRegistered, spec=manipulator("r2"))
     model.receive(events.WorkerConnected, robot="r2", incarnation="i1")
     model.learn("r2", "holding", "nothing")
-    entry = model.state.plans["plan-1"]
+    entry = model.plans["plan-1"]
     assert entry.plan.revision == 2
     assert {record.robot for record in entry.current()} == {"r1", "r2"}
     model.finish()
     assert entry.plan.goals == ("g1", "g2")
-    assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
+    assert model.plans["plan-1"].state is PlanState.SUCCEEDED

@@ -28,7 +28,7 @@ def running(robots: int, cups: int) -> FleetModel:
 
 
 def entry(model: FleetModel) -> PlanEntry:
-    return model.state.plans["plan-1"]
+    return model.plans["plan-1"]
 
 
 def order_of(model: FleetModel, robot: str) -> Order | None:
@@ -87,7 +87,7 @@ def test_robots_work_on_while_a_plan_is_made_and_nothing_is_done_twice(
     model.finish_cancelling()
     assert entry(model).state is PlanState.SUCCEEDED
     assert entry(model).plan.revision > 1
-    states = {status.state for status in model.state.goal_states.values()}
+    states = {status.state for status in model.goal_states.values()}
     assert states == {GoalState.REACHED}
     records = entry(model).records
     done_at_last = [r for r in records.values() if r.state is TaskState.SUCCEEDED]
@@ -134,7 +134,7 @@ def test_the_goal_of_a_task_that_failed_waits_and_the_others_do_not() -> None:
     assert goal not in begun
     assert len(begun) > 1
     model.finish()
-    assert all(s.state is GoalState.REACHED for s in model.state.goal_states.values())
+    assert all(s.state is GoalState.REACHED for s in model.goal_states.values())
 
 
 def test_goals_are_reached_while_a_plan_is_made() -> None:

@@ -12,7 +12,7 @@ from tests.support.household import manipulator
 def say(model: FleetModel, text: str) -> GoalStatus:
     number = len(model.state.goals) + 1
     model.receive(events.GoalPut, goal=Goal(goal=f"g{number}", text=text, ordinal=number))
-    return model.state.goal_states[f"g{number}"]
+    return model.goal_states[f"g{number}"]
 
 
 def test_a_remark_is_told_to_ask_for_nothing() -> None:

@@ -17,7 +17,7 @@ def test_sentences_wait_for_the_names_they_use() -> None:
     model = FleetModel((manipulator(),), cups=1)
     model.receive(events.GoalPut, goal=Goal(goal="g", text="bring the vase to the hallway"))
     assert model.goal_state("g") is GoalState.REJECTED
-    assert "known are cup_1" in (model.state.goal_states["g"].reason or "")
+    assert "known are cup_1" in (model.goal_states["g"].reason or "")
     vase = events.ObjectPut(
         object=model.state.objects["cup_1"].__class__(object="vase", kind="vase", label="vase"),
         time_s=1.0,
@@ -33,7 +33,7 @@ def test_a_goal_in_steps_takes_one_after_the_other() -> None:
     model.receive(events.GoalPut, goal=Goal(goal="g", text="kindly do the usual with cup one"))
     assert model.goal_state("g") is GoalState.READING
     model.plan(goals=("g",))
-    assert "still being worked out" in model.state.answers["r0"].sentence
+    assert "still being worked out" in model.replies["r0"].sentence
     assert any(isinstance(effect, Interpret) for effect in model.effects)
     stages = ((at("cup_1", "hallway"),), (at("cup_1", "living_room"),))
     model.receive(events.GoalInterpreted, goal="g", stages=stages)
@@ -43,7 +43,7 @@ def test_a_goal_in_steps_takes_one_after_the_other() -> None:
     assert model.state.facts[FactKey(AT, "cup_1")].value == "living_room"
     places = [
         record.args["place"]
-        for record in model.state.plans["plan-1"].records.values()
+        for record in model.plans["plan-1"].records.values()
         if record.skill == "place"
     ]
     assert places == ["hallway", "living_room"]
@@ -55,7 +55,7 @@ def test_what_an_earlier_step_brought_somewhere_stays_there() -> None:
     model.plan(Goal(goal="g", text=text))
     model.finish()
     assert model.goal_state("g") is GoalState.REACHED
-    assert {str(c) for c in model.state.goal_states["g"].conditions} == {
+    assert {str(c) for c in model.goal_states["g"].conditions} == {
         "at(locobot) = kitchen",
         "at(cup_1) = living_room",
         "at(cup_2) = living_room",
@@ -68,7 +68,7 @@ def test_a_sentence_that_no_model_understands_is_refused() -> None:
     model.receive(events.GoalPut, goal=Goal(goal="g", text="hum a tune"))
     model.receive(events.GoalInterpreted, goal="g", reason="it is no task for robots")
     assert model.goal_state("g") is GoalState.REJECTED
-    assert "no task for robots" in (model.state.goal_states["g"].reason or "")
+    assert "no task for robots" in (model.goal_states["g"].reason or "")
 
 
 def test_a_deleted_goal_leaves_the_plan() -> None:
@@ -76,7 +76,7 @@ def test_a_deleted_goal_leaves_the_plan() -> None:
     model.plan(*BOTH)
     model.receive(events.GoalDeleted, goal="g2")
     model.finish()
-    entry = model.state.plans["plan-1"]
+    entry = model.plans["plan-1"]
     assert entry.state is PlanState.SUCCEEDED
     assert entry.plan.goals == ("g1",)
     assert "goals/g2/status" not in model.documents
@@ -90,7 +90,7 @@ def test_a_goal_that_comes_up_joins_the_running_plan_when_asked() -> None:
         events.ReplanRequested,
         request=ReplanRequest(request="x", plan="plan-1", reason="more", goals=("g2",)),
     )
-    assert model.state.plans["plan-1"].plan.goals == ("g1", "g2")
+    assert model.plans["plan-1"].plan.goals == ("g1", "g2")
     model.finish()
     assert model.goal_state("g2") is GoalState.REACHED
 
@@ -100,6 +100,6 @@ def test_goals_are_planned_unasked_where_the_policy_says_so() -> None:
     model.receive(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(auto_plan=True))
     for goal in BOTH:
         model.receive(events.GoalPut, goal=goal)
-    assert list(model.state.plans) == ["plan-1"]
+    assert list(model.plans) == ["plan-1"]
     model.finish()
     assert [model.goal_state(g) for g in ("g1", "g2")] == [GoalState.REACHED] * 2

@@ -9,14 +9,14 @@ from tests.support.household import bring
 
 
 def plan_of(model: FleetModel) -> str:
-    (plan,) = model.state.plans
+    (plan,) = model.plans
     return plan
 
 
 def delete(model: FleetModel, plan: str) -> None:
     request = ControlRequest(request=f"c{len(model.journal)}", control=Control.DELETE, plan=plan)
     model.receive(events.ControlRequested, request=request)
-    assert plan not in model.state.plans
+    assert plan not in model.plans
 
 
 def test_the_name_of_a_deleted_plan_is_not_given_again() -> None:

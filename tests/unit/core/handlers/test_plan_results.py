@@ -44,7 +44,7 @@ def short(**fields: Any) -> Short:
 
 
 def waits(model: FleetModel, goal: str) -> bool:
-    status = model.state.goal_states[goal]
+    status = model.goal_states[goal]
     return (status.state, status.plan, status.reason) == (GoalState.WAITING, None, WHY)
 
 
@@ -52,7 +52,7 @@ def test_a_goal_for_which_there_was_no_time_waits_and_the_others_are_carried_out
     model = short(slow=("g2",))
     model.plan(*BOTH)
     assert waits(model, "g2")
-    assert f"goal g2 is left out: {WHY}" in model.state.answers["r0"].sentence
+    assert f"goal g2 is left out: {WHY}" in model.replies["r0"].sentence
     model.finish()
     assert model.goal_state("g1") is GoalState.REACHED
     model.slow = ()
@@ -68,7 +68,7 @@ def test_a_goal_added_to_a_running_plan_may_have_to_wait_and_ends_nothing() -> N
     ask = ReplanRequest(request="q", plan="plan-1", goals=("g2",), reason="so")
     model.receive(events.ReplanRequested, request=ask)
     assert waits(model, "g2")
-    assert model.state.plans["plan-1"].state is PlanState.RUNNING
+    assert model.plans["plan-1"].state is PlanState.RUNNING
     model.finish()
     assert model.goal_state("g1") is GoalState.REACHED
 
@@ -97,4 +97,4 @@ def test_a_job_that_nobody_waits_for_any_more_is_dropped() -> None:
     model.receive(events.ControlRequested, request=cancel)
     assert DropJob(made.given.job.job) in model.effects
     model.answer()
-    assert not [r for r in model.state.plans["plan-1"].records.values() if r.state in OUTSTANDING]
+    assert not [r for r in model.plans["plan-1"].records.values() if r.state in OUTSTANDING]

@@ -15,7 +15,7 @@ def test_a_failed_task_leads_to_a_new_revision_with_finished_work_kept() -> None
     model.succeed(model.orders()[0])
     (pick,) = model.orders()
     model.fail(pick)
-    entry = model.state.plans["plan-1"]
+    entry = model.plans["plan-1"]
     assert entry.plan.revision == 2
     assert entry.records["t1"].state is TaskState.SUCCEEDED
     assert entry.records["t2"].state is TaskState.FAILED
@@ -33,7 +33,7 @@ def test_a_task_that_always_fails_ends_its_goal_with_the_reason() -> None:
                 model.fail(order)
             else:
                 model.succeed(order)
-    status = model.state.goal_states["g1"]
+    status = model.goal_states["g1"]
     assert status.state is GoalState.FAILED
     assert "it slipped" in (status.reason or "")
     assert model.orders() == []
@@ -44,7 +44,7 @@ def test_an_interrupted_attempt_that_was_done_counts_and_is_not_given_again() ->
     model.plan(bring(1, "hallway"))
     model.succeed(model.orders()[0])
     model.interrupt(model.orders()[0], done=True)
-    assert model.state.plans["plan-1"].records["t2"].state is TaskState.SUCCEEDED
+    assert model.plans["plan-1"].records["t2"].state is TaskState.SUCCEEDED
     assert model.orders()[0].skill == "navigate"
 
 
@@ -61,7 +61,7 @@ def test_reports_of_old_attempts_change_nothing_but_facts() -> None:
     model.plan(bring(1, "hallway"))
     (order,) = model.orders()
     model.interrupt(order, done=False)
-    before = model.state.plans
+    before = model.plans
     model.report(order, ReportState.FAILED, reason="late news")
     model.report(order, ReportState.SUCCEEDED)
-    assert model.state.plans == before
+    assert model.plans == before

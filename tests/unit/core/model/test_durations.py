@@ -108,7 +108,7 @@ def test_reports_teach_and_the_next_plan_counts_with_it() -> None:
     pick = PICK.ground({"robot": "hsr", "object": "cup_2", "place": "kitchen"})
     assert world.duration_s(pick, "kitchen", "hsr") == known.skills["pick"].mean
     model.plan(bring(2, "hallway"))
-    predicted = {r.skill: r.duration_s for r in model.state.plans["plan-2"].current()}
+    predicted = {r.skill: r.duration_s for r in model.plans["plan-2"].current()}
     assert predicted["pick"] == known.skills["pick"].mean
     assert predicted["navigate"] > 4.0 + 4.0 / 0.6
 

@@ -19,12 +19,12 @@ def test_a_replan_that_changes_nothing_disturbs_nobody() -> None:
     model.receive(
         events.ReplanRequested, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
     )
-    entry = model.state.plans["plan-1"]
+    entry = model.plans["plan-1"]
     assert entry.plan.revision == 2
     assert entry.change == PlanChange(kept=9, dropped=0, added=0)
     assert model.orders() == before
     model.finish()
-    assert model.state.plans["plan-1"].state is PlanState.SUCCEEDED
+    assert model.plans["plan-1"].state is PlanState.SUCCEEDED
 
 
 def test_a_replan_in_the_middle_of_a_pick_goes_on_with_it() -> None:
@@ -37,7 +37,7 @@ def test_a_replan_in_the_middle_of_a_pick_goes_on_with_it() -> None:
         events.ReplanRequested, request=ReplanRequest(request="x", plan="plan-1", reason="I say so")
     )
     assert model.orders() == [pick]
-    assert model.state.plans["plan-1"].change == PlanChange(kept=3, dropped=0, added=0)
+    assert model.plans["plan-1"].change == PlanChange(kept=3, dropped=0, added=0)
     model.finish()
     assert model.goal_state("g1") is GoalState.REACHED
 
@@ -53,7 +53,7 @@ def test_work_that_is_no_longer_wanted_is_cancelled_before_what_conflicts_starts
     model.learn("cup_1", "at", other)
     dropped = [o for o in model.orders() if o.cancelled]
     assert [o.task for o in dropped] == [order.task]
-    assert model.state.plans["plan-1"].change is not None
+    assert model.plans["plan-1"].change is not None
     model.report(dropped[0], ReportState.CANCELLED)
     assert {o.robot for o in model.orders()} == {other}
     model.finish()
@@ -77,6 +77,6 @@ def test_a_waiting_task_that_is_so_already_counts_once() -> None:
     model.interrupt(order(0), done=True)
     model.interrupt(order(0), done=False)
     model.fail(order(7))
-    (entry,) = model.state.plans.values()
+    (entry,) = model.plans.values()
     assert entry.plan.revision == 3
     model.finish()

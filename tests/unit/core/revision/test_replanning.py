@@ -30,7 +30,7 @@ def running(robots: int, cups: int, allocator: str = "makespan") -> FleetModel:
 
 
 def entry(model: FleetModel) -> PlanEntry:
-    return model.state.plans["plan-1"]
+    return model.plans["plan-1"]
 
 
 def robot_of(model: FleetModel) -> dict[str, str | None]:
@@ -59,7 +59,7 @@ def test_only_a_lost_robots_work_changes_hands(allocator: str) -> None:
     moved = 1 if allocator == "makespan" else 0
     assert len(stayed) - 4 * moved <= change.kept <= len(stayed)
     model.finish()
-    assert all(status.state is GoalState.REACHED for status in model.state.goal_states.values())
+    assert all(status.state is GoalState.REACHED for status in model.goal_states.values())
 
 
 def test_a_lost_robot_that_had_begun_is_followed_by_one_that_begins_anew() -> None:
@@ -78,22 +78,25 @@ def test_a_lost_robot_that_had_begun_is_followed_by_one_that_begins_anew() -> No
     assert entry(model).state is PlanState.SUCCEEDED
 
 
-def test_what_a_lost_robot_had_in_its_hand_fails_that_goal_only() -> None:
+def test_what_a_lost_robot_had_in_its_hand_makes_that_goal_wait_and_no_other() -> None:
     model = running(robots=3, cups=6)
     while (held := model.state.facts[FactKey(HOLDING, "r1")].value) == "nothing":
         model.succeed(order_of(model, "r1"))
     before = robot_of(model)
     model.lose("r1")
-    (failed,) = [g for g, s in model.state.goal_states.items() if s.state is GoalState.FAILED]
-    assert f"g{str(held).removeprefix('cup_')}" == failed
-    assert f"at({held})" in (model.state.goal_states[failed].reason or "")
-    assert any(f"goal {failed} is left out" in note for note in entry(model).outcome.notes)
+    (waits,) = [g for g, s in model.goal_states.items() if s.state is GoalState.WAITING]
+    assert f"g{str(held).removeprefix('cup_')}" == waits
+    assert f"at({held})" in (model.goal_states[waits].reason or "")
+    assert any(f"goal {waits} is left out" in note for note in entry(model).outcome.notes)
     begun = {order.task: order.robot for order in model.orders()}
     assert begun.items() <= before.items()
     model.finish()
-    others = [s.state for g, s in model.state.goal_states.items() if g != failed]
+    others = [s.state for g, s in model.goal_states.items() if g != waits]
     assert others == [GoalState.REACHED] * 5
     assert entry(model).state is PlanState.SUCCEEDED
+    model.return_("r1")
+    model.finish()
+    assert model.goal_state(waits) is GoalState.REACHED
 
 
 def test_a_goal_that_cannot_be_reached_any_more_does_not_end_the_others() -> None:
@@ -102,9 +105,9 @@ def test_a_goal_that_cannot_be_reached_any_more_does_not_end_the_others() -> Non
     model.receive(
         events.ReplanRequested, request=ReplanRequest(request="x", plan="plan-1", reason="it broke")
     )
-    assert model.state.goal_states["g3"].state is GoalState.FAILED
+    assert model.goal_states["g3"].state is GoalState.FAILED
     model.finish()
-    assert [model.state.goal_states[g].state for g in ("g1", "g2")] == [GoalState.REACHED] * 2
+    assert [model.goal_states[g].state for g in ("g1", "g2")] == [GoalState.REACHED] * 2
 
 
 def be_late(model: FleetModel, order: Order, more_s: float = 0.0) -> None:
@@ -164,7 +167,7 @@ def test_a_task_added_to_a_running_plan_leaves_orders_with_the_robots_that_have_
             args={"to": "hallway"},
         )  # fmt: skip
         model.receive(events.ControlRequested, request=request)
-        assert model.state.answers[name].accepted
+        assert model.replies[name].accepted
         for record in entry(model).current():
             assert record.robot == entry(model).outcome.allocation[record.actor]
     model.finish()
@@ -177,7 +180,7 @@ def test_a_robot_that_is_busy_with_another_plan_counts_as_busy() -> None:
     (first,) = model.orders()
     model.start(first)
     model.plan(bring(2, "hallway"))
-    robots = set(model.state.plans["plan-2"].outcome.allocation.values())
+    robots = set(model.plans["plan-2"].outcome.allocation.values())
     assert robots == {"r1", "r2"} - {first.robot}
 
 
@@ -204,10 +207,10 @@ def test_the_only_robot_is_planned_with_again_while_its_hand_is_full(strategy: s
     assert model.orders() == undisturbed
     assert entry(model).plan.revision == 2
     model.finish()
-    assert all(status.state is GoalState.REACHED for status in model.state.goal_states.values())
+    assert all(status.state is GoalState.REACHED for status in model.goal_states.values())
 
 
-def test_a_lost_robot_that_had_nothing_else_to_do_takes_its_goal_with_it() -> None:
+def test_the_goal_of_a_lost_robot_that_had_nothing_else_to_do_waits_for_it() -> None:
     model = running(robots=2, cups=2)
     holder, other = (order.robot for order in model.orders())
     while model.state.facts[FactKey(HOLDING, holder)].value == "nothing":
@@ -215,8 +218,8 @@ def test_a_lost_robot_that_had_nothing_else_to_do_takes_its_goal_with_it() -> No
     undisturbed = order_of(model, other)
     model.lose(holder)
     assert order_of(model, other) == undisturbed
-    states = sorted(status.state.value for status in model.state.goal_states.values())
-    assert states == ["failed", "running"]
+    states = sorted(status.state.value for status in model.goal_states.values())
+    assert states == ["running", "waiting"]
     model.finish()
     assert entry(model).state is PlanState.SUCCEEDED
     assert all(record.robot == other for record in entry(model).current())
@@ -240,7 +243,7 @@ def test_a_task_that_fails_changes_nothing_about_other_goals() -> None:
     kept = others & {task.task for task in entry(model).plan.tasks}
     assert len(kept) >= len(others) - 4, "more than one other actor changed hands"
     model.finish()
-    assert all(status.state is GoalState.REACHED for status in model.state.goal_states.values())
+    assert all(status.state is GoalState.REACHED for status in model.goal_states.values())
 
 
 def test_a_new_goal_is_planned_alone_and_put_beside_the_rest() -> None:
@@ -257,7 +260,7 @@ def test_a_new_goal_is_planned_alone_and_put_beside_the_rest() -> None:
     assert change.dropped <= 4
     assert len(before & {task.task for task in entry(model).plan.tasks}) >= len(before) - 4
     model.finish()
-    assert model.state.goal_states["g5"].state is GoalState.REACHED
+    assert model.goal_states["g5"].state is GoalState.REACHED
 
 
 def test_a_deleted_goal_takes_only_its_own_tasks_with_it() -> None:
@@ -287,11 +290,11 @@ def test_one_goal_that_never_works_does_not_use_up_the_patience_for_all() -> Non
             model.fail(order)
         else:
             model.succeed(order)
-    states = {goal: status.state for goal, status in model.state.goal_states.items()}
+    states = {goal: status.state for goal, status in model.goal_states.items()}
     assert states == {
         "g1": GoalState.REACHED, "g2": GoalState.FAILED, "g3": GoalState.REACHED,
     }  # fmt: skip
-    assert "it slipped" in (model.state.goal_states["g2"].reason or "")
+    assert "it slipped" in (model.goal_states["g2"].reason or "")
 
 
 def test_plans_that_keep_robots_from_each_other_do_not_wait_for_ever() -> None:
@@ -321,7 +324,7 @@ def test_plans_that_keep_robots_from_each_other_do_not_wait_for_ever() -> None:
     model.receive(events.PlanProposed, plan=hand_over("two", "cup_2", "carrier", "pickup"))
     assert [(o.plan, o.robot) for o in model.orders()] == [("two", "c1"), ("one", "r1")]
     model.finish()
-    assert {each.state for each in model.state.plans.values()} == {PlanState.SUCCEEDED}
+    assert {each.state for each in model.plans.values()} == {PlanState.SUCCEEDED}
 
 
 def test_work_that_is_being_cancelled_is_not_gone_on_with() -> None:
@@ -344,5 +347,5 @@ def test_work_that_is_being_cancelled_is_not_gone_on_with() -> None:
     )
     model.report(pick, ReportState.CANCELLED)
     model.finish()
-    states = {name: status.state for name, status in model.state.goal_states.items()}
+    states = {name: status.state for name, status in model.goal_states.items()}
     assert states == {goal: GoalState.REACHED, other: GoalState.REACHED}

@@ -25,7 +25,7 @@ def running(robots: int = 2, cups: int = 2) -> FleetModel:
 
 
 def entry(model: FleetModel) -> PlanEntry:
-    return model.state.plans["plan-1"]
+    return model.plans["plan-1"]
 
 
 def replan(model: FleetModel, name: str, *goals: str, why: str = "I say so") -> None:
@@ -44,7 +44,7 @@ def add_task(model: FleetModel, name: str, **more: object) -> None:
 
 
 def answer_of(model: FleetModel, name: str) -> Answer | None:
-    return model.state.answers.get(name)
+    return model.replies.get(name)
 
 
 def accepted(model: FleetModel, name: str) -> bool:
@@ -188,7 +188,7 @@ def test_a_failed_replan_tries_again_with_the_news() -> None:
     assert entry(model).state is PlanState.RUNNING
     assert entry(model).job is not None
     model.finish()
-    assert all(s.state is GoalState.REACHED for s in model.state.goal_states.values())
+    assert all(s.state is GoalState.REACHED for s in model.goal_states.values())
 
 
 def next_order(model: FleetModel, skill: str) -> Order:
@@ -221,7 +221,7 @@ def test_every_goal_that_comes_up_while_plans_are_made_is_planned() -> None:
     goals = [new_goal(model, number) for number in (3, 4, 5)]
     model.finish()
     assert [model.goal_state(goal) for goal in goals] == [GoalState.REACHED] * 3
-    assert set(model.state.plans) == {"plan-1"}
+    assert set(model.plans) == {"plan-1"}
 
 
 def test_a_worker_that_has_been_told_to_stop_is_waited_for() -> None:

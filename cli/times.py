@@ -1,0 +1,47 @@
+"""How a person writes a time or a span of time on the command line."""
+
+from __future__ import annotations
+
+import re
+from datetime import datetime
+
+from cli.errors import BadArgument
+
+_UNITS_S = {"s": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0, "d": 86_400.0, "w": 604_800.0}
+_SPAN = re.compile(r"(?:[0-9]+(?:\.[0-9]+)?(?:s|min|m|h|d|w))+")
+_PART = re.compile(r"([0-9.]+)(s|min|m|h|d|w)")
+_CLOCK = re.compile(r"([01]?[0-9]|2[0-3]):([0-5][0-9])")
+
+
+def parse_span(written: str, option: str) -> float:
+    """A span such as `90s`, `15min`, `2h`, `7d`, `1d12h`, in seconds.
+
+    Raises:
+        BadArgument: it is none; the message names the `option`.
+    """
+    if not _SPAN.fullmatch(written):
+        raise BadArgument(f"{option} {written!r} is no span of time such as 90s, 15min, 2h, 7d")
+    return sum(float(number) * _UNITS_S[unit] for number, unit in _PART.findall(written))
+
+
+def parse_since(written: str, option: str, now: datetime) -> float:
+    """A time (`2026-11-28`, `2026-11-28T14:30`, `14:30` today) or a span before `now`, in Unix s.
+
+    A time without an offset from UTC is one of `now`'s zone.
+
+    Raises:
+        BadArgument: it is neither; the message names the `option`.
+    """
+    if _SPAN.fullmatch(written):
+        return now.timestamp() - parse_span(written, option)
+    if clock := _CLOCK.fullmatch(written):
+        hour, minute = map(int, clock.groups())
+        return now.replace(hour=hour, minute=minute, second=0, microsecond=0).timestamp()
+    try:
+        time = datetime.fromisoformat(written)
+    except ValueError:
+        raise BadArgument(
+            f"{option} {written!r} is neither a time such as 2026-11-28, 2026-11-28T14:30 or 14:30 "
+            "nor a span such as 15min, 2h, 7d"
+        ) from None
+    return (time if time.tzinfo is not None else time.replace(tzinfo=now.tzinfo)).timestamp()

@@ -1,0 +1,99 @@
+"""What is over as a table, and what it comes to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from datetime import datetime
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+
+from cli.views.console import table
+from cli.views.text import seconds
+from keyexpr_schema.payloads.history import (
+    HistoryOutcome,
+    HistoryStats,
+    PastEntry,
+    PastGoal,
+    PeriodStats,
+    Retired,
+)
+
+
+def history_table(entries: Iterable[PastEntry]) -> Table:
+    """One line a goal, with what is about its whole plan on the first one."""
+    rows: list[Sequence[object]] = []
+    for entry in entries:
+        goals: Sequence[PastGoal | None] = entry.goals or (None,)
+        for number, goal in enumerate(goals):
+            rows.append(
+                (
+                    *((_at(entry.ended_wall_s), entry.plan) if number == 0 else ("", "")),
+                    goal.text or goal.goal if goal else "",
+                    (goal.outcome if goal else entry.outcome).value,
+                    seconds(goal.took_s if goal else max(0.0, entry.ended_s - entry.begun_s)),
+                    *(_work(entry) if number == 0 else ("", "", "")),
+                    (goal.reason if goal else entry.reason) or (entry.reason if not number else ""),
+                )
+            )
+    columns = ["ended", "plan", "wanted", "came of it", "took", "who did it", "tasks", "replans"]
+    return table([*columns, "reason"], rows)
+
+
+def _work(entry: PastEntry) -> tuple[object, object, object]:
+    who = ", ".join(f"{share.robot} {seconds(share.busy_s)}" for share in entry.robots)
+    return who, entry.tasks or "", entry.replans or ""
+
+
+def _at(wall_s: float) -> str:
+    return datetime.fromtimestamp(wall_s).strftime("%Y-%m-%d %H:%M:%S")
+
+
+def stats_page(stats: HistoryStats) -> RenderableType:
+    """Goals by day, robots, and why goals were not reached."""
+    total = stats.total
+    if not total.goals and not total.plans:
+        return "Nothing is over yet."
+    parts: list[RenderableType] = [_periods([*stats.days, total])]
+    if total.robots:
+        rows = [
+            (use.robot, use.tasks, seconds(use.busy_s), f"{use.utilisation:.0%}")
+            for use in total.robots
+        ]
+        parts += ["", table(["robot", "tasks", "busy", "utilisation"], rows)]
+    if total.failures:
+        rows_of_reasons = [(each.goals, each.reason) for each in total.failures]
+        parts += ["", table(["goals", "not reached, because"], rows_of_reasons)]
+    return Group(*parts)
+
+
+def _periods(periods: Iterable[PeriodStats]) -> Table:
+    outcomes = (
+        HistoryOutcome.REACHED,
+        HistoryOutcome.FAILED,
+        HistoryOutcome.REJECTED,
+        HistoryOutcome.DELETED,
+    )
+    rows = [
+        (
+            period.day or "in all",
+            *(period.goals.get(outcome, 0) for outcome in outcomes),
+            seconds(period.median_s),
+            seconds(period.p90_s),
+            sum(period.plans.values()),
+            period.replans,
+            seconds(period.active_s),
+        )
+        for period in periods
+    ]
+    columns = ["day", *(outcome.value for outcome in outcomes), "time to goal: median", "p90"]
+    return table([*columns, "plans", "replans", "plans under way"], rows)
+
+
+def retired_sentence(gone: Retired) -> str:
+    """What was deleted, and where it still is."""
+    counts = [(gone.plans, "plan"), (gone.goals, "goal")]
+    said = [f"{count} {what}{'' if count == 1 else 's'}" for count, what in counts if count]
+    if not said:
+        return "there is nothing such that has ended"
+    return f"deleted {' and '.join(said)}; `robotctl history` still has them"

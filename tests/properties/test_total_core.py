@@ -141,12 +141,12 @@ FLEET = fleet()
 @reaches("put", "deleted", "changed", "plan under way")
 @given(
     story=st.lists(
-        st.one_of(changes().map(lambda c: ("change", c)), st.just(("robot", None))), max_size=12
+        st.one_of(changes().map(lambda c: ("change", c)), st.just(("robot", None))), max_size=6
     ),
     policy=st.builds(dict, auto_plan=st.booleans(), approval=st.booleans()),
 )
 @settings(
-    max_examples=300, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
+    max_examples=100, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
 )
 def test_no_value_breaks_the_core(reached: Any, story: Any, policy: Any) -> None:
     state = FLEET.state

@@ -37,6 +37,9 @@ GRACE_S = 10.0
 KEPT_FAILURES = 5
 """Inputs of jobs that ended their process, kept for whoever looks into it."""
 
+_Key = int | tuple[str, str]
+"""The number of a planning job, or a goal and the sentence of it that is read."""
+
 log = logging.getLogger(__name__)
 
 
@@ -48,10 +51,9 @@ class _Ticket:
     process: PlanningProcess | None = None
 
     @property
-    def key(self) -> int | str:
-        """The number of a planning job, or the goal whose sentence is read."""
+    def key(self) -> _Key:
         job = self.job
-        return job.job.job if isinstance(job, PlanningInput) else job.goal
+        return job.job.job if isinstance(job, PlanningInput) else (job.goal, job.text)
 
 
 @dataclass(eq=False)
@@ -75,7 +77,7 @@ class PlanningPool:
         self._processes = [*self._computing.idle, *talking]
         self._failures = failures
         self._ready: Ready | None = None
-        self._tickets: dict[int | str, _Ticket] = {}
+        self._tickets: dict[_Key, _Ticket] = {}
         self._numbers = count()
         self._tasks: set[asyncio.Task[None]] = set()
         self.answers: asyncio.Queue[Answer] = asyncio.Queue()
@@ -171,7 +173,9 @@ class PlanningPool:
             return
         with suppress(OSError):
             self._failures.mkdir(parents=True, exist_ok=True)
-            path = self._failures / f"{ticket.key}.json"
+            job = ticket.job
+            name = f"job-{job.job.job}" if isinstance(job, PlanningInput) else f"goal-{job.goal}"
+            path = self._failures / f"{name}.json"
             path.write_bytes(msgspec.json.encode(ticket.job))
             log.warning("what it was to plan is kept in %s", path)
             kept = sorted(self._failures.glob("*.json"), key=lambda each: each.stat().st_mtime)

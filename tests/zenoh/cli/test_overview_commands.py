@@ -49,7 +49,58 @@ def test_the_journal_tells_what_was_stored_in_order(robotctl: Robotctl) -> None:
     ]
     last = told["entries"][-1]["number"]
     assert robotctl("journal", "--after", str(last), "--json").data["entries"] == []
-    assert len(robotctl("journal", "--limit", "1", "--json").data["entries"]) == 1
+    (newest,) = robotctl("journal", "--limit", "1", "--json").data["entries"]
+    assert newest["number"] == last
+    (first,) = robotctl("journal", "--after", "0", "--limit", "1", "--json").data["entries"]
+    assert first["number"] == 1
+    of_one = robotctl("journal", "--key", "robots/locobot/*", "--json").data["entries"]
+    assert [e["keyexpr"] for e in of_one] == ["robots/locobot/spec"]
+    assert len(robotctl("journal", "--since", "1h", "--json").data["entries"]) == last
+    shown = robotctl("journal", "--since", "1h", "--key", "robots/hsr/**").out.splitlines()
+    assert "deleted" in shown[-1]
+    bad = robotctl("journal", "--key", "goals//spec")
+    assert (bad.code, "--key 'goals//spec' is no pattern of keys" in bad.err) == (1, True)
+    bad = robotctl("journal", "--since", "yesterday")
+    assert (bad.code, "neither a time" in bad.err) == (1, True)
+
+
+@pytest.mark.parametrize("flags", [[], ["--json"]])
+async def test_the_journal_is_followed_through_a_restart_of_the_router(
+    robotctl: Robotctl, router: RouterProcess, session_config: MakeConfig, flags: list[str]
+) -> None:
+    async with open_session(session_config()) as session:
+        for name in ("g1", "g2", "g3"):
+            await session.confirm(GOAL_SPEC, GoalAddress(name), Goal(goal=name, text="Bring it."))
+        child = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "cli.main", "journal", "--tail", "--limit", "2"),
+            *("--key", "goals/*/spec", *flags),
+            env={**robotctl.env, "PYTHONUNBUFFERED": "1"},
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+        )
+        assert child.stdout is not None
+        try:
+            async with asyncio.timeout(60):
+                lines = [(await child.stdout.readline()).decode() for _ in range(2)]
+                router.restart()
+                status = GoalStatus(goal="g4", state=GoalState.WAITING)
+                await session.confirm(GOAL_STATUS, GoalAddress("g4"), status, 30)
+                await session.delete(GOAL_SPEC, GoalAddress("g1"), 30)
+                lines.append((await child.stdout.readline()).decode())
+            child.send_signal(signal.SIGINT)
+            assert await child.wait() == 130
+        finally:
+            if child.returncode is None:
+                child.kill()
+                await child.wait()
+    if flags:
+        entries = [json.loads(line) for line in lines]
+        assert [e["keyexpr"][6:8] for e in entries] == ["g2", "g3", "g1"]
+    else:
+        assert [f"goals/g{n}/spec" in line for n, line in zip("231", lines, strict=True)] == [
+            True
+        ] * 3
+        assert "deleted" in lines[-1]
 
 
 async def test_status_tells_what_is_unreadable_as_long_as_it_is(

@@ -85,12 +85,44 @@ class Exits(Their):
     def act(self, problem):
         sys.exit("that was enough")
 
+class Closes(Their):
+    """Whatever is open, and goes on."""
+    name = "closes"
+    def act(self, problem):
+        os.closerange(3, 256)
+        while True:
+            pass
+
+class Leaves(Their):
+    """Somebody behind who keeps the pipe and is in no group of ours."""
+    name = "leaves"
+    def act(self, problem):
+        if os.fork() == 0:
+            os.setsid()
+            (HERE / "child-").write_text(str(os.getpid()))
+            (HERE / "child-").rename(HERE / "child")
+            signal.pause()
+        while not (HERE / "child").exists():
+            pass
+        os.kill(os.getpid(), signal.SIGKILL)
+
 class Swells(Their):
     name = "swells"
     def act(self, problem):
         bytearray(1 << 40)
 '''
-PLANNERS = ("Loops", "Starts", "Prints", "Crashes", "Waits", "Patient", "Exits", "Swells")
+PLANNERS = (
+    "Loops",
+    "Starts",
+    "Prints",
+    "Crashes",
+    "Waits",
+    "Patient",
+    "Exits",
+    "Swells",
+    "Closes",
+    "Leaves",
+)
 
 
 @pytest.fixture
@@ -133,7 +165,7 @@ async def pool(failures: Path | None = None) -> AsyncIterator[PlanningPool]:
 
 
 async def answer_of(running: PlanningPool) -> Answer:
-    async with asyncio.timeout(DEADLINE_S):
+    async with asyncio.timeout(3 * DEADLINE_S):  # it runs at low priority
         return await running.answers.get()
 
 
@@ -204,6 +236,26 @@ async def test_a_loop_without_end_is_answered_at_the_limit(site: Path) -> None:
         for _, pid in begun(site):
             await until(lambda pid=pid: not alive(pid))
         await plan(running, 2)
+
+
+async def test_a_process_that_closes_its_pipe_is_no_better_than_one_that_ended(site: Path) -> None:
+    async with pool() as running:
+        running.submit(given(1, "closes"))
+        answer = await answer_of(running)
+        assert isinstance(answer, PlanningFailed)
+        assert answer.reason == "the planning process ended (SIGKILL)"
+        await plan(running, 2)
+
+
+async def test_who_is_left_behind_with_the_pipe_holds_nobody_up(site: Path) -> None:
+    async with pool() as running:
+        running.submit(replace(given(1, "leaves"), limit_s=5.0))
+        try:
+            answer = await answer_of(running)
+            assert isinstance(answer, PlanningFailed)
+            await plan(running, 2)
+        finally:
+            os.kill(int((site / "child").read_text()), signal.SIGKILL)
 
 
 @pytest.mark.parametrize(

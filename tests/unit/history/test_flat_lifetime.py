@@ -34,7 +34,7 @@ from keyexpr_schema.transport.store.storage import Write
 from tests.support.fleet_model import FleetModel
 from tests.support.household import bring, manipulator
 
-FEW, MANY = 200, 2000
+FEW, MANY = 100, 400
 """Missions lived."""
 SOME = 60
 """So many are looked at: journals grow until they are cut, and grow again."""

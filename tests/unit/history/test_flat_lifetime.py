@@ -108,7 +108,7 @@ class LongLife(FleetModel):
         self.write(tree.build(name), None)
 
     async def live(self, first: int, last: int) -> list[Size]:
-        """Missions of these numbers, a cup brought to and fro; what there is after the last ones."""
+        """Missions of these numbers, a cup brought to and fro; what is left after the last."""
         sizes = []
         for number in range(first, last + 1):
             room = "hallway" if number % 2 else "living_room"

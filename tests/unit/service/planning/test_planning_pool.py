@@ -125,6 +125,9 @@ PLANNERS = (
 )
 
 
+REASON = ReplanReason(scope=ReplanScope.ANEW, number=1, sentence="so")
+
+
 @pytest.fixture
 def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Where the plug-in is, for child processes only."""
@@ -281,16 +284,32 @@ async def test_what_a_planner_prints_is_no_answer(site: Path) -> None:
 
 async def test_a_running_plan_comes_first_and_a_dry_run_last(site: Path) -> None:
     os.mkfifo(site / "p1")
-    reason = ReplanReason(scope=ReplanScope.ANEW, number=1, sentence="so")
     async with pool() as running:
-        running.submit(given(1, "waits"))
+        running.submit(given(1, "waits", reason=REASON))
         running.submit(given(2, dry_run=True))
         running.submit(given(3))
-        running.submit(given(4, reason=reason))
+        running.submit(given(4, reason=REASON))
         await until(lambda: begun(site))
         await asyncio.to_thread((site / "p1").write_bytes, b"go")
         answers = [await answer_of(running) for _ in range(4)]
         assert [getattr(answer, "job", None) for answer in answers] == [1, 4, 3, 2]
+
+
+async def test_a_running_plan_waits_for_no_dry_run(site: Path) -> None:
+    for name in ("p1", "p2"):
+        os.mkfifo(site / name)
+    async with pool() as running:
+        running.submit(given(1, "waits", dry_run=True))
+        running.submit(given(2, "waits", dry_run=True))
+        await until(lambda: begun(site))
+        running.submit(given(3, reason=REASON))
+        answer = await answer_of(running)
+        assert isinstance(answer, PlanningSucceeded)
+        assert answer.job == 3
+        assert [name for name, _ in begun(site)] == ["p1"], "dry runs go one after the other"
+        for name in ("p1", "p2"):
+            await asyncio.to_thread((site / name).write_bytes, b"go")
+            assert isinstance(await answer_of(running), PlanningSucceeded)
 
 
 async def test_jobs_that_wait_for_others_go_on_beside_each_other_and_the_rest(site: Path) -> None:

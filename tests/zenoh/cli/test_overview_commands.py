@@ -13,11 +13,13 @@ import pytest
 import zenoh
 
 from keyexpr_schema.keyspace import (
+    DIAGNOSTIC,
     GOAL_SPEC,
     GOAL_STATUS,
     UNDECODABLE,
 )
 from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState, GoalStatus
+from keyexpr_schema.payloads.system import Diagnostic, DiagnosticAddress
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from tests.support.robotctl import Robotctl
@@ -125,6 +127,30 @@ async def test_status_tells_what_is_unreadable_as_long_as_it_is(
         await session.delete(GOAL_SPEC, GoalAddress("g2"))
         status = (await robotctl.soon("status", "--json")).data
         assert {r["keyexpr"] for r in status["rejects"]} <= {"planner/status"}
+
+
+async def test_status_shows_what_is_wrong_with_the_planner(
+    robotctl: Robotctl, session_config: MakeConfig
+) -> None:
+    """A value that decodes and could not be used is shown for as long as it is there."""
+    goal = Goal(goal="g1", text="Bring the cup.")
+    wrong = Diagnostic(
+        component="planner", check="store", sentence="the planner cannot read", since_s=0.0
+    )
+    at = DiagnosticAddress("planner", "store")
+    async with open_session(session_config(component="planner")) as session:
+        await session.confirm(GOAL_SPEC, GoalAddress("g1"), goal)
+        await session.confirm(DIAGNOSTIC, at, wrong)
+        session.report_unusable(GOAL_SPEC, GoalAddress("g1"), goal, "it breaks the core")
+        status = (await robotctl.soon("status", "--json")).data
+        assert [r["reason"] for r in status["rejects"]] == ["it breaks the core"]
+        assert [d["sentence"] for d in status["diagnostics"]] == ["the planner cannot read"]
+        page = (await robotctl.soon("status")).out
+        assert "planner: the planner cannot read" in page and "it breaks the core" in page
+        await session.delete(DIAGNOSTIC, at)
+        await session.confirm(GOAL_SPEC, GoalAddress("g1"), Goal(goal="g1", text="Bring it."))
+        status = (await robotctl.soon("status", "--json")).data
+        assert status["rejects"] == status["diagnostics"] == []
 
 
 @pytest.mark.parametrize("flags", [[], ["--json"]])

@@ -227,7 +227,7 @@ SIM_MOTION = Key(
 )
 SIM_SENSES = Key(
     "sim_senses", "sim/robots/{robot}/senses", simulation.SimRobotAddress, motions.Senses,
-    delivery=STREAM, writers=SIMULATION, readers=PERSON,
+    delivery=STREAM, writers=SIMULATION, readers=OWN_WORKER | PERSON,
     about="Odometry, hand and basket sensors of one simulated robot.",
 )
 SIM_CLOCK = Key(

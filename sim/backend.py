@@ -65,6 +65,10 @@ class Backend(ABC):
             )
         return self._outcome(robot)
 
+    def is_running(self, robot: str) -> bool:
+        """Whether the robot's latest motion has begun and not ended; costs less than `outcome`."""
+        return robot not in self._refused and self._runs_still(robot)
+
     def senses(self, robot: str) -> Senses:
         """What the robot knows of itself."""
         self._check_robot(robot)
@@ -97,6 +101,9 @@ class Backend(ABC):
     @abstractmethod
     def _stop(self, robot: str) -> None:
         """As `stop`; a robot that does nothing stays as it is."""
+
+    @abstractmethod
+    def _runs_still(self, robot: str) -> bool: ...
 
     @abstractmethod
     def _outcome(self, robot: str) -> MotionOutcome | None: ...

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-from contextlib import AbstractAsyncContextManager, suppress
+from collections.abc import AsyncIterator
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager, suppress
+from weakref import WeakKeyDictionary
 
 from keyexpr_schema.errors import NoReply
-from keyexpr_schema.keyspace import SIM_CLOCK, SIM_MOTION
+from keyexpr_schema.keyspace import SIM_CLOCK, SIM_MOTION, SIM_SENSES
 from keyexpr_schema.payloads.motions import Motion, MotionOutcome, MotionState, Senses
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.simulation import MotionCall, SimRobotAddress
@@ -21,8 +23,53 @@ SLACK_S = 1.0
 """How much longer than `POLL_S` an answer may take."""
 
 
+class _SimulatedTime:
+    """The simulation's clock, as one session hears it: one for all robots of a process.
+
+    It goes back only where the simulation says so: when another one has started.
+    """
+
+    def __init__(self) -> None:
+        self.time_s = 0.0
+        self._ticked_s = 0.0
+        self._users = 0
+        self._following: asyncio.Task[None] | None = None
+
+    @asynccontextmanager
+    async def followed(self, session: Session) -> AsyncIterator[None]:
+        """Follow the clock while anybody is in the block."""
+        self._users += 1
+        if self._following is None:
+            self._following = asyncio.create_task(self._follow(session))
+        try:
+            yield
+        finally:
+            self._users -= 1
+            if self._users == 0:
+                following, self._following = self._following, None
+                following.cancel()
+                await asyncio.gather(following, return_exceptions=True)
+
+    def hear(self, time_s: float) -> None:
+        """A robot's senses say how late it is."""
+        self.time_s = max(self.time_s, time_s)
+
+    async def _follow(self, session: Session) -> None:
+        async with session.watch(SIM_CLOCK) as watch:
+            async for change in watch:
+                if change.value is None:
+                    continue
+                now_s = change.value.time_s
+                self.time_s = now_s if now_s < self._ticked_s else max(self.time_s, now_s)
+                self._ticked_s = now_s
+
+
+_times: WeakKeyDictionary[Session, _SimulatedTime] = WeakKeyDictionary()
+
+
 class SimEmbodiment(AbstractAsyncContextManager["SimEmbodiment"]):
-    """One simulated robot, over Zenoh. Within `async with` it also follows the simulation's clock.
+    """One simulated robot, over Zenoh. Within `async with` it also follows the simulation's clock
+    and the robot's senses.
 
     Every motion is a call with a name of its own: asked as often as it takes until the answer is
     there, carried out once. `patience_s` is how long, in wall time, router or simulation may be
@@ -36,19 +83,38 @@ class SimEmbodiment(AbstractAsyncContextManager["SimEmbodiment"]):
         self._session = session
         self._incarnation = incarnation
         self._patience_s = patience_s
-        self._time_s = 0.0
+        self._time = _times.setdefault(session, _SimulatedTime())
+        self._sensed: asyncio.Future[Senses] | None = None
+        self._stack = AsyncExitStack()
 
     async def __aenter__(self) -> SimEmbodiment:
-        self._following = asyncio.create_task(self._follow_clock())
+        await self._stack.enter_async_context(self._time.followed(self._session))
+        self._sensing = asyncio.create_task(self._follow_senses())
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        self._following.cancel()
-        await asyncio.gather(self._following, return_exceptions=True)
+        self._sensing.cancel()
+        await asyncio.gather(self._sensing, return_exceptions=True)
+        await self._stack.aclose()
 
     def now_s(self) -> float:
         """Simulated seconds, as last heard."""
-        return self._time_s
+        return self._time.time_s
+
+    async def next_senses(self) -> Senses:
+        """What the simulation says next of the robot's senses."""
+        if self._sensed is None:
+            self._sensed = asyncio.get_running_loop().create_future()
+        return await asyncio.shield(self._sensed)
+
+    async def _follow_senses(self) -> None:
+        async with self._session.watch((SIM_SENSES, {"robot": self.robot})) as watch:
+            async for change in watch:
+                if change.value is not None:
+                    self._time.hear(change.value.time_s)
+                    if self._sensed is not None:
+                        self._sensed.set_result(change.value)
+                        self._sensed = None
 
     async def perform(self, motion: Motion) -> MotionOutcome:
         """Carry out `motion` once; see `workers.embodiment.Embodiment.perform`."""
@@ -101,14 +167,8 @@ class SimEmbodiment(AbstractAsyncContextManager["SimEmbodiment"]):
                 await asyncio.sleep(pause_s)
                 pause_s = min(1.0, 2 * pause_s)
             else:
-                self._time_s = max(self._time_s, outcome.senses.time_s)
+                self._time.hear(outcome.senses.time_s)
                 return outcome
-
-    async def _follow_clock(self) -> None:
-        async with self._session.watch(SIM_CLOCK) as watch:
-            async for change in watch:
-                if change.value is not None:
-                    self._time_s = max(self._time_s, change.value.time_s)
 
 
 def sim_embodiment(session: Session, spec: RobotSpec, incarnation: str) -> SimEmbodiment:

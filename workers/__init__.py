@@ -21,7 +21,7 @@ else:
         __name__,
         {
             "skill_context": "SkillContext",
-            "embodiment": "Embodiment EmbodimentFactory",
+            "embodiment": "Embodiment EmbodimentFactory SensingEmbodiment",
             "errors": (
                 "BadArguments BadSkill JournalBusy JournalUnreadable RobotTaken "
                 "RobotUnreachable SkillFailed UnknownSkill WorkerError WorkersEnded"

@@ -78,6 +78,18 @@ class Embodiment(Protocol):
         ...
 
 
+@runtime_checkable
+class SensingEmbodiment(Embodiment, Protocol):
+    """An embodiment whose driver says by itself what the sensors give: then nobody has to ask."""
+
+    async def next_senses(self) -> Senses:
+        """The next reading: soon after something changed, else every second or so.
+
+        A reading that nobody waited for may be passed over for a later one.
+        """
+        ...
+
+
 class EmbodimentFactory(Protocol):
     """Makes a robot's embodiment. One that is an async context manager is entered and left."""
 

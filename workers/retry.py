@@ -18,8 +18,9 @@ from keyexpr_schema.payloads.tasks import Report, ReportState, Try
 from workers.errors import RobotUnreachable, SkillFailed
 
 MOST_TRIES = 3
-CLOCK_S = 0.05
-"""Wall seconds between two looks at the fleet's clock, whose ticks nobody announces."""
+CLOCK_S, LONGEST_CLOCK_S = 0.05, 0.5
+"""Wall seconds between two looks at the fleet's clock, whose ticks nobody announces: the more
+seldom the farther off the deadline is, as fast as the clock has gone since the start of the try."""
 
 _log = logging.getLogger("robotfleet.worker.retry")
 
@@ -98,12 +99,17 @@ async def _one_try(
     running = asyncio.ensure_future(once())
     cancel = asyncio.ensure_future(cancelled.wait())
     late = False
+    loop = asyncio.get_running_loop()
+    began_s, began_wall_s, pause_s = now_s(), loop.time(), CLOCK_S / 2
     try:
         while not running.done() and not cancelled.is_set():
             if late := now_s() >= due_s:
                 break
+            speed = max(1.0, (now_s() - began_s) / max(1e-3, loop.time() - began_wall_s))
+            due_wall_s = (due_s - now_s()) / speed
+            pause_s = min(LONGEST_CLOCK_S, 2 * pause_s, max(CLOCK_S, due_wall_s / 2))
             await asyncio.wait(
-                {running, cancel}, timeout=CLOCK_S, return_when=asyncio.FIRST_COMPLETED
+                {running, cancel}, timeout=pause_s, return_when=asyncio.FIRST_COMPLETED
             )
     finally:
         cancel.cancel()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from contextlib import suppress
 from math import dist
 
 from keyexpr_schema.errors import SchemaError
@@ -12,15 +13,19 @@ from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.payloads.tasks import Order
 from keyexpr_schema.transport.session import Session
-from workers.embodiment import Embodiment
+from workers.embodiment import Embodiment, SensingEmbodiment
 from workers.errors import RobotUnreachable
 
 SENSE_S = 0.2
-"""Wall seconds between two readings of the robot's own sensors."""
+"""Wall seconds between two readings of the sensors of a robot that is at work, or moves."""
+IDLE_SENSE_S = 1.0
+"""The same, for one that stands about: only being pushed or filled changes what it senses."""
+QUIET_S = 5.0
+"""A driver that says by itself what the sensors give is asked after so long without a word."""
 DRIVING_S = 0.5
 """Wall seconds between two states of which only the pose differs."""
-REPEAT_S = 5.0
-"""Wall seconds after which a state is put again: a put while no router was there is lost."""
+REPEAT_S = 20.0
+"""Wall seconds after which a state is put again, should it have been lost in spite of all."""
 PATIENCE_S = 3.0
 """Wall seconds after which sensors that do not answer count as silent."""
 STOOD_STILL_M = 0.01
@@ -39,35 +44,69 @@ class StatePublisher:
         self._sent: RobotState | None = None
         self._sent_wall_s = 0.0
         self._silent = False
+        self._stirred = asyncio.Event()
         self._log = logging.getLogger(f"robotfleet.worker.{embodiment.robot}")
 
     def set_activity(self, activity: RobotActivity, order: Order | None = None) -> None:
         """Set what the robot does; published at once."""
         self._activity, self._order = activity, order
+        self._stirred.set()
         self._publish()
 
     async def read_senses(self) -> None:
         """Read the sensors once, now; what changed goes out."""
         try:
             async with asyncio.timeout(PATIENCE_S):
-                self._senses = await self._embodiment.senses()
+                senses = await self._embodiment.senses()
         except (RobotUnreachable, SchemaError, TimeoutError) as error:
             if not self._silent:
                 self._log.warning("the robot's sensors give nothing: %s", str(error) or "no answer")
             self._silent = True
+            self._publish()
         else:
-            self._silent = False
-        self._publish()
+            self._take(senses)
 
     async def run(self) -> None:
-        """Read the sensors and publish for ever; ends by being cancelled."""
-        connected = self._session.connected
+        """Follow the sensors and publish for ever; ends by being cancelled."""
+        connections = self._session.connections
+        body = self._embodiment
+        driver = body if isinstance(body, SensingEmbodiment) else None
+        await self.read_senses()
         while True:
-            if self._session.connected and not connected:
+            await (self._polled() if driver is None else self._heard(driver))
+            if self._session.connections != connections:
+                # What was put while no router was there is lost.
+                connections = self._session.connections
                 self._sent = None
-            connected = self._session.connected
+                self._publish()
+
+    async def _heard(self, driver: SensingEmbodiment) -> None:
+        """Take in what the driver says next; ask it where it says nothing."""
+        try:
+            async with asyncio.timeout(QUIET_S):
+                senses = await driver.next_senses()
+        except TimeoutError:
             await self.read_senses()
-            await asyncio.sleep(SENSE_S)
+        else:
+            self._take(senses)
+
+    async def _polled(self) -> None:
+        """Ask again, sooner while the robot is at work."""
+        before = self._senses
+        await self.read_senses()
+        senses = self._senses
+        stands = before is None or senses is None or before.pose_m_rad == senses.pose_m_rad
+        idle = self._activity is RobotActivity.IDLE and stands
+        self._stirred.clear()
+        with suppress(TimeoutError):
+            async with asyncio.timeout(IDLE_SENSE_S if idle else SENSE_S):
+                await self._stirred.wait()
+
+    def _take(self, senses: Senses) -> None:
+        if self._senses is None or senses.time_s >= self._senses.time_s or self._silent:
+            self._senses = senses
+        self._silent = False
+        self._publish()
 
     def _publish(self) -> None:
         state, now = self._state(), asyncio.get_running_loop().time()

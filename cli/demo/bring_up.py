@@ -32,7 +32,11 @@ RECORDING = "recording.rrd"
 
 @dataclass(frozen=True)
 class DemoOptions:
-    """`speed` is simulated seconds a second, or `max`; `timeout_s` bounds the plan's execution."""
+    """`speed` is simulated seconds a second, or `max`; `timeout_s` bounds the plan's execution.
+
+    All workers are one process, which starts sooner and costs less, or are `apart`, so that one can
+    go down without the others.
+    """
 
     mission: str
     out: Path
@@ -40,6 +44,11 @@ class DemoOptions:
     speed: str = "max"
     view: bool = False
     timeout_s: float = 600.0
+    apart: bool = False
+
+    def worker_process(self, robot: str) -> str:
+        """The name of the process that is a robot's worker."""
+        return f"worker-{robot}" if self.apart else "workers"
 
 
 def declare_processes(processes: ChildProcesses, mission: Mission, options: DemoOptions) -> None:
@@ -52,9 +61,10 @@ def declare_processes(processes: ChildProcesses, mission: Mission, options: Demo
     pace = ("--backend", options.backend, "--speed", options.speed)
     processes.declare("sim", "sim", options.mission, *pace, layer=2)
     processes.declare("planner", "planner", "--data", str(data / "planner"), layer=2)
-    for robot in mission.robots:
-        name = f"worker-{robot.spec.robot}"
-        processes.declare(name, "worker", robot.spec.robot, "--data", str(data / name), layer=2)
+    robots = tuple(robot.spec.robot for robot in mission.robots)
+    for group in ((robot,) for robot in robots) if options.apart else (robots,):
+        name = options.worker_process(group[0])
+        processes.declare(name, "worker", *group, "--data", str(data / name), layer=2)
 
 
 async def router_up(processes: ChildProcesses) -> None:
@@ -80,7 +90,11 @@ async def router_up(processes: ChildProcesses) -> None:
 
 
 async def bring_up(
-    processes: ChildProcesses, session: Session, view: FleetView, mission: Mission
+    processes: ChildProcesses,
+    session: Session,
+    view: FleetView,
+    mission: Mission,
+    options: DemoOptions,
 ) -> None:
     """Store the world and the robots, start the rest, wait until all are ready."""
     await put_world(session, place_payloads(mission.world), object_payloads(mission.world))
@@ -99,7 +113,7 @@ async def bring_up(
         _recording(processes),
     ]
     for name in (robot.spec.robot for robot in mission.robots):
-        log = processes.log(f"worker-{name}")
+        log = processes.log(options.worker_process(name))
         ready += [
             _token(session, ROBOT_ALIVE, {"robot": name}, f"the worker of {name}", log),
             view.until(

@@ -192,5 +192,5 @@ async def running_demo(
             fleet_view(session, *FLEET_KEYS, *SIMULATION_KEYS, on_change=on_change) as view,
         ):
             demo = Demo(options, mission, processes, session, view, started_at_s)
-            await processes.guard(bring_up(processes, session, view, mission))
+            await processes.guard(bring_up(processes, session, view, mission, options))
             yield demo

@@ -17,7 +17,7 @@ from keyexpr_schema.payloads.goals import Condition, Goal, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, Violation
 from keyexpr_schema.payloads.requests import Answer, ControlRequest, PlanRequest, ReplanRequest
 from keyexpr_schema.payloads.robots import RobotSpec
-from keyexpr_schema.payloads.tasks import Report
+from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
 At = Mapping[str, Any]
@@ -229,6 +229,8 @@ class PriorStateLoaded(Event, frozen=True, kw_only=True):
     answers: tuple[Answer, ...] = ()
     goals: tuple[GoalStatus, ...] = ()
     plans: tuple[str, ...] = ()
+    orders: tuple[Order, ...] = ()
+    """They may still be carried out."""
     statements: tuple[StatementStatus, ...] = ()
     """What an earlier planner had read out of statements; only what is said anew is read again."""
     durations: tuple[Durations, ...] = ()

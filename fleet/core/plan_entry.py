@@ -8,6 +8,7 @@ import msgspec
 from msgspec.structs import replace
 
 from fleet.core.model.skills import Skills
+from fleet.core.model.world import Hopeless
 from fleet.core.plan_index import EMPTY_INDEX, PlanGraph, PlanIndex
 from fleet.core.replan_reasons import ReplanReason, ReplanScope, Wish
 from fleet.core.table import Table
@@ -107,6 +108,8 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     discarded: int = 0
     late: tuple[str, ...] = ()
     failures: Table[str, int] = Table()
+    hopeless: tuple[Hopeless, ...] = ()
+    """Calls that failed in a way that their workers say is not worth another try."""
     waits_for_team: int | None = None
     """What `State.team_number` was when no robot could go on with the plan; it is not made again
     before another comes, or something else happens."""

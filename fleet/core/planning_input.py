@@ -13,7 +13,7 @@ import msgspec
 from msgspec.structs import replace
 
 from fleet.core.model.skills import SkillModel, Skills
-from fleet.core.model.world import WorldModel
+from fleet.core.model.world import Hopeless, WorldModel
 from fleet.core.plan_entry import PlanningJob
 from fleet.core.state import State
 from fleet.language import Vocabulary
@@ -39,7 +39,8 @@ class PlanningInput(msgspec.Struct, frozen=True, kw_only=True, tag="plan"):
 
     `goals` have as their conditions what they still want; of those `reached`, that is what holds of
     them now. `busy_s` says for how long robots are taken [s from now], `under_way` what they do of
-    the plan itself. `searched` are places in which this plan has looked around. The answer has to
+    the plan itself. `searched` are places in which this plan has looked around, `hopeless` calls
+    that are not worth another try. The answer has to
     be there `limit_s` after the job began; by half of that, planners give what they have.
     """
 
@@ -59,6 +60,7 @@ class PlanningInput(msgspec.Struct, frozen=True, kw_only=True, tag="plan"):
     searched: tuple[str, ...] = ()
     busy_s: dict[str, float] = {}
     under_way: tuple[WorkUnderWay, ...] = ()
+    hopeless: tuple[Hopeless, ...] = ()
 
     def world(self) -> WorldModel:
         """The world that the plan is made in."""
@@ -70,6 +72,7 @@ class PlanningInput(msgspec.Struct, frozen=True, kw_only=True, tag="plan"):
             available=frozenset(self.available),
             facts=dict(self.facts),
             durations={known.model: known for known in self.durations},
+            hopeless=self.hopeless,
         )
 
 
@@ -114,6 +117,7 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
             for name in job.under_way
             if (record := records.get(name)) is not None and record.robot is not None
         ),
+        hopeless=entry.hopeless if entry is not None else (),
     )
 
 

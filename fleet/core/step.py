@@ -14,15 +14,22 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.clocks import at_time_of, with_clock_of_new_run
 from fleet.core.dispatch import dispatcher
-from fleet.core.effects import Effect, all_touches, effects_between
+from fleet.core.effects import Effect, effects_between
 from fleet.core.events import Event
-from fleet.core.handlers import goals, plan_results, reports, requests, robots, statements, world
+from fleet.core.handlers import (
+    goals,
+    plan_results,
+    prior_state,
+    reports,
+    requests,
+    robots,
+    statements,
+    world,
+)
 from fleet.core.over import SINCE_LOGIC, everything_perhaps_over, let_go
 from fleet.core.state import State
 from fleet.core.state_updates import touch
-from fleet.core.table import Table
 from fleet.core.touches import UNTOUCHED, Part, Touch
-from keyexpr_schema.payloads.goals import ENDED_GOALS
 
 
 def _planner_started(state: State, event: events.PlannerStarted) -> State:
@@ -45,29 +52,10 @@ def _planner_started(state: State, event: events.PlannerStarted) -> State:
     return touch(started, Touch(Part.EPOCH))
 
 
-def _prior_state_loaded(state: State, event: events.PriorStateLoaded) -> State:
-    """Take over what an earlier planner left, so that nothing is done a second time."""
-    answers = {answer.request: answer for answer in event.answers}
-    goals = {status.goal: status for status in event.goals if status.state in ENDED_GOALS}
-    state = replace(
-        state,
-        answers=Table({**answers, **state.answers}),
-        durations={**{known.model: known for known in event.durations}, **state.durations},
-        goal_states=Table({**goals, **state.goal_states}),
-        statement_states=Table(
-            {**{status.statement: status for status in event.statements}, **state.statement_states}
-        ),
-        past_plans=(*state.past_plans, *(p for p in event.plans if p not in state.plans)),
-    )
-    for touched in all_touches(State(), state):
-        state = touch(state, touched)
-    return state
-
-
 _Handler = Callable[[State, Any], State]
 _HANDLERS: dict[type[Event], _Handler] = {
     events.PlannerStarted: _planner_started,
-    events.PriorStateLoaded: _prior_state_loaded,
+    events.PriorStateLoaded: prior_state.prior_state_loaded,
     events.TimerFired: lambda state, event: state,
     events.GoalPut: goals.goal_put,
     events.GoalDeleted: goals.goal_deleted,

@@ -69,13 +69,15 @@ def in_order(changes: list[Change[Any, Any]]) -> list[Change[Any, Any]]:
 
 
 async def prior_state(session: Session, at: At) -> PriorStateLoaded:
-    """Without a journal: names that an earlier planner gave are not given again, and what it
-    learned is not forgotten."""
+    """Without a journal: names that an earlier planner gave are not given again, what it ordered is
+    cancelled, and what it learned is not forgotten."""
     plans = await session.list(PLAN_STATUS)
+    orders = await session.list(ORDER)
     durations = await session.list(DURATIONS)
     statements = await session.list(STATEMENT_STATUS)
     return PriorStateLoaded(
         plans=tuple(address.plan for address in plans),
+        orders=tuple(orders.values()),
         statements=tuple(statements.values()),
         durations=tuple(durations.values()),
         **at,

@@ -149,7 +149,10 @@ class Session:
         keyexpr = tree.build(name)
         for key in tree.keys:
             self._trace.note("delete", key, keyexpr)
-        await self._store.write(tree.keys[0], keyexpr, None, timeout_s)
+        if "*" in keyexpr:
+            await self._store.delete_matching(tree.keys[0], keyexpr, timeout_s)
+        else:
+            await self._store.write(tree.keys[0], keyexpr, None, timeout_s)
 
     async def create(self, key: Key[A, P], address: A, payload: P, timeout_s: float = 10.0) -> bool:
         """Put if there is no value yet; whether it was put. Of several at once one succeeds.

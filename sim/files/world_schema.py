@@ -118,8 +118,9 @@ class WorldFile(FileEntry, frozen=True):
     def place_at(self, x_m: float, y_m: float) -> str | None:
         """The place that contains the point; the first in the file where several do."""
         for name, place in self.place_entries.items():
-            if any(a <= x_m <= c and b <= y_m <= d for a, b, c, d in place.region_m):
-                return name
+            for left, low, right, high in place.region_m:
+                if left <= x_m <= right and low <= y_m <= high:
+                    return name
         return None
 
     def kind_of(self, object: str) -> ObjectKind:

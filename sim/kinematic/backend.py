@@ -167,6 +167,9 @@ class KinematicBackend(Backend):
         assert motion.point_m is not None
         return self._routes.to_point(me.pose, motion.point_m, REACH_M)
 
+    def _runs_still(self, robot: str) -> bool:
+        return self._state.robots[robot].state is MotionState.RUNNING
+
     def _outcome(self, robot: str) -> MotionOutcome | None:
         me = self._state.robots[robot]
         if me.state is None:

@@ -1,7 +1,7 @@
 """Puts world file and robot models together into one MuJoCo model.
 
-Names: the robot's parts are `ROBOT/part`; `object/NAME`, `furniture/NAME`, `walls` and `floor` are
-bodies, and a geom that others rest on has its body's name (a table's top has `furniture/NAME`).
+Names: the robot's parts are `ROBOT/part`; `object/NAME`, `furniture/NAME`, `walls/NAME` and `floor`
+are bodies, and a geom that others rest on has its body's name (a table's top has `furniture/NAME`).
 An object's body has its origin at the centre of its base.
 """
 
@@ -52,12 +52,14 @@ def compile_world(world: WorldFile, robots: Sequence[tuple[str, RobotModel]]) ->
     # 0.1 mm/s at an impratio of 10, and (with the stiff pads of the models) 0.002 mm/s at 100.
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.impratio = 100.0
+    # What lies about costs nothing until it is touched. What has motors never sleeps.
+    option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
 
     _add_floor(spec, world)
-    walls = spec.worldbody.add_body(name="walls")
     for solid in solids(world):
         if solid.kind == "wall":
-            _add_wall(walls, solid)
+            # A body each: the box around all walls holds every robot, and each would be looked at.
+            _add_wall(spec.worldbody.add_body(name=f"walls/{solid.name}"), solid)
         else:
             _add_furniture(spec.worldbody, solid)
     for name in world.object_entries:
@@ -115,10 +117,10 @@ def _add_floor(spec: Any, world: WorldFile) -> None:
     )
 
 
-def _add_wall(walls: Any, solid: Solid) -> None:
+def _add_wall(wall: Any, solid: Solid) -> None:
     import mujoco
 
-    walls.add_geom(
+    wall.add_geom(
         name=f"walls/{solid.name}",
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=(*solid.half_m, solid.height_m / 2),

@@ -22,7 +22,7 @@ from sim.mujoco_world.base_controllers import PERIOD_S
 from sim.mujoco_world.base_motions import approach, fold, go_to, look
 from sim.mujoco_world.collisions import Collisions
 from sim.mujoco_world.description import load_description
-from sim.mujoco_world.drawing import draw_frame, draw_scene
+from sim.mujoco_world.drawing import FrameDrawer, draw_scene
 from sim.mujoco_world.grasping import grasp, release
 from sim.mujoco_world.handover import release_in_basket
 from sim.mujoco_world.motion import MotionContext, MotionFailed, MotionRun, Steps
@@ -93,6 +93,7 @@ class MujocoBackend(Backend):
         self._runs: dict[str, MotionRun] = {}
         self._ctrl = self._data.ctrl.copy()
         self._scene = draw_scene(self._model, world.world, self.robots)
+        self._frames = FrameDrawer(self._model, self._data, self._scene)
         mujoco.mj_forward(self._model, self._data)
         for _ in range(SETTLE_PERIODS):
             self._physics()
@@ -114,7 +115,7 @@ class MujocoBackend(Backend):
         return self._scene
 
     def frame(self) -> Frame:
-        return draw_frame(self._model, self._data, self._scene, self.time_s)
+        return self._frames.draw(self.time_s)
 
     def _begin(self, robot: str, motion: Motion) -> None:
         run = self._runs[robot] = MotionRun(self._bodies[robot], motion, self.time_s)
@@ -203,9 +204,14 @@ class MujocoBackend(Backend):
             # A setpoint that moves smoothly does not shake what the hand holds.
             self._data.ctrl[:] = old + change * step
             mujoco.mj_step(self._model, self._data)
+            self._context.observer.note_sleepers()
             if step % WATCH_EVERY == 0:
                 self._collisions.watch(self.time_s, runs)
         self.time_s = round(self.time_s + PERIOD_S, 6)
+
+    def _runs_still(self, robot: str) -> bool:
+        run = self._runs.get(robot)
+        return run is not None and run.ended is None
 
     def _outcome(self, robot: str) -> MotionOutcome | None:
         run = self._runs.get(robot)

@@ -36,7 +36,7 @@ class Collisions:
             body = int(model.geom_bodyid[geom])
             name = str(model.body(body).name)
             head = name.partition("/")[0]
-            self._body_names.append(name)
+            self._body_names.append(head if head == "walls" else name)
             if head in robots:
                 owner[geom] = self._names.index(head)
                 hand[geom] = body in robots[head].hand_bodies

@@ -18,6 +18,7 @@ def draw_scene(model: Any, world: str, robots: Iterable[str]) -> Scene:
     owners = set(robots)
     bodies: list[Body] = []
     fixed: dict[str, tuple[PointM, QuaternionWxyz]] = {}
+    walls: list[Shape] = []
     for number in range(1, model.nbody):
         shapes = tuple(
             shape
@@ -31,22 +32,37 @@ def draw_scene(model: Any, world: str, robots: Iterable[str]) -> Scene:
             continue
         name = str(model.body(number).name)
         head, _, tail = name.partition("/")
+        if head == "walls":
+            walls.extend(shapes)  # all in one, at the origin
+            continue
         owner = tail if head == "object" else head if head in owners else None
         bodies.append(Body(body=name, owner=owner, shapes=shapes))
         if int(model.body_weldid[number]) == 0:
             # everything fixed hangs on the world directly, so its local pose is its pose
             fixed[name] = (_point(model.body_pos[number]), _quaternion(model.body_quat[number]))
+    if walls:
+        bodies.insert(0, Body(body="walls", owner=None, shapes=tuple(walls)))
+        fixed["walls"] = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
     return Scene(world=world, bodies=tuple(bodies), fixed=fixed)
 
 
-def draw_frame(model: Any, data: Any, scene: Scene, time_s: float) -> Frame:
-    """The poses of the scene's bodies that can move."""
-    poses = {}
-    for body in scene.bodies:
-        if body.body not in scene.fixed:
-            number = model.body(body.body).id
-            poses[body.body] = (_point(data.xpos[number]), _quaternion(data.xquat[number]))
-    return Frame(time_s=time_s, poses=poses)
+class FrameDrawer:
+    """Reads the poses of the scene's bodies that can move."""
+
+    def __init__(self, model: Any, data: Any, scene: Scene) -> None:
+        self._data = data
+        self._names = [body.body for body in scene.bodies if body.body not in scene.fixed]
+        self._numbers = [int(model.body(name).id) for name in self._names]
+
+    def draw(self, time_s: float) -> Frame:
+        """Where they are now, rounded as much as nobody sees."""
+        points = self._data.xpos[self._numbers].round(5).tolist()
+        turns = self._data.xquat[self._numbers].round(6).tolist()
+        poses = {
+            name: ((x, y, z), (w, i, j, k))
+            for name, (x, y, z), (w, i, j, k) in zip(self._names, points, turns, strict=True)
+        }
+        return Frame(time_s=time_s, poses=poses)
 
 
 def _shape(model: Any, geom: int) -> Shape | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -15,6 +16,9 @@ SETTLED_M_S = 0.02
 SETTLED_RAD_S = 0.3
 VISIBLE_SHARE = 0.3
 """A thing is recognised when this share of the points looked for on it can be seen."""
+
+NEAR_ENOUGH_M = 0.5
+"""The base of an object can be that much farther off than its middle."""
 
 NOISE_M = 0.003
 """Standard deviation of a seen point, each axis in the plane: what an RGB-D camera gives at 2 m."""
@@ -38,6 +42,11 @@ class Observer:
         self._objects = {
             name: int(model.body(f"object/{name}").id) for name in world.object_entries
         }
+        self._bodies = list(self._objects.values())
+        self._trees = model.body_treeid[self._bodies]
+        self._asleep = data.tree_asleep[self._trees] >= 0
+        self._at_rest: dict[str, set[tuple[str, str]]] = {}
+        """What objects touched when they fell asleep: while they sleep, contacts are not listed."""
         self._of_geom: dict[int, tuple[str, str]] = {}
         self._pads = {pad: robot.name for robot in robots.values() for pad in robot.pads}
         for geom in range(model.ngeom):
@@ -71,17 +80,34 @@ class Observer:
 
     def basket(self, robot: RobotBody) -> tuple[str, ...]:
         """What lies in a robot's basket, as its sensor says, in the order of the world file."""
-        if robot.basket < 0:
+        if robot.basket < 0 or not self._objects:
             return ()
-        return tuple(
-            name for name, body in self._objects.items() if robot.in_basket(self._data.xpos[body])
-        )
+        inside = robot.in_basket(self._data.xpos[self._bodies])
+        return tuple(itertools.compress(self._objects, inside))
+
+    def note_sleepers(self) -> None:
+        """Take down what objects touch that fell asleep in this physics step."""
+        asleep = self._data.tree_asleep[self._trees] >= 0
+        if (asleep == self._asleep).all():
+            return
+        fell, self._asleep = asleep & ~self._asleep, asleep
+        for name in itertools.compress(self._objects, (~asleep).tolist()):
+            self._at_rest.pop(name, None)
+        if fell.any():
+            touching = self._contacts()
+            for name in itertools.compress(self._objects, fell.tolist()):
+                self._at_rest[name] = touching[name]
 
     def touching(self) -> dict[str, set[tuple[str, str]]]:
         """What each object touches: `("pad", robot)`, `("robot", r)`, `("surface", s)`, …
 
         Two pads of one hand are two entries, `("pad", "hsr:0")` and `("pad", "hsr:1")`.
         """
+        return {
+            name: self._at_rest.get(name, set()) | now for name, now in self._contacts().items()
+        }
+
+    def _contacts(self) -> dict[str, set[tuple[str, str]]]:
         found: dict[str, set[tuple[str, str]]] = {name: set() for name in self._objects}
         for one, two in self._data.contact.geom[: self._data.ncon].tolist():
             for geom, other in ((one, two), (two, one)):
@@ -129,6 +155,15 @@ class Observer:
             if pads and all(("pad", f"{name}:{number}") in touches for number in range(pads)):
                 return name
         return None
+
+    def in_range(self, robot: RobotBody) -> list[str]:
+        """The objects that are not too far off for a robot's camera: those worth a closer look."""
+        if robot.camera < 0 or not self._objects:
+            return []
+        away = self._data.xpos[self._bodies] - self._data.site_xpos[robot.camera]  # (n, 3) m
+        reach_m = robot.spec.capabilities.get("see", 0.0) + NEAR_ENOUGH_M
+        near = (away**2).sum(axis=1) <= reach_m**2
+        return list(itertools.compress(self._objects, near.tolist()))
 
     def sees(self, robot: RobotBody, object: str) -> bool:
         """Whether a robot's camera sees an object now: in range, in its field of view, not hidden.
@@ -184,7 +219,7 @@ class Observer:
 
     def _seen_support(self, object: str, x: float, y: float, z: float) -> str:
         for other in self._robots.values():
-            if other.in_basket(self._data.xpos[self._objects[object]]) or other.held == object:
+            if other.held == object or object in self.basket(other):
                 return other.name
         for surface in self._world.surfaces():
             if surface.distance_m(x, y) == 0.0 and abs(z - surface.z_m) < 0.06:

@@ -10,6 +10,7 @@ from keyexpr_schema.payloads.robots import PoseMRad
 from sim.errors import NoPath, NoStance
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation.clearance import segment_gap
+from sim.navigation.distance_field import DistanceField
 from sim.navigation.lattice import TRACKING_M
 from sim.navigation.spots import Dock, Spots
 from sim.navigation.steering import Leg, passed, steer
@@ -260,7 +261,7 @@ class Navigator:
         self,
         name: str,
         task: _Task,
-        around: list[float],
+        around: DistanceField,
         taken: frozenset[int],
         others: list[Traveller],
     ) -> None:
@@ -282,7 +283,7 @@ class Navigator:
         traveller.since_s = self._time_s
 
     def _choose_dock(
-        self, name: str, task: _Task, around: list[float], taken: frozenset[int]
+        self, name: str, task: _Task, around: DistanceField, taken: frozenset[int]
     ) -> None:
         traveller = self._robots[name]
         parked = traveller.parked

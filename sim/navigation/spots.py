@@ -9,6 +9,7 @@ import numpy as np
 
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation.clearance import Clearance
+from sim.navigation.distance_field import DistanceField
 from sim.navigation.lattice import PITCH_M, TRACKING_M, Lattice
 
 DOOR_M = 0.5
@@ -90,7 +91,7 @@ class Spots:
         return any(field[other] > 8 * PITCH_M for other in around[1:])
 
     def waiting_spot(
-        self, place: str, field: list[float], taken: frozenset[int], disliked: frozenset[int]
+        self, place: str, field: DistanceField, taken: frozenset[int], disliked: frozenset[int]
     ) -> int | None:
         """The best free node to wait at in `place`; `field` is the distance from the robot.
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from sim.navigation.distance_field import DistanceField
 from sim.navigation.lattice import Lattice
 from sim.navigation.spots import Dock
 
@@ -58,7 +59,7 @@ class Traveller:
 class Traffic:
     """Decides, for all robots together, who may drive on to which node."""
 
-    def __init__(self, lattice: Lattice, retreat: list[float]) -> None:
+    def __init__(self, lattice: Lattice, retreat: DistanceField) -> None:
         self._lattice, self._retreat = lattice, retreat
 
     def decide(self, robots: dict[str, Traveller], lookahead: int) -> None:
@@ -115,7 +116,7 @@ class Traffic:
         finally:
             self._stack.pop()
 
-    def _distance(self, robot: Traveller) -> list[float]:
+    def _distance(self, robot: Traveller) -> DistanceField:
         if robot.goal is None:
             return self._retreat
         goals = frozenset({robot.goal})
@@ -166,7 +167,7 @@ class Traffic:
             return self._decided[other.name] != other.frontier
         return self._decide(other, robot)
 
-    def _slant(self, robot: Traveller, distance: list[float]) -> bool:
+    def _slant(self, robot: Traveller, distance: DistanceField) -> bool:
         """A step across a square, if that is shorter and all of the square is free."""
         here = robot.frontier
         if robot.parked is not None or robot.goal is None or len(robot.track) > self._lookahead:

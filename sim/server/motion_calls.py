@@ -81,11 +81,10 @@ class MotionCalls:
 
     def settle(self, now_s: float, grace_s: float) -> bool:
         """Notice that the motion has ended; whether it did. The world then waits `grace_s`."""
-        if self._active is None:
+        if self._active is None or self._backend.is_running(self.robot):
             return False
         outcome = self._backend.outcome(self.robot)
-        if outcome is None or outcome.state is MotionState.RUNNING:
-            return False
+        assert outcome is not None, "a motion that was begun has an outcome"
         self._end(outcome)
         self.held_until_s = now_s + grace_s
         return True

@@ -14,6 +14,7 @@ from keyexpr_schema.keyspace import (
     SIM_SENSES,
     SIM_TRUTH,
 )
+from keyexpr_schema.payloads.motions import Senses
 from keyexpr_schema.payloads.simulation import (
     Frame,
     Frames,
@@ -25,10 +26,12 @@ from keyexpr_schema.payloads.simulation import (
 from keyexpr_schema.transport.session import Session
 from sim.backend import Backend
 
-CLOCK_WALL_S = 0.05
-SENSES_S, SENSES_WALL_S = 0.2, 0.05
-TRUTH_S, TRUTH_WALL_S = 0.1, 0.01
-"""Senses and truths: no more often than this in simulated time, and in wall time."""
+CLOCK_S, CLOCK_WALL_S = 0.1, 0.05
+SENSES_S, SENSES_WALL_S = 0.2, 0.1
+TRUTH_S, TRUTH_WALL_S = 0.1, 0.02
+"""No more often than this in simulated time, and in wall time."""
+MOVED_M, TURNED_RAD = 0.005, 0.02
+"""Senses that differ by less say nothing new."""
 FRAME_S, FRAMES_WALL_S, FRAMES = 0.1, 0.05, 100
 """A frame is kept this often in simulated time; they go out together this often in wall time, or
 as soon as there are so many."""
@@ -42,7 +45,8 @@ class WorldPublisher:
     def __init__(self, session: Session, backend: Backend, speed: float | None) -> None:
         self._session, self._backend, self._speed = session, backend, speed
         self._clock_wall_s = self._senses_wall_s = self._truth_wall_s = -1.0
-        self._senses_s = self._truth_s = self._frame_s = -1.0
+        self._clock_s = self._senses_s = self._truth_s = self._frame_s = -1.0
+        self._senses: dict[str, Senses] = {}
         self._frames: list[Frame] = []
         self._frames_wall_s = -1.0
         self._repeat_wall_s = 0.0
@@ -61,8 +65,12 @@ class WorldPublisher:
         repeat = wall_s - self._repeat_wall_s >= REPEAT_WALL_S
         if repeat:
             self._repeat_wall_s = wall_s
-        if robots or repeat or wall_s - self._clock_wall_s >= CLOCK_WALL_S:
-            self._clock_wall_s = wall_s
+        if (
+            robots
+            or repeat
+            or (now_s - self._clock_s >= CLOCK_S and wall_s - self._clock_wall_s >= CLOCK_WALL_S)
+        ):
+            self._clock_s, self._clock_wall_s = now_s, wall_s
             self._session.put(
                 SIM_CLOCK,
                 SimAddress(),
@@ -72,9 +80,11 @@ class WorldPublisher:
             now_s - self._senses_s >= SENSES_S and wall_s - self._senses_wall_s >= SENSES_WALL_S
         ):
             self._senses_s, self._senses_wall_s = now_s, wall_s
-            robots = self._backend.robots
-        for robot in robots:
-            self._session.put(SIM_SENSES, SimRobotAddress(robot), self._backend.senses(robot))
+            for robot in self._backend.robots:
+                self._publish_senses(robot, always=repeat or robot in robots)
+        else:
+            for robot in robots:
+                self._publish_senses(robot, always=True)
         if repeat or (
             now_s - self._truth_s >= TRUTH_S and wall_s - self._truth_wall_s >= TRUTH_WALL_S
         ):
@@ -89,6 +99,12 @@ class WorldPublisher:
         ):
             self._session.put(SIM_FRAMES, SimAddress(), Frames(frames=tuple(self._frames)))
             self._frames, self._frames_wall_s = [], wall_s
+
+    def _publish_senses(self, robot: str, *, always: bool) -> None:
+        senses = self._backend.senses(robot)
+        if always or _differ(self._senses.get(robot), senses):
+            self._senses[robot] = senses
+            self._session.put(SIM_SENSES, SimRobotAddress(robot), senses)
 
     def _publish_truth(self, repeat: bool) -> None:
         for truth in self._backend.truths():
@@ -116,3 +132,17 @@ class WorldPublisher:
                 await asyncio.sleep(REPEAT_WALL_S)
                 continue
             await self._session.wait_reconnected(connections)
+
+
+def _differ(before: Senses | None, now: Senses) -> bool:
+    """Whether there is news in `now`."""
+    if before is None:
+        return True
+    (x, y, yaw), (old_x, old_y, old_yaw) = now.pose_m_rad, before.pose_m_rad
+    return (
+        abs(x - old_x) > MOVED_M
+        or abs(y - old_y) > MOVED_M
+        or abs(yaw - old_yaw) > TURNED_RAD
+        or (now.place, now.holding, now.basket, now.moving)
+        != (before.place, before.holding, before.basket, before.moving)
+    )

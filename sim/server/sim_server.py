@@ -25,6 +25,9 @@ LAG_S = 0.5
 """A world that is further behind the wall clock stops trying to catch up."""
 
 GRACE_S = 0.25
+WAIT_SHARE, WAIT_S = 0.2, 5.0
+"""A world without a pace waits for robots that think for no longer than this share of the time that
+it has gone on for, beyond so much at first [s]: of many robots there is always one that thinks."""
 WATCHDOG_S = 2.0
 
 
@@ -34,7 +37,7 @@ class SimServer:
     `speed` is simulated seconds a second of wall time. `None` is as fast as it goes: then time
     advances only while some robot moves, and after a motion has ended it waits up to `grace_s` of
     wall time for that robot's next call, so that the thinking of workers and planners takes no
-    simulated time.
+    simulated time; with many robots, as far as that can be afforded (`WAIT_SHARE`).
 
     A motion that nobody has asked about for `watchdog_s` (beyond the wait of the last call) is
     stopped, as a driver would stop a robot whose worker is gone. While our own link to the router
@@ -54,6 +57,8 @@ class SimServer:
         self._calls = {robot: MotionCalls(backend, robot) for robot in backend.robots}
         self._publisher = WorldPublisher(session, backend, speed)
         self._called = asyncio.Event()
+        self._waits_s = WAIT_S
+        """How long the world may still wait for robots that think."""
         self._ready = asyncio.Event()
 
     async def ready(self) -> None:
@@ -99,32 +104,44 @@ class SimServer:
                 await self._advance_until(loop, max(due_s, self._backend.time_s))
             self._poll_motions(loop.time())
             self._called.clear()
-            pause_s = 0.005 if speed > 0.0 or self._held(loop.time()) else 0.05
+            held = self._held(loop.time())
+            pause_s = 0.005 if speed > 0.0 or held else 0.05
+            paused_s = loop.time()
             try:
                 async with asyncio.timeout(pause_s):
                     await self._called.wait()
             except TimeoutError:
                 pass
+            if held and self._anybody_moves():
+                self._waits_s -= loop.time() - paused_s
 
     def _speed_now(self, wall_s: float) -> float | None:
         if self._speed is not None:
             return self._speed
-        moving = any(calls.active for calls in self._calls.values())
-        return None if moving and not self._held(wall_s) else 0.0
+        return None if self._anybody_moves() and not self._held(wall_s) else 0.0
+
+    def _anybody_moves(self) -> bool:
+        return any(calls.active for calls in self._calls.values())
 
     def _held(self, wall_s: float) -> bool:
         """The world waits for the next call of a robot whose motion just ended."""
-        return self._speed is None and any(
-            not calls.active and wall_s < calls.held_until_s for calls in self._calls.values()
+        return (
+            self._waits_s > 0.0
+            and self._speed is None
+            and any(
+                not calls.active and wall_s < calls.held_until_s for calls in self._calls.values()
+            )
         )
 
     async def _advance_until(self, loop: asyncio.AbstractEventLoop, until_s: float | None) -> None:
         """Let the world go on for a few milliseconds, at most to `until_s`."""
-        end_wall_s = loop.time() + CHUNK_S
+        began_wall_s = loop.time()
+        end_wall_s = began_wall_s + CHUNK_S
         while until_s is None or self._backend.time_s < until_s:
             self._backend.advance()
             if self._poll_motions(loop.time()) or loop.time() >= end_wall_s:
                 break
+        self._waits_s = min(WAIT_S, self._waits_s + WAIT_SHARE * (loop.time() - began_wall_s))
         await asyncio.sleep(0)
 
     def _poll_motions(self, wall_s: float) -> bool:

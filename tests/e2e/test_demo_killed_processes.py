@@ -36,7 +36,8 @@ async def mission_with_a_death(
 ) -> tuple[Summary, Reports]:
     """Kill `victim` while `robot` carries out `skill`, start it again, and see it through."""
     speed = "max" if backend == "mujoco" else "10"
-    options = DemoOptions(mission=mission, out=out, backend=backend, speed=speed, timeout_s=150.0)
+    apart = victim.startswith("worker-")
+    options = DemoOptions(mission, out, backend, speed, timeout_s=150.0, apart=apart)
     async with running_demo(options) as demo:
 
         def busy() -> bool:
@@ -101,6 +102,7 @@ def check_no_attempt_ran_twice(reports: Reports) -> None:
         ("two-cups", "mujoco", "worker-hsr", "pick", "hsr"),
         ("two-cups", "mujoco", "worker-hsr", "place", "hsr"),
         ("two-cups", "mujoco", "worker-locobot", "navigate", "locobot"),
+        ("two-cups", "mujoco", "workers", "pick", "hsr"),
         # While nobody plans, the cup is found, and both robots look on in vain.
         ("find-cup", "kinematic", "planner", "search", "locobot"),
         ("find-cup", "kinematic", "planner", "pick", "hsr"),
@@ -124,5 +126,9 @@ async def test_the_mission_survives(
     if victim == f"worker-{robot}":
         # It was hit in the middle of its work, said so, and somebody took it up again.
         assert [report.robot for report in interrupted] == [robot]
+    elif victim == "workers":
+        # The other robot may have been at work as well.
+        robots = [report.robot for report in interrupted]
+        assert robot in robots and len(robots) == len(set(robots))
     else:
         assert interrupted == []

@@ -67,7 +67,7 @@ def trace(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, str, str,
 
 async def mission(folder: Path) -> None:
     """Two cups are brought; then a person looks at everything, proposes a plan, deletes, asks."""
-    options = DemoOptions(mission="two-cups", out=folder / "run", backend="kinematic")
+    options = DemoOptions("two-cups", folder / "run", backend="kinematic", apart=True)
     (folder / "plan.yaml").write_text(f"plan: mine{PLAN}", encoding="utf-8")
 
     async with running_demo(options) as demo:

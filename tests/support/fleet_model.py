@@ -303,10 +303,11 @@ class FleetModel:
             order, ReportState.SUCCEEDED, facts=facts, started_s=begun_s, ended_s=self.time_s
         )
 
-    def fail(self, order: Order, reason: str = "it slipped") -> None:
+    def fail(self, order: Order, reason: str = "it slipped", retryable: bool = True) -> None:
         """A robot has tried, and failed for good."""
         self.start(order)
-        self.report(order, ReportState.FAILED, reason=reason, ended_s=self.time_s)
+        failed = {"reason": reason, "retryable": retryable, "ended_s": self.time_s}
+        self.report(order, ReportState.FAILED, **failed)
 
     def cancelled(self, order: Order) -> None:
         """A robot confirms that it does no more about an order."""

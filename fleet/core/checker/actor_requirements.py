@@ -48,7 +48,9 @@ class Candidates:
         alike: dict[object, list[str]] = {}
         for robot in world.team:
             spec = world.robots[robot]
-            alike.setdefault((spec.skills, tuple(spec.capabilities.items())), []).append(robot)
+            marked = robot if robot in world.marked else None
+            kind = spec.skills, tuple(spec.capabilities.items()), marked
+            alike.setdefault(kind, []).append(robot)
         self._kinds = list(alike.values())
         self._playable: dict[tuple[object, ...], list[str]] = {}
         fitting = {actor: self._fitting(each) for actor, each in requirements.items()}
@@ -121,6 +123,8 @@ class Candidates:
             for need in action.skill.needs.get(parameter, ())
             if need.measure is not None and need.of is not None
         )
+        if any(known.skill == action.skill.name for known in self._world.hopeless):
+            return action.skill.name, parameter, *sorted(action.args.items())
         return action.skill.name, parameter, *measured
 
     def _unfit(self, robot: str, requirement: Requirement) -> str | None:

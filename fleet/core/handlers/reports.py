@@ -9,6 +9,7 @@ from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.model.durations import learn
 from fleet.core.model.preconditions import action_of, effects_hold, unmet_before
 from fleet.core.model.skills import Action
+from fleet.core.model.world import Hopeless
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.plan_index import OUTSTANDING
 from fleet.core.replan_reasons import ReplanScope
@@ -142,6 +143,8 @@ def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) 
         return set_record(state, entry, record)
     reason = f"{record.task} ({record.skill}) failed: {report.reason}"
     entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=(record.goal,))
+    if not report.retryable and (call := _hopeless(state, record, report)) is not None:
+        entry = replace(entry, hopeless=(*entry.hopeless, call))
     if record.goal is not None and record.goal in entry.plan.goals:
         count = entry.failures.get(record.goal, 0) + 1
         entry = replace(entry, failures=entry.failures.set(record.goal, count))
@@ -153,6 +156,16 @@ def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) 
             state = mark_goals(state, (record.goal,), GoalState.FAILED, entry.plan.plan, sentence)
             entry = replace(entry, plan=without_goal(state, entry.plan, record.goal))
     return set_record(state, entry, record)
+
+
+def _hopeless(state: State, record: TaskRecord, report: Report) -> Hopeless | None:
+    """The task's call, if the facts still say that it could be done: what its worker knows better,
+    a new plan has to know, or it would be the same again."""
+    action = action_of(record, state.skills)
+    if action is None or unmet_before(action, state.world()) is not None:
+        return None
+    reason = report.reason or "it did not say why"
+    return Hopeless(record.skill, record.args, report.robot, reason)
 
 
 def _interrupted(state: State, entry: PlanEntry, record: TaskRecord, report: Report) -> State:

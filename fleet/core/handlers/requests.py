@@ -121,7 +121,7 @@ def _planning(state: State, plan: Plan, job: PlanningJob) -> State:
         begun_s=state.time_s,
         begun_wall_s=state.wall_time_s,
     )
-    made = max(state.plans_made, _plan_number(plan.plan))
+    made = max(state.plans_made, plan_number(plan.plan))
     state = replace(_taken_up(state, plan.goals), jobs=job.job, plans_made=made)
     return set_entry(state, entry)
 
@@ -155,7 +155,7 @@ def _waiting_goals(state: State) -> Iterator[str]:
             yield goal
 
 
-def _plan_number(plan: str) -> int:
+def plan_number(plan: str) -> int:
     """`N` where the plan is called `plan-N`, else 0."""
     named = _NUMBERED.fullmatch(plan)
     return 0 if named is None else int(named[1])
@@ -187,7 +187,7 @@ def replan_requested(state: State, event: events.ReplanRequested) -> State:
         return answer(state, ask.request, False, entry)
     wish = ReplanAsked(request=ask.request, sentence=ask.reason, goals=ask.goals)
     # What a person asks for is no sign that the world does not go along: counting begins anew.
-    entry = replace(entry.wishing(wish), fruitless_replans=0)
+    entry = replace(entry.wishing(wish), fruitless_replans=0, hopeless=())
     return set_entry(_taken_up(state, ask.goals), entry)
 
 

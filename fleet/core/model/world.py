@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+import msgspec
+
 from fleet.core.model.durations import pace, work_s
 from fleet.core.model.skills import Action, SkillModel
 from keyexpr_schema.facts import AT, HELD, HOLDING, LOCATED, NOTHING, FactKey, Value
@@ -21,12 +23,31 @@ UNKNOWN_TRAVEL_M = 5.0
 """Distance assumed where the map has none, m; about one room to the next."""
 
 
+Call = tuple[str, tuple[tuple[str, str], ...]]
+"""A skill and its arguments, with robots in place of actors: what makes two tasks the same."""
+
+
+def call_of(skill: str, args: Mapping[str, str]) -> Call:
+    """What a task does."""
+    return skill, tuple(sorted(args.items()))
+
+
+class Hopeless(msgspec.Struct, frozen=True):
+    """A call that failed, and would again as its worker says, though no fact is against it."""
+
+    skill: str
+    args: dict[str, str]
+    robot: str
+    reason: str
+
+
 @dataclass(frozen=True)
 class WorldModel:
     """Places, objects and robots that exist, and the facts believed of them.
 
     `available` names the robots whose workers are connected now; only those get work. `durations`
-    are those learned, by type of robot; skill models and top speeds hold for the others.
+    are those learned, by type of robot; skill models and top speeds hold for the others. `hopeless`
+    are calls that are not to be tried again.
     """
 
     skills: Mapping[str, SkillModel]
@@ -36,6 +57,7 @@ class WorldModel:
     available: frozenset[str] = frozenset()
     facts: Mapping[FactKey, Value] = field(default_factory=dict)
     durations: Mapping[str, Durations] = field(default_factory=dict)
+    hopeless: tuple[Hopeless, ...] = ()
 
     @classmethod
     def of(
@@ -77,6 +99,15 @@ class WorldModel:
         """The robots that can get work now, in a fixed order."""
         return tuple(sorted(self.available & self.robots.keys()))
 
+    @cached_property
+    def _hopeless(self) -> dict[Call, Hopeless]:
+        return {call_of(known.skill, known.args): known for known in self.hopeless}
+
+    @cached_property
+    def marked(self) -> frozenset[str]:
+        """Robots that are not to try something again: they differ from others of their kind."""
+        return frozenset(known.robot for known in self.hopeless)
+
     def capability(self, robot: str, name: str) -> float | None:
         """The parameter of a robot's capability, or `None` if it lacks it."""
         return self.robots[robot].capabilities.get(name)
@@ -87,6 +118,10 @@ class WorldModel:
         skill = action.skill
         if parameter == skill.actor_parameter and skill.name not in spec.skills:
             return f"{robot} does not have the skill {skill.name}"
+        if self.hopeless and parameter == skill.actor_parameter:
+            call = call_of(skill.name, {**action.args, parameter: robot})
+            if (known := self._hopeless.get(call)) is not None:
+                return f"{robot} has failed at it, and would again: {known.reason}"
         for need in skill.needs.get(parameter, ()):
             has = spec.capabilities.get(need.capability)
             if has is None:

@@ -17,15 +17,12 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.model.preconditions import effects_hold
 from fleet.core.model.task_graph import TaskGraph
-from fleet.core.model.world import WorldModel
+from fleet.core.model.world import Call, WorldModel, call_of
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.plan_index import OUTSTANDING
 from keyexpr_schema.ids import bound
 from keyexpr_schema.payloads.plans import Plan, PlanChange, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
-
-Call = tuple[str, tuple[tuple[str, str], ...]]
-"""A skill and its arguments, with robots in place of actors: what makes two tasks the same."""
 
 
 @dataclass(frozen=True)
@@ -83,13 +80,11 @@ def _under_way(entry: PlanEntry, started: Iterable[str]) -> Iterator[str]:
 
 
 def _call(task: Task, allocation: Mapping[str, str]) -> Call:
-    return task.skill, tuple(
-        sorted((name, bound(value, allocation)) for name, value in task.args.items())
-    )
+    return call_of(task.skill, {n: bound(value, allocation) for n, value in task.args.items()})
 
 
 def _call_of(record: TaskRecord) -> Call:
-    return record.skill, tuple(sorted(record.args.items()))
+    return call_of(record.skill, record.args)
 
 
 def _going_on(

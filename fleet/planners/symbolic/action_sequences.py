@@ -212,7 +212,8 @@ def _representatives(
             full[able] += 1
             if full[able] > MAX_FULL_HANDS:
                 continue
-        kinds.setdefault((able, holds, robot if named else None), robot)
+        alone = named or robot in world.marked
+        kinds.setdefault((able, holds, robot if alone else None), robot)
     return sorted(kinds.values())
 
 

@@ -145,9 +145,10 @@ def _needs_locating(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
 
 
 def _no_way(subgoal: Subgoal, world: WorldModel) -> str:
+    failed = (f"; {known.robot} cannot {known.skill}: {known.reason}" for known in world.hopeless)
     return (
         f"no sequence of skills of the connected robots ({', '.join(world.team)}) "
-        f"leads to {subgoal.condition}"
+        f"leads to {subgoal.condition}{''.join(failed)}"
     )
 
 

@@ -89,6 +89,22 @@ class StoreClient:
                 f"{'deleting ' if data is None else ''}{keyexpr}", timeout_s
             ) from None
 
+    async def delete_matching(self, key: Key[Any, Any], pattern: str, timeout_s: float) -> None:
+        """Delete what a pattern matches, and return when the store has no older value of it.
+
+        Raises:
+            Unconfirmed: it had after `timeout_s`.
+            Unreachable: no store could be asked.
+        """
+        put = Put(pattern, None, encoding_of(key), self._link.new_timestamp())
+        ours = stamp_of_text(str(put.timestamp))
+        try:
+            async with asyncio.timeout(timeout_s):
+                while any(s.stamp < ours for s in await self.list(pattern, timeout_s)):
+                    await self._link.send(put)
+        except TimeoutError:
+            raise self._unconfirmed(f"deleting {pattern}", timeout_s) from None
+
     def _unconfirmed(self, what: str, timeout_s: float) -> Unconfirmed:
         why = (
             "a router is there, but no store answers for this key"

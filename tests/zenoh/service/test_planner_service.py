@@ -105,6 +105,27 @@ async def test_a_planner_that_lost_its_journal_repeats_nothing(
             assert await session.list(ORDER) == {}
 
 
+async def test_a_planner_that_lost_its_journal_cancels_what_the_other_ordered(
+    router: RouterProcess, tmp_path: Path
+) -> None:
+    async with person(router.endpoint) as session:
+        async with planner(router.endpoint, tmp_path / "one") as first:
+            await ask_for_plan(session)
+            order = await next_order(session, set())
+            first.kill()
+        shutil.rmtree(tmp_path / "one")
+        async with planner(router.endpoint, tmp_path / "two"):
+            address = OrderAddress.of(order)
+            cancelled = await value(session, ORDER, address, cancelled=True)
+            assert (cancelled.planner, cancelled.attempt) == (order.planner, order.attempt)
+            await carry_out(session, cancelled)
+
+            async def gone() -> bool:
+                return await session.get(ORDER, address) is None
+
+            await until(gone, "the order is withdrawn")
+
+
 async def test_durations_are_learned_and_outlive_the_planners_journal(
     router: RouterProcess, tmp_path: Path
 ) -> None:

@@ -115,5 +115,5 @@ def test_a_person_can_have_it_tried_again() -> None:
     request = ReplanRequest(request="again", plan="plan-1", reason="try")
     model.receive(events.ReplanRequested, request=request)
     assert model.state.jobs > jobs
-    assert "no robot is connected" in model.state.answers["again"].sentence
+    assert "no robot is connected" in model.replies["again"].sentence
     assert model.goal_state("g1") is GoalState.WAITING

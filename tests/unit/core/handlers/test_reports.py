@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from fleet.core import events
+from fleet.core.handlers.reports import MAX_FAILURES
 from fleet.core.revision.replanning import MAX_REPLANS
 from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.requests import ReplanRequest
 from keyexpr_schema.payloads.tasks import ReportState, TaskState
-from tests.support.fleet_model import fleet
-from tests.support.household import bring
+from keyexpr_schema.payloads.world import Fact
+from tests.support.fleet_model import BOTH, FleetModel, fleet
+from tests.support.household import bring, manipulator
 
 
 def test_a_failed_task_leads_to_a_new_revision_with_finished_work_kept() -> None:
@@ -65,3 +69,62 @@ def test_reports_of_old_attempts_change_nothing_but_facts() -> None:
     model.report(order, ReportState.FAILED, reason="late news")
     model.report(order, ReportState.SUCCEEDED)
     assert model.plans == before
+
+
+def failing_picks(model: FleetModel, retryable: bool) -> list[str]:
+    """The robots that have tried to pick something up, each of which has failed."""
+    tried = []
+    while orders := model.orders():
+        if orders[0].skill == "pick":
+            tried.append(orders[0].robot)
+            model.fail(orders[0], "the gripper is jammed", retryable)
+        else:
+            model.succeed(orders[0])
+    return tried
+
+
+def test_what_is_not_worth_another_try_is_tried_by_another_robot_and_by_nobody_twice() -> None:
+    model = FleetModel((manipulator("r1"), manipulator("r2")), cups=1)
+    model.plan(bring(1, "hallway"))
+    assert sorted(failing_picks(model, retryable=False)) == ["r1", "r2"]
+    status = model.goal_states["g1"]
+    assert status.state is GoalState.FAILED
+    assert "the gripper is jammed" in (status.reason or "")
+
+
+def test_what_is_worth_another_try_is_tried_again_after_planning() -> None:
+    model = FleetModel((manipulator("r1"),), cups=1)
+    model.plan(bring(1, "hallway"))
+    assert failing_picks(model, retryable=True) == ["r1"] * MAX_FAILURES
+
+
+def test_a_failure_that_the_facts_explain_is_planned_around() -> None:
+    model = FleetModel((manipulator("r1"),), cups=1)
+    model.plan(bring(1, "hallway"))
+    while (order := model.orders()[0]).skill != "pick":
+        model.succeed(order)
+    gone = Fact(subject="cup_1", relation="at", value=None, source="r1", time_s=model.time_s)
+    model.start(order)
+    model.report(order, ReportState.FAILED, reason="not here", retryable=False, facts=(gone,))
+    model.learn("cup_1", "at", "kitchen")
+    model.finish_cancelling()
+    assert model.goal_state("g1") is GoalState.REACHED
+
+
+def test_a_person_who_wants_another_plan_has_perhaps_put_things_right() -> None:
+    model = FleetModel((manipulator("r1"),), cups=2)
+    model.plan(*BOTH)
+    while (order := model.orders()[0]).skill != "pick":
+        model.succeed(order)
+    model.late = True
+    model.fail(order, "the gripper is jammed", retryable=False)
+    model.receive(
+        events.ReplanRequested,
+        request=ReplanRequest(request="x", plan="plan-1", reason="I have oiled it"),
+    )
+    del model.answers[0]
+    job = model.state.plans["plan-1"].job
+    assert job is not None
+    model.receive(events.PlanningFailed, job=job.job, reason="no way")
+    model.finish()
+    assert [model.goal_state(goal) for goal in ("g1", "g2")] == [GoalState.REACHED] * 2

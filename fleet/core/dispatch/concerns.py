@@ -19,13 +19,15 @@ class Concerns:
     """What may have come to be otherwise.
 
     `plans` are looked at as a whole; of others `goals` that may be reached and `tasks` that may be
-    ready. `robots` may be free, or planned with, now.
+    ready. `robots` may be free, or planned with, now. With another `team` every plan may have to be
+    made again, but no goal is reached by that.
     """
 
     plans: set[str] = field(default_factory=set)
     goals: defaultdict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     tasks: defaultdict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     robots: set[str] = field(default_factory=set)
+    team: bool = False
 
     @classmethod
     def of(cls, state: State, touches: Iterable[Touch]) -> Concerns:
@@ -34,7 +36,7 @@ class Concerns:
         for part, name, task in touches:
             match part:
                 case Part.TEAM:
-                    found.plans.update(state.index.active)
+                    found.team = True
                 case Part.ROBOT:
                     found.robots.add(name)
                 case Part.PLAN:

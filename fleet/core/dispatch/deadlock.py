@@ -10,8 +10,8 @@ from fleet.core.state import State
 def break_deadlock(state: State) -> State:
     """Where nobody moves, one task gets its robots in spite of reservations; what that upsets is
     planned again."""
-    if state.index.work and not state.gone_since:
-        return state
+    if len(state.index.work) > len(state.gone_since):
+        return state  # somebody who is there is at work
     alive = [state.plans[plan] for plan in by_priority(state, state.index.active)]
     if any(entry.job is not None for entry in alive):
         return state

@@ -53,12 +53,13 @@ def _look_at(state: State, concerns: Concerns) -> State:
     plan is made again, as far as that does not touch it."""
     robots = sorted(concerns.robots)
     concerned = {*concerns.plans, *concerns.goals, *concerns.tasks}
-    if robots:
+    if robots or concerns.team:
         concerned.update(state.index.active)
     for plan in by_priority(state, concerned):
-        entry, whole = state.plans[plan], plan in concerns.plans
+        entry, changed = state.plans[plan], plan in concerns.plans
+        whole = changed or (concerns.team and plan in state.index.active)
         if may_order(state, entry):
-            goals = entry.plan.goals if whole else sorted(concerns.goals.get(plan, ()))
+            goals = entry.plan.goals if changed else sorted(concerns.goals.get(plan, ()))
             state = _mark_reached(state, entry, goals)
             if whole:
                 state = _end_or_replan(state, state.plans[plan])

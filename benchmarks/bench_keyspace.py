@@ -7,6 +7,7 @@ store in a process of its own, on the loopback; wall times of this machine.
 from __future__ import annotations
 
 import asyncio
+import os
 import subprocess
 import sys
 import tempfile
@@ -15,8 +16,10 @@ from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import zenoh
 from rich.console import Console
 from rich.table import Table
+from zenoh import handlers
 
 from fleet.service.router_process import with_port
 from fleet.stores.sqlite import SqliteStore
@@ -24,13 +27,14 @@ from keyexpr_schema.facts import AT
 from keyexpr_schema.keyspace import FACT, STORE_JOURNAL
 from keyexpr_schema.payloads.system import StoreAddress, StoreQuery
 from keyexpr_schema.payloads.world import Fact, FactAddress
+from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from keyexpr_schema.transport.store.storage import Write
 
 CALLS = 1500
 WATCHED = 500
-WRITERS = 20
-WRITES_EACH = 100
+AT_ONCE = (1, 8, 64, 256)
+WRITES = 10_000
 PUTS = 20_000
 LISTED = 10_000
 BATCHES, BATCH = 100, 500
@@ -42,6 +46,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder, _router(Path(folder) / "data") as endpoint:
         latencies, rates = asyncio.run(_measured(endpoint))
     rates.extend(_store_alone())
+    console.print(f"machine load: {', '.join(f'{each:.1f}' for each in os.getloadavg())}")
     console.print(latencies_table(latencies))
     table = Table("what", "a second", title="throughput")
     for what, rate in rates:
@@ -85,12 +90,18 @@ async def _measured(
     config = SessionConfig((endpoint,))
     async with open_session(config) as writer, open_session(config) as reader:
         latencies = [
-            ("confirm: put, and read back from the store", await _repeat(_confirm(writer), CALLS)),
+            ("raw put to subscriber, through the router", await _raw(endpoint)),
+            ("confirm: put, and the store's word for it", await _repeat(_confirm(writer), CALLS)),
+            ("create: compare and set", await _repeat(_create(writer), CALLS)),
             ("get", await _repeat(lambda i: reader.get(FACT, _at(f"c{i % 100}")), CALLS)),
             ("watch: from put to the other session's watcher", await _watched(writer, reader)),
         ]
         rates = [
-            (f"confirmed writes, {WRITERS} at once", await _confirmed_together(writer)),
+            *[
+                (f"confirmed writes of new keys, {at_once} at once", rate)
+                for at_once in AT_ONCE
+                for rate in [await _confirmed_together(writer, at_once)]
+            ],
             *await _puts(writer),
             (f"values in a listing of {LISTED:,}", await _listed(writer, reader)),
         ]
@@ -103,6 +114,29 @@ def _at(subject: str) -> FactAddress:
 
 def _confirm(session: Session) -> Callable[[int], Awaitable[object]]:
     return lambda i: session.confirm(FACT, _at(f"c{i % 100}"), _fact(i))
+
+
+def _create(session: Session) -> Callable[[int], Awaitable[object]]:
+    return lambda i: session.create(FACT, _at(f"n{i}"), _fact(i))
+
+
+async def _raw(endpoint: str) -> list[float]:
+    """What Zenoh itself takes, of the same size, with nothing of ours around it."""
+    config = {"connect": [endpoint], "namespace": "raw"}
+    data = FACT.encode(_fact(0))
+    seconds: list[float] = []
+    with (
+        await asyncio.to_thread(zenoh.open, zenoh_config("client", **config)) as sender,  # type: ignore[arg-type]
+        await asyncio.to_thread(zenoh.open, zenoh_config("client", **config)) as receiver,  # type: ignore[arg-type]
+    ):
+        subscriber = receiver.declare_subscriber("unstored", handlers.FifoChannel(10))
+        await asyncio.sleep(0.5)  # until the router knows the subscriber
+        for _ in range(CALLS):
+            began_s = time.perf_counter()
+            sender.put("unstored", data)
+            subscriber.recv()
+            seconds.append(time.perf_counter() - began_s)
+    return seconds
 
 
 async def _repeat(call: Callable[[int], Awaitable[object]], times: int) -> list[float]:
@@ -128,14 +162,16 @@ async def _watched(writer: Session, reader: Session) -> list[float]:
     return seconds
 
 
-async def _confirmed_together(session: Session) -> float:
+async def _confirmed_together(session: Session, at_once: int) -> float:
+    each = min(WRITES // at_once, 2000)
+
     async def write(number: int) -> None:
-        for i in range(WRITES_EACH):
-            await session.confirm(FACT, _at(f"w{number}"), _fact(i))
+        for i in range(each):
+            await session.confirm(FACT, _at(f"w{at_once}-{number}-{i}"), _fact(i))
 
     began_s = time.perf_counter()
-    await asyncio.gather(*(write(number) for number in range(WRITERS)))
-    return WRITERS * WRITES_EACH / (time.perf_counter() - began_s)
+    await asyncio.gather(*(write(number) for number in range(at_once)))
+    return at_once * each / (time.perf_counter() - began_s)
 
 
 async def _puts(session: Session) -> list[tuple[str, float]]:

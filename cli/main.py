@@ -32,7 +32,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "register": ("cli.commands.robots:register", "Declare robots from YAML files."),
     "unregister": ("cli.commands.robots:unregister", "Forget a robot."),
     "history": ("cli.commands.history:app", "What is over, and what came of it."),
-    "journal": ("cli.commands.overview:journal", "What changed, in the order it was stored."),
+    "journal": ("cli.commands.journal:journal", "What changed, in the order it was stored."),
     "demo": ("cli.commands.demo:demo", "Run a whole mission here, judged by the physics."),
     "router": ("cli.commands.processes:router", "Run a Zenoh router with the fleet's store."),
     "planner": ("cli.commands.processes:planner", "Run the planner."),

@@ -315,4 +315,4 @@ class FleetRun:
         self.counts.planning_s += time.perf_counter() - began_s
         answer: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
         answer |= self._at()
-        self._pending.append(events.GoalInterpreted(goal=given.goal, **answer))
+        self._pending.append(events.GoalInterpreted(goal=given.goal, text=given.text, **answer))

@@ -32,8 +32,9 @@ class TakenMeanwhile(Exception):
         self.by = by
 
 
-def free_name(text: str, taken: Iterable[str], kind: str) -> str:
-    """A name made from the words of `text` that is not one of `taken`.
+def free_name(text: str, taken: Iterable[str], kind: str, number: int = 2) -> str:
+    """A name made from the words of `text` that is not one of `taken`; if need be, with the first
+    number from `number` on that makes it so.
 
     Where no letter of it can stand in a name, as of Chinese, the name is `kind`.
     """
@@ -42,11 +43,10 @@ def free_name(text: str, taken: Iterable[str], kind: str) -> str:
         base = slug(text)
     except InvalidId:
         base = kind
-    number = 1
     name = base
     while name in used:
-        number += 1
         name = f"{base}-{number}"
+        number += 1
     return name
 
 
@@ -67,11 +67,15 @@ async def put_if_unchanged(
     await session.update(key, address, unless_changed)
 
 
-async def next_number(session: Session, of: str, kind: str, highest: int) -> int:
-    """The number after `highest`, or after those that others have been given just now."""
+async def next_number(
+    session: Session, of: str, kind: str, highest: int, *, returns: bool = True
+) -> int:
+    """The number after `highest`, or after those that others have been given just now; or, if none
+    `returns` whatever is deleted, that were ever given."""
 
     def given(last: Claim | None) -> Claim:
-        taken = max(highest, last.number) if last is not None and _counts(last) else highest
+        counts = last is not None and (not returns or _counts(last))
+        taken = max(highest, last.number) if last is not None and counts else highest
         return Claim(number=taken + 1, wall_time_s=time.time())
 
     return (await session.update(CLAIM, ClaimAddress(of, kind), given)).number

@@ -129,12 +129,11 @@ async def put_goal(
     ended = [address.goal for address in await session.list(GOAL_STATUS)]
     taken = {*stored, *ended}
     said_s = await fleet_time_s(session)
-    ordinal = await next_number(
-        session, "goals", "all", max((each.ordinal for each in stored.values()), default=0)
-    )
+    highest = max((each.ordinal for each in stored.values()), default=0)
+    ordinal = await next_number(session, "goals", "all", highest, returns=False)
     while True:
         spec = Goal(
-            goal=name if name is not None else free_name(text, taken, "goal"),
+            goal=name if name is not None else free_name(text, taken, "goal", max(2, ordinal)),
             text=text,
             priority=priority,
             due_s=None if within_s is None else said_s + within_s,

@@ -1,4 +1,4 @@
-"""`robotctl status`, `watch`, `journal`."""
+"""`robotctl status`, `watch`."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ import typer
 from cli.command import Call, single
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     from keyexpr_schema.payloads.system import UndecodableValue
     from keyexpr_schema.transport.session import Change, Session
 
@@ -124,27 +122,3 @@ def _as_json(change: Change[Any, Any]) -> None:
 
     what = {"key": change.key.build(change.address), "value": change.value}
     typer.echo(msgspec.json.encode(what).decode())
-
-
-@single
-async def journal(
-    call: Call,
-    after: Annotated[int, typer.Option("--after", min=0, help="Only entries after this.")] = 0,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="At most so many.")] = 1000,
-) -> None:
-    """What changed in the key-space, in the order in which the store applied it."""
-    from keyexpr_schema.keyspace import STORE_JOURNAL
-    from keyexpr_schema.payloads.system import StoreAddress, StoreJournal, StoreQuery
-
-    async with call.session() as session:
-        # What a query key replies is not in its type; the key table says it is a StoreJournal.
-        page: StoreJournal = await session.query(
-            STORE_JOURNAL, StoreAddress(), StoreQuery(after=after, limit=limit)
-        )
-
-    def draw() -> RenderableType:
-        from cli.views.status import journal_table
-
-        return journal_table(page) if page.entries else "The journal has no such entries."
-
-    call.show(page, draw)

@@ -46,16 +46,42 @@ def router(
         typer.Option("--connect", metavar="ENDPOINT", help="Other routers to link with."),
     ] = None,
     data: DataOption = None,
+    journal_entries: Annotated[
+        int | None,
+        typer.Option("--journal-entries", min=1, help="Changes its journal keeps: 100000."),
+    ] = None,
+    journal_days: Annotated[
+        float | None,
+        typer.Option("--journal-days", min=0.01, metavar="DAYS", help="And for how long: 30."),
+    ] = None,
+    tombstone_days: Annotated[
+        float | None,
+        typer.Option(
+            "--tombstone-days",
+            min=0.01,
+            metavar="DAYS",
+            help="How long deletions hold against older values that come late: 7.",
+        ),
+    ] = None,
 ) -> None:
     """Run a Zenoh router with the fleet's durable store in it."""
     from cli.demo.child_processes import end_with_parent
     from fleet.service.router_process import run
+    from fleet.stores import StoreMemory
+
+    given = {
+        "journal_entries": journal_entries,
+        "journal_days": journal_days,
+        "tombstone_days": tombstone_days,
+    }
+    memory = StoreMemory(**{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
 
     end_with_parent()
     run(
         listen=tuple(listen or call.settings.routers[:1]),
         connect=tuple(connect or ()),
         data_dir=data_folder(data, "router"),
+        memory=memory,
     )
 
 

@@ -84,7 +84,7 @@ async def _history(session: Session, address: PlanAddress) -> dict[int, PlanSide
     spec_key, status_key = PLAN_SPEC.build(address), PLAN_STATUS.build(address)
     plans: dict[int, Plan] = {}
     allocations: dict[int, dict[str, str]] = {}
-    async for entry in _journal(session):
+    async for entry in _journal(session, f"plans/{address.plan}/*"):
         if entry.value is None or entry.keyexpr not in (spec_key, status_key):
             continue
         try:
@@ -106,13 +106,12 @@ async def _history(session: Session, address: PlanAddress) -> dict[int, PlanSide
     }
 
 
-async def _journal(session: Session) -> AsyncIterator[JournalEntry]:
+async def _journal(session: Session, pattern: str) -> AsyncIterator[JournalEntry]:
     after = 0
     while True:
         # What a query key replies is not in its type; the key table says it is a StoreJournal.
-        page: StoreJournal = await session.query(
-            STORE_JOURNAL, StoreAddress(), StoreQuery(after=after, limit=PAGE), JOURNAL_S
-        )
+        query = StoreQuery(after=after, limit=PAGE, pattern=pattern)
+        page: StoreJournal = await session.query(STORE_JOURNAL, StoreAddress(), query, JOURNAL_S)
         for entry in page.entries:
             yield entry
         if not page.entries:

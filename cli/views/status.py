@@ -16,6 +16,7 @@ from cli.views.plans import plans_table
 from cli.views.robots import RobotRow, robots_table
 from keyexpr_schema.payloads.system import (
     Diagnostic,
+    JournalEntry,
     PlannerStatus,
     StoreJournal,
     UndecodableValue,
@@ -90,7 +91,20 @@ def journal_table(journal: StoreJournal) -> Table:
     """One line a change."""
     rows = []
     for entry in journal.entries:
-        at = datetime.fromtimestamp(entry.wall_time_s).strftime("%H:%M:%S.%f")[:-3]
-        value = "deleted" if entry.deleted else entry.value or ""
-        rows.append((entry.number, at, entry.keyexpr, value[:VALUE_WIDTH]))
+        at, value = _journal_at(entry)
+        rows.append((entry.number, at, entry.keyexpr, value))
     return table(["number", "at", "key", "value"], rows)
+
+
+def journal_line(entry: JournalEntry) -> str:
+    """A change while one looks on."""
+    at, value = _journal_at(entry)
+    return f"{entry.number}  {at}  {entry.keyexpr}  {value}"
+
+
+def _journal_at(entry: JournalEntry) -> tuple[str, str]:
+    """When it was applied, with the day if that is not today; and the value, cut."""
+    time = datetime.fromtimestamp(entry.wall_time_s)
+    day = "" if time.date() == datetime.now().date() else time.strftime("%Y-%m-%d ")
+    value = "deleted" if entry.deleted else entry.value or ""
+    return day + time.strftime("%H:%M:%S.%f")[:-3], value[:VALUE_WIDTH]

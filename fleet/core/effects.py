@@ -357,5 +357,8 @@ def _jobs(old: State, new: State, scope: _Scope) -> Iterator[Effect]:
         if after is not None and before != after:
             yield MakePlan(planning_input(new, after))
     for goal in scope.names.get(Part.INTERPRETING, ()):
-        if goal in new.interpreting and goal not in old.interpreting and goal in new.goals:
+        if goal not in new.interpreting or goal not in new.goals:
+            continue
+        known = old.goals.get(goal) if goal in old.interpreting else None
+        if known is None or known.text != new.goals[goal].text:
             yield Interpret(interpretation_input(new, goal))

@@ -219,6 +219,8 @@ class GoalInterpreted(Event, frozen=True, kw_only=True):
     """A language model has read a goal's sentence: its stages, or why it means nothing."""
 
     goal: str
+    text: str | None = None
+    """The sentence; the goal may have another one by now."""
     stages: tuple[tuple[Condition, ...], ...] = ()
     reason: str | None = None
 

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from fleet.core.model.skills import Skills
 from fleet.core.model.world import Hopeless
 from fleet.core.plan_index import EMPTY_INDEX, PlanGraph, PlanIndex
-from fleet.core.replan_reasons import ReplanReason, ReplanScope, Wish
+from fleet.core.replan_reasons import ReplanReason, ReplanScope, TaskAdded, Wish
 from fleet.core.table import Table
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.payloads.plans import ENDED_PLANS, Plan, PlanChange, PlanState, Task, Violation
@@ -104,6 +104,8 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     wishes: tuple[Wish, ...] = ()
     replan_reasons: int = 0
     """How many reasons and wishes there have been."""
+    added: Table[str, TaskAdded] = Table()
+    """Tasks that people have added, by actor: planning anew for the goals does not lose them."""
     given_out: Table[str, None] = Table()
     discarded: int = 0
     late: tuple[str, ...] = ()

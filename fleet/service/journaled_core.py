@@ -81,13 +81,14 @@ class JournaledCore:
                 return ()
             line = encode_event(event)
         except Exception as error:
-            return self._set_aside(event, error)
+            return self.set_aside(event, error)
         self._journal.append_encoded(line)
         self._state = state
         self._replayable += 1
         return effects
 
-    def _set_aside(self, event: Event, error: Exception) -> tuple[Effect, ...]:
+    def set_aside(self, event: Event, error: Exception) -> tuple[Effect, ...]:
+        """Keep an event that cannot be handled beside the journal; what is to be done about it."""
         reason = f"{type(error).__name__}: {error}"
         log.exception("%s cannot be handled: it is set aside", type(event).__name__)
         if not isinstance(event, events.TimerFired):  # one of those is like the other

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import sqlite3
 import time
 import uuid
 from collections.abc import Collection, Sequence
@@ -17,7 +18,7 @@ from fleet.core.effects import DropJob, Effect, Interpret, MakePlan, Publish, Re
 from fleet.core.events import At, Event
 from fleet.core.model.skills import Skills, phrases_of
 from fleet.core.state import LOGIC, Policy, State
-from fleet.errors import Superseded
+from fleet.errors import FleetError, Superseded
 from fleet.history.archive import Archive
 from fleet.history.retention import Retention
 from fleet.service.catch_up import (
@@ -279,7 +280,14 @@ class PlannerService:
             self._apply(event)
 
     def _apply(self, event: Event) -> None:
-        if (news := self._past.news(event)) is not None:
+        try:
+            news = self._past.news(event)
+        except (FleetError, sqlite3.Error):
+            raise  # the archive, and not the event
+        except Exception as error:
+            self._carry_out(self._core.set_aside(event, error))
+            return
+        if news is not None:
             effects = self._core.apply(news)
             self._past.keep(effects)
             self._carry_out(effects)

@@ -10,36 +10,49 @@ from contextlib import nullcontext
 from pathlib import Path
 
 from fleet.errors import StoreError
-from fleet.stores.sqlite import SqliteStore
+from fleet.stores.sqlite import SqliteStore, StoreMemory
 from keyexpr_schema.errors import CannotListen
 from keyexpr_schema.transport.router import run_router
 
 FREE_PORT = ":0"
 
 
-def run(listen: tuple[str, ...], connect: tuple[str, ...], data_dir: Path | None) -> None:
+def run(
+    listen: tuple[str, ...],
+    connect: tuple[str, ...],
+    data_dir: Path | None,
+    memory: StoreMemory | None = None,
+) -> None:
     """Be a router until SIGTERM or SIGINT; prints one line once it listens.
 
     `listen` and `connect` are Zenoh endpoints such as `tcp/127.0.0.1:7447`; port 0 takes a free
     one. `connect` names routers on other hosts. The store lies in `data_dir`; None: a router
-    without a store, for the other hosts of a fleet whose store is elsewhere.
+    without a store, for the other hosts of a fleet whose store is elsewhere. `memory`: how long the
+    store remembers what is over.
 
     Raises:
         SystemExit: with 1 and one sentence on stderr, when it cannot start.
     """
     try:
-        asyncio.run(_run(tuple(with_port(endpoint) for endpoint in listen), connect, data_dir))
+        endpoints = tuple(with_port(endpoint) for endpoint in listen)
+        asyncio.run(_run(endpoints, connect, data_dir, memory))
     except (CannotListen, StoreError) as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201
         raise SystemExit(1) from None
 
 
-async def _run(listen: tuple[str, ...], connect: tuple[str, ...], data_dir: Path | None) -> None:
+async def _run(
+    listen: tuple[str, ...],
+    connect: tuple[str, ...],
+    data_dir: Path | None,
+    memory: StoreMemory | None,
+) -> None:
     loop = asyncio.get_running_loop()
     ended = asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, ended.set)
-    with SqliteStore(data_dir) if data_dir is not None else nullcontext() as store:
+    keeping = SqliteStore(data_dir, memory=memory) if data_dir is not None else nullcontext()
+    with keeping as store:
         async with run_router(listen, connect, store):
             print(f"router listening on {', '.join(listen)}", flush=True)  # noqa: T201
             await ended.wait()

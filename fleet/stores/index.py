@@ -72,6 +72,10 @@ class Index:
         found = self._entries.get(keyexpr)
         return found[1] if found is not None else None
 
+    def number(self, keyexpr: str) -> int:
+        """The number of the newest change of a key; 0: there is none."""
+        return self._entries[keyexpr][0] if keyexpr in self._entries else 0
+
     def set(self, number: int, write: Write) -> None:
         """Keep `write`, the change of that number, as the newest of its key."""
         keyexpr = write.keyexpr
@@ -83,7 +87,7 @@ class Index:
         self._entries[keyexpr] = (number, write)
         self._numbers.append(number)
         self._keys.append(keyexpr)
-        self.last = number
+        self.last = max(self.last, number)
         if len(self._numbers) > 2 * len(self._entries) + _WORTH_TIDYING:
             self._tidy()
 

@@ -6,24 +6,50 @@ import os
 import sqlite3
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import islice, takewhile
 from pathlib import Path
 from sys import intern
 from typing import Literal, Self
 
 from fleet.errors import StoreError
 from fleet.stores.index import Index
-from fleet.stores.state_file import STAMP_BYTES, identity_of, open_file, take_lock
-from keyexpr_schema.transport.store.storage import AppliedWrite, Changes, Write, is_journaled
+from fleet.stores.journal import StoreJournal
+from fleet.stores.state_file import blob_of, forgotten_of, identity_of, open_file, take_lock
+from keyexpr_schema.transport.store.storage import (
+    AppliedWrite,
+    Changes,
+    JournalQuery,
+    Write,
+    is_journaled,
+)
 
-_PRUNE_EVERY = 1000
+_DAY_S = 86_400.0
+_AT_ONCE = 1000
+
+
+@dataclass(frozen=True)
+class StoreMemory:
+    """How long a store remembers what is over.
+
+    A tombstone keeps an older value from coming back that arrives late: from a writer that tries
+    again, or whose clock is behind. So it must outlive both by far, and clocks that differ by days
+    are seen and set right; somebody who has not looked for longer than that lists everything anew.
+    The journal is for people who ask what happened, and for earlier revisions of plans.
+    """
+
+    journal_entries: int = 100_000
+    journal_days: float = 30.0
+    tombstone_days: float = 7.0
 
 
 class SqliteStore:
     """The `Store` of a router in the directory `data_dir`, which one process uses at a time.
 
     `synchronous`: `NORMAL` outlives the end of the process at any moment; `FULL` also a power cut,
-    at about half the speed. `journal_limit`: how many changes the journal remembers.
+    at about half the speed. `memory`: how long what is over is remembered.
 
     Raises:
         StoreInUse: another process has it open.
@@ -36,23 +62,24 @@ class SqliteStore:
         data_dir: Path,
         *,
         synchronous: Literal["NORMAL", "FULL"] = "NORMAL",
-        journal_limit: int = 100_000,
+        memory: StoreMemory | None = None,
         wall_time_s: Callable[[], float] = time.time,
     ) -> None:
+        memory = memory or StoreMemory()
         self._wall_time_s = wall_time_s
-        self._journal_limit = journal_limit
+        self._tombstone_s = memory.tombstone_days * _DAY_S
         self._lock = threading.Lock()
-        self._since_prune = 0
-        self._forgotten = 0
         self._guard = take_lock(data_dir)
         path = data_dir / "state.sqlite"
         try:
             self._db = open_file(path, synchronous)
             self._identity = identity_of(self._db, path)
+            self._forgotten = forgotten_of(self._db)
+            self._tombstones: deque[tuple[float, int, str]] = deque()
             self._index = self._load()
-            self._last = self._db.execute(
-                "SELECT coalesce(max(number), 0) FROM journal"
-            ).fetchone()[0]
+            self._journal = StoreJournal(
+                self._db, path, memory.journal_entries, memory.journal_days * _DAY_S
+            )
         except sqlite3.Error as error:
             os.close(self._guard)
             raise StoreError(
@@ -65,15 +92,15 @@ class SqliteStore:
 
     def _load(self) -> Index:
         rows = self._db.execute(
-            "SELECT number, keyexpr, stamp, deleted, encoding, data FROM latest"
+            "SELECT number, keyexpr, stamp, deleted, encoding, data, wall_time_s FROM latest"
         ).fetchall()
         rows.sort()
-        index = Index()
-        for number, keyexpr, stamp, deleted, encoding, data in rows:
-            write = Write(
-                keyexpr, int.from_bytes(stamp, "big"), bool(deleted), intern(encoding), data
-            )
-            index.set(number, write)
+        index = Index(self._forgotten)
+        for number, keyexpr, stamp, deleted, encoding, data, wall_time_s in rows:
+            at = int.from_bytes(stamp, "big")
+            index.set(number, Write(keyexpr, at, bool(deleted), intern(encoding), data))
+            if deleted:
+                self._tombstones.append((wall_time_s, number, keyexpr))
         return index
 
     def apply(self, batch: Sequence[Write]) -> int:
@@ -97,22 +124,25 @@ class SqliteStore:
                     self._db.executemany(
                         "INSERT OR REPLACE INTO latest VALUES (?, ?, ?, ?, ?, ?, ?)",
                         [
-                            (w.keyexpr, _blob(w.stamp), w.deleted, w.encoding, w.data, n, now_s)
+                            (w.keyexpr, blob_of(w.stamp), w.deleted, w.encoding, w.data, n, now_s)
                             for n, w in fresh
                         ],
                     )
-                    self._db.executemany(
-                        "INSERT INTO journal (wall_time_s, keyexpr, deleted, stamp, data) "
-                        "VALUES (?, ?, ?, ?, ?)",
-                        [(now_s, w.keyexpr, w.deleted, _blob(w.stamp), w.data) for w in journaled],
-                    )
-                    self._prune(len(journaled))
+                    self._journal.add(journaled, now_s)
+                    faded = self._fade(now_s)
             except sqlite3.Error as error:
                 raise StoreError(f"the store could not write: {error}") from error
             # Only now: what a reader sees must be durable.
-            self._last += len(journaled)
+            self._journal.added(len(journaled))
             for number, write in fresh:
                 self._index.set(number, write)
+                if write.deleted:
+                    self._tombstones.append((now_s, number, write.keyexpr))
+            for number, keyexpr in faded:
+                self._tombstones.popleft()
+                if self._index.number(keyexpr) == number:
+                    self._index.forget(keyexpr)
+                self._forgotten = max(self._forgotten, number)
             return len(changes)
 
     def _decide(self, batch: Sequence[Write]) -> list[Write]:
@@ -141,14 +171,17 @@ class SqliteStore:
             for key in sorted(keys)
         ]
 
-    def _prune(self, added: int) -> None:
-        self._since_prune += added
-        if self._since_prune >= min(_PRUNE_EVERY, self._journal_limit):
-            self._since_prune = 0
+    def _fade(self, now_s: float) -> list[tuple[int, str]]:
+        """Delete from the file the tombstones that are old enough, some at a time: which."""
+        old = takewhile(lambda each: each[0] < now_s - self._tombstone_s, self._tombstones)
+        faded = [(number, keyexpr) for _, number, keyexpr in islice(old, _AT_ONCE)]
+        if faded:
+            self._db.executemany("DELETE FROM latest WHERE number = ? AND keyexpr = ?", faded)
             self._db.execute(
-                "DELETE FROM journal WHERE number <= (SELECT max(number) FROM journal) - ?",
-                (self._journal_limit,),
+                "INSERT OR REPLACE INTO about VALUES ('forgotten', ?)",
+                (str(max(self._forgotten, *(number for number, _ in faded))),),
             )
+        return faded
 
     def select(self, pattern: str) -> list[Write]:
         with self._lock:
@@ -180,23 +213,13 @@ class SqliteStore:
             return int(began), int(after)
         return -1, -1
 
-    def journal(self, prefix: str, after: int, limit: int) -> tuple[list[AppliedWrite], int]:
-        with self._lock:
-            rows = self._db.execute(
-                "SELECT number, wall_time_s, keyexpr, deleted, stamp, data FROM journal "
-                "WHERE number > ? AND substr(keyexpr, 1, ?) = ? ORDER BY number LIMIT ?",
-                (after, len(prefix) + 1, prefix + "/", max(0, limit)),
-            ).fetchall()
-            last = self._last
-        entries = [
-            AppliedWrite(number, wall_s, keyexpr, bool(deleted), int.from_bytes(stamp, "big"), data)
-            for number, wall_s, keyexpr, deleted, stamp, data in rows
-        ]
-        return entries, last
+    def journal(self, realm: str, asked: JournalQuery) -> tuple[list[AppliedWrite], int]:
+        return self._journal.entries(realm, asked), self._journal.last
 
     def close(self) -> None:
         """Release everything; what was applied stays."""
         with self._lock:
+            self._journal.close()
             self._db.close()
             if self._guard >= 0:
                 os.close(self._guard)
@@ -207,7 +230,3 @@ class SqliteStore:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def _blob(stamp: int) -> bytes:
-    return stamp.to_bytes(STAMP_BYTES, "big")

@@ -15,7 +15,7 @@ from pathlib import Path
 from fleet.errors import StoreError, StoreInUse
 
 FORMAT = 2
-STAMP_BYTES = 24
+_STAMP_BYTES = 24
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 _LATEST = """
 CREATE TABLE IF NOT EXISTS latest (
@@ -128,3 +128,14 @@ def identity_of(db: sqlite3.Connection, path: Path) -> str:
                 [("place", place), ("identity", about["identity"])],
             )
     return str(about["identity"])
+
+
+def blob_of(stamp: int) -> bytes:
+    """A stamp as a column has it: such blobs compare as the stamps do."""
+    return stamp.to_bytes(_STAMP_BYTES, "big")
+
+
+def forgotten_of(db: sqlite3.Connection) -> int:
+    """The number of the newest deletion that is forgotten."""
+    row = db.execute("SELECT value FROM about WHERE name = 'forgotten'").fetchone()
+    return int(row[0]) if row is not None else 0

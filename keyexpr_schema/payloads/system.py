@@ -73,10 +73,17 @@ class StoreAddress(Address, frozen=True):
 
 
 class StoreQuery(Payload, frozen=True, kw_only=True):
-    """Asks the store for its journal: changes after `after`, at most `limit` of them."""
+    """Asks the store for its journal: changes numbered above `after`, at most `limit` of them.
+
+    Of keys that `pattern` matches (`*`, `**`), applied at `since_s` (Unix seconds) or later; the
+    first of them, or with `newest` the last.
+    """
 
     after: int = 0
     limit: int = 1000
+    pattern: str = "**"
+    since_s: float | None = None
+    newest: bool = False
 
 
 class JournalEntry(Payload, frozen=True, kw_only=True):

@@ -45,10 +45,17 @@ class Drive(ABC):
         """Whether the hand is full: then it turns slowly."""
         self._target: tuple[float, float, float | None, float] | None = None
         self._spin: float | None = None
+        self._pose_at: tuple[float, PoseMRad] | None = None
+
+    def pose(self) -> PoseMRad:
+        """Where the base is: (x, y, yaw), world frame; read once for each moment."""
+        now_s = self._data.time
+        if self._pose_at is None or self._pose_at[0] != now_s:
+            self._pose_at = (now_s, self._read_pose())
+        return self._pose_at[1]
 
     @abstractmethod
-    def pose(self) -> PoseMRad:
-        """Where the base is: (x, y, yaw), world frame."""
+    def _read_pose(self) -> PoseMRad: ...
 
     @abstractmethod
     def put(self, pose_m_rad: PoseMRad) -> None:
@@ -114,12 +121,13 @@ class Planar(Drive):
         self._ctrl = [int(model.actuator(prefix + name).id) for name in entry.actuators]
         self._command = (0.0, 0.0, 0.0)
 
-    def pose(self) -> PoseMRad:
+    def _read_pose(self) -> PoseMRad:
         x, y, yaw = (float(self._data.qpos[address]) for address in self._qpos)
         return (x, y, wrap(yaw))
 
     def put(self, pose_m_rad: PoseMRad) -> None:
         self._data.qpos[self._qpos] = pose_m_rad
+        self._pose_at = None
         self.halt()
 
     def speed(self) -> tuple[float, float]:
@@ -172,7 +180,7 @@ class Differential(Drive):
         self._command = (0.0, 0.0)
         self._driving = False
 
-    def pose(self) -> PoseMRad:
+    def _read_pose(self) -> PoseMRad:
         at = self._qpos
         qpos = self._data.qpos
         return (float(qpos[at]), float(qpos[at + 1]), yaw_of(qpos[at + 3 : at + 7]))
@@ -182,6 +190,7 @@ class Differential(Drive):
         at = self._qpos
         self._data.qpos[at : at + 3] = (x, y, 0.0)
         self._data.qpos[at + 3 : at + 7] = yaw_quaternion(yaw)
+        self._pose_at = None
         self.halt()
 
     def speed(self) -> tuple[float, float]:

@@ -85,7 +85,7 @@ def look(context: MotionContext, run: MotionRun) -> Steps:
     turned = 0.0
     robot.drive.spin(LOOK_RATE_RAD_S)
     while turned < math.tau:
-        for name in context.observer.in_range(robot):
+        for name in context.observer.in_view(robot):
             if name not in seen and robot.held != name and context.observer.sees(robot, name):
                 seen[name] = context.observer.detect(robot, name)
         yield

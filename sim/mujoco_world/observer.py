@@ -156,13 +156,19 @@ class Observer:
                 return name
         return None
 
-    def in_range(self, robot: RobotBody) -> list[str]:
-        """The objects that are not too far off for a robot's camera: those worth a closer look."""
-        if robot.camera < 0 or not self._objects:
+    def in_view(self, robot: RobotBody) -> list[str]:
+        """The objects ahead of a robot's camera and not too far off: those worth a closer look."""
+        import numpy as np
+
+        camera = robot.description.camera
+        if camera is None or not self._objects:
             return []
         away = self._data.xpos[self._bodies] - self._data.site_xpos[robot.camera]  # (n, 3) m
         reach_m = robot.spec.capabilities.get("see", 0.0) + NEAR_ENOUGH_M
         near = (away**2).sum(axis=1) <= reach_m**2
+        x, y, _ = self._data.site_xmat[robot.camera].reshape(3, 3)[:, 0]
+        bearing = np.arctan2(x * away[:, 1] - y * away[:, 0], x * away[:, 0] + y * away[:, 1])
+        near &= abs(bearing) <= math.radians(camera.fov_deg) / 2 + 1e-6
         return list(itertools.compress(self._objects, near.tolist()))
 
     def sees(self, robot: RobotBody, object: str) -> bool:

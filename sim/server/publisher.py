@@ -28,7 +28,7 @@ from sim.backend import Backend
 
 CLOCK_S, CLOCK_WALL_S = 0.1, 0.05
 SENSES_S, SENSES_WALL_S = 0.2, 0.1
-TRUTH_S, TRUTH_WALL_S = 0.1, 0.02
+TRUTH_S, TRUTH_WALL_S = 0.1, 0.05
 """No more often than this in simulated time, and in wall time."""
 MOVED_M, TURNED_RAD = 0.005, 0.02
 """Senses that differ by less say nothing new."""

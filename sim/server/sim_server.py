@@ -25,7 +25,7 @@ LAG_S = 0.5
 """A world that is further behind the wall clock stops trying to catch up."""
 
 GRACE_S = 0.25
-WAIT_SHARE, WAIT_S = 0.2, 5.0
+WAIT_SHARE, WAIT_S = 0.1, 5.0
 """A world without a pace waits for robots that think for no longer than this share of the time that
 it has gone on for, beyond so much at first [s]: of many robots there is always one that thinks."""
 WATCHDOG_S = 2.0

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from fleet.stores.index import matcher
 from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.transport.samples import stamp_of_text, text_of_stamp, timestamp_of_stamp
-from keyexpr_schema.transport.store.storage import Write
+from keyexpr_schema.transport.store.storage import JournalQuery, Write
 from tests.support.reached import reaches
 
 KEYS = st.sampled_from([f"north/world/facts/{name}/at" for name in "abc"])
@@ -74,11 +74,11 @@ def test_the_latest_wins_in_any_order_in_any_batches_twice_and_after_reopening(
 def test_a_repeated_write_changes_nothing_and_is_not_journaled(writes):
     with tempfile.TemporaryDirectory() as directory, SqliteStore(Path(directory)) as store:
         store.apply(writes)
-        entries, last = store.journal("north", 0, 1000)
+        entries, last = store.journal("north", JournalQuery(0, 1000))
         assert [entry.number for entry in entries] == list(range(1, last + 1))
         assert store.apply(writes) == 0
-        assert store.journal("north", 0, 1000) == (entries, last)
-        assert store.journal("nort", 0, 1000) == ([], last)
+        assert store.journal("north", JournalQuery(0, 1000)) == (entries, last)
+        assert store.journal("nort", JournalQuery(0, 1000)) == ([], last)
 
 
 CHUNK = st.sampled_from(["a", "b", "ab", "abc", "@a", "a.b"])

@@ -70,10 +70,12 @@ def _goal_taken_out(state: State, entry: PlanEntry, goal: str) -> State:
 
 def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
     """Take over what a language model read in a goal's sentence, or that it read nothing."""
-    if event.goal not in state.interpreting:
+    goal = state.goals.get(event.goal)
+    if event.goal not in state.interpreting or (
+        goal is not None and event.text not in (None, goal.text)
+    ):
         return state
-    rest = tuple(goal for goal in state.interpreting if goal != event.goal)
-    state = replace(state, interpreting=rest)
+    state = _without_reading(state, event.goal)
     status = state.goal_states.get(event.goal)
     if status is None:
         return state
@@ -134,7 +136,14 @@ def _take_goal(state: State, goal: Goal, known: GoalStatus | None = None) -> Sta
         interpreting = tuple(dict.fromkeys([*state.interpreting, goal.goal]))
         state = replace(state, interpreting=interpreting)
         return touch(state, Touch(Part.INTERPRETING, goal.goal))
-    return _begin_stage(state, goal.goal)
+    return _begin_stage(_without_reading(state, goal.goal), goal.goal)
+
+
+def _without_reading(state: State, goal: str) -> State:
+    """Nobody reads the goal's sentence any more, or what it was before."""
+    if goal not in state.interpreting:
+        return state
+    return replace(state, interpreting=tuple(g for g in state.interpreting if g != goal))
 
 
 def _begin_stage(state: State, goal: str) -> State:

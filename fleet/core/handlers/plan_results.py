@@ -10,7 +10,7 @@ from fleet.core import events
 from fleet.core.dispatch.replan_triggers import contradicted
 from fleet.core.effects import status_of
 from fleet.core.plan_entry import PlanEntry, PlanningJob
-from fleet.core.replan_reasons import ReplanReason, Wish
+from fleet.core.replan_reasons import ReplanReason, TaskAdded, Wish
 from fleet.core.revision.reconcile import reconcile
 from fleet.core.state import State
 from fleet.core.state_updates import (
@@ -23,6 +23,7 @@ from fleet.core.state_updates import (
     touch,
     without_goal,
 )
+from fleet.core.table import Table
 from fleet.core.touches import Part, Touch
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
@@ -57,6 +58,11 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
         to = PlanState.PROPOSED if state.policy.approval else PlanState.READY
     if to is PlanState.READY and entry.start:
         to = PlanState.RUNNING
+    added = _added(entry, job, wishes)
+    lost = [actor for actor in added if _is_lost(entry, revision.plan, actor)]
+    for actor in lost:
+        rest = rest.wishing(replace(added[actor], request=None, after=()))
+        added = added.without(actor)
     fruitless = bool(reasons) and not (event.repaired and job.reallocation)
     entry = replace(
         rest,
@@ -66,6 +72,7 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
         records=entry.records.updated(revision.records),
         unwanted=tuple(dict.fromkeys([*entry.unwanted, *revision.unwanted])),
         change=None if first else revision.change,
+        added=added,
         discarded=0,
         waits_for_team=None,
         team=team,
@@ -80,6 +87,21 @@ def planning_succeeded(state: State, event: events.PlanningSucceeded) -> State:
     for wish in wishes:
         state = _answer_wish(state, wish, event)
     return state
+
+
+def _added(entry: PlanEntry, job: PlanningJob, wishes: tuple[Wish, ...]) -> Table[str, TaskAdded]:
+    """The tasks that people have added to the plan, with the one of this job, by actor."""
+    for wish in wishes:
+        if isinstance(wish, TaskAdded) and job.proposal is not None:
+            return entry.added.set(job.proposal.tasks[-1].actor, wish)
+    return entry.added
+
+
+def _is_lost(entry: PlanEntry, plan: Plan, actor: str) -> bool:
+    """Whether a task that somebody added was still to be done, and a plan that was made anew for
+    its goals alone does without it: then it is wished for again."""
+    undone = (r for r in entry.current() if r.actor == actor and r.state not in ENDED_TASKS)
+    return any(undone) and all(task.actor != actor for task in plan.tasks)
 
 
 def _for_goals_of_now(state: State, entry: PlanEntry, event: events.PlanningSucceeded) -> Plan:

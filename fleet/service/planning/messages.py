@@ -71,5 +71,5 @@ def failed_answer(job: Job, reason: str) -> Answer:
     """The answer to a job that came to no answer of its own."""
     at: dict[str, Any] = {"time_s": job.time_s, "wall_time_s": job.wall_time_s}
     if isinstance(job, InterpretationInput):
-        return GoalInterpreted(goal=job.goal, reason=reason, **at)
+        return GoalInterpreted(goal=job.goal, text=job.text, reason=reason, **at)
     return PlanningFailed(job=job.job.job, reason=reason, postponed=True, **at)

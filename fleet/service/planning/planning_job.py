@@ -65,7 +65,11 @@ def run_interpretation(given: InterpretationInput, composition: Composition) -> 
     read = composition.interpreter.interpret(given.text, given.vocabulary, given.skills)
     meaning: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
     return GoalInterpreted(
-        time_s=given.time_s, wall_time_s=given.wall_time_s, goal=given.goal, **meaning
+        time_s=given.time_s,
+        wall_time_s=given.wall_time_s,
+        goal=given.goal,
+        text=given.text,
+        **meaning,
     )
 
 

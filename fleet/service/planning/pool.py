@@ -1,8 +1,8 @@
 """The planner's planning processes: who does which job when, and an answer to each.
 
-There are two lanes. Jobs that compute share one process, the most urgent first, since more would
-only take the cores from each other and from dispatching. Jobs that wait for a language model go on
-side by side.
+There are two lanes. Jobs that compute go one after the other, the most urgent first, since more
+would only take the cores from each other and from dispatching; what is more urgent than the one
+that goes on begins beside it. Jobs that wait for a language model go on side by side.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ from fleet.service.planning.process import (
     PlanningTookTooLong,
 )
 
+COMPUTING = 3
+"""As many as there are urgencies; the second and third are started when they are needed."""
 CONVERSATIONS = 4
 """Jobs that may wait for a language model at the same time."""
 TRIES = 2
@@ -36,6 +38,9 @@ GRACE_S = 10.0
 """What reading a sentence may take besides waiting for the language model, s."""
 KEPT_FAILURES = 5
 """Inputs of jobs that ended their process, kept for whoever looks into it."""
+
+_Key = int | tuple[str, str]
+"""The number of a planning job, or a goal and the sentence of it that is read."""
 
 log = logging.getLogger(__name__)
 
@@ -48,17 +53,21 @@ class _Ticket:
     process: PlanningProcess | None = None
 
     @property
-    def key(self) -> int | str:
-        """The number of a planning job, or the goal whose sentence is read."""
+    def key(self) -> _Key:
         job = self.job
-        return job.job.job if isinstance(job, PlanningInput) else job.goal
+        return job.job.job if isinstance(job, PlanningInput) else (job.goal, job.text)
 
 
 @dataclass(eq=False)
 class _Lane:
-    """Processes that are free, the one used last on top, and tickets by urgency."""
+    """Processes that are free, the one used last on top, and tickets by urgency.
+
+    Where they do not go `side_by_side`, one begins only if it is more urgent than all `running`.
+    """
 
     idle: list[PlanningProcess]
+    side_by_side: bool = False
+    running: list[int] = field(default_factory=list)
     waiting: list[tuple[int, int, _Ticket]] = field(default_factory=list)
 
 
@@ -70,12 +79,14 @@ class PlanningPool:
         llm = None if llm_file is None else str(llm_file)
         how = Start(llm_file=llm, converses=True)
         talking = [PlanningProcess(how) for _ in range(CONVERSATIONS)]
-        self._computing = _Lane([PlanningProcess(Start(llm_file=llm))])
-        self._conversing = _Lane(talking)
-        self._processes = [*self._computing.idle, *talking]
+        computing = [PlanningProcess(Start(llm_file=llm)) for _ in range(COMPUTING)]
+        self._computing = _Lane(computing)
+        self._conversing = _Lane(talking, side_by_side=True)
+        self._processes = [*computing, *talking]
+        self._first = computing[-1]
         self._failures = failures
         self._ready: Ready | None = None
-        self._tickets: dict[int | str, _Ticket] = {}
+        self._tickets: dict[_Key, _Ticket] = {}
         self._numbers = count()
         self._tasks: set[asyncio.Task[None]] = set()
         self.answers: asyncio.Queue[Answer] = asyncio.Queue()
@@ -100,7 +111,7 @@ class PlanningPool:
             PlanningProcessEnded: none can be started; the message says why.
         """
         if self._ready is None:
-            self._ready = await self._processes[0].started()
+            self._ready = await self._first.started()
         return self._ready
 
     def submit(self, job: Job) -> None:
@@ -121,14 +132,19 @@ class PlanningPool:
 
     def _assign(self, lane: _Lane) -> None:
         while lane.idle and lane.waiting:
-            _, _, ticket = heappop(lane.waiting)
+            urgency, _, ticket = lane.waiting[0]
             if self._tickets.get(ticket.key) is ticket:
+                if not lane.side_by_side and any(urgency >= other for other in lane.running):
+                    return
                 ticket.process = lane.idle.pop()
+                lane.running.append(urgency)
                 self._spawn(self._serve(lane, ticket, ticket.process))
+            heappop(lane.waiting)
 
     async def _serve(self, lane: _Lane, ticket: _Ticket, process: PlanningProcess) -> None:
         answer = await self._answer_to(ticket, process)
         ticket.process = None
+        lane.running.remove(_urgency(ticket.job))
         if self._tickets.get(ticket.key) is ticket:
             del self._tickets[ticket.key]
             self.answers.put_nowait(answer)
@@ -171,7 +187,9 @@ class PlanningPool:
             return
         with suppress(OSError):
             self._failures.mkdir(parents=True, exist_ok=True)
-            path = self._failures / f"{ticket.key}.json"
+            job = ticket.job
+            name = f"job-{job.job.job}" if isinstance(job, PlanningInput) else f"goal-{job.goal}"
+            path = self._failures / f"{name}.json"
             path.write_bytes(msgspec.json.encode(ticket.job))
             log.warning("what it was to plan is kept in %s", path)
             kept = sorted(self._failures.glob("*.json"), key=lambda each: each.stat().st_mtime)
@@ -192,7 +210,10 @@ class PlanningPool:
 
 
 def _urgency(job: Job) -> int:
-    """A running plan waits for its next revision; nobody waits for a dry run but a person."""
+    """A running plan waits for its next revision; nobody waits for a dry run but a person.
+
+    The least number comes first.
+    """
     if not isinstance(job, PlanningInput):
         return 1
     if job.job.dry_run:

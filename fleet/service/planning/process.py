@@ -29,6 +29,10 @@ START_TIMEOUT_S = 60.0
 """For a process to greet; it takes half a second on an idle core."""
 
 
+END_TIMEOUT_S = 5.0
+"""For what a killed process has left behind; somebody it started may keep its pipe."""
+
+
 class PlanningProcessEnded(FleetError):
     """A planning process has ended, or was never there; the message says how."""
 
@@ -92,9 +96,8 @@ class PlanningProcess:
 
     def kill(self) -> None:
         """End it at once, with what it has started; whoever waits for an answer hears of it."""
-        if (pid := self.pid) is not None:
-            with suppress(ProcessLookupError):
-                os.killpg(pid, signal.SIGKILL)
+        if self._process is not None:
+            _kill(self._process)
 
     async def close(self) -> None:
         """End it, and wait until it has ended."""
@@ -102,12 +105,12 @@ class PlanningProcess:
         if process is None:
             return
         assert process.stdin is not None and process.stdout is not None
-        if process.returncode is None:
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
+        _kill(process)
         process.stdin.close()
-        await process.stdout.read()  # what is left in the pipe would keep it open
-        await process.wait()
+        with suppress(TimeoutError):
+            async with asyncio.timeout(END_TIMEOUT_S):
+                await process.wait()
+                await process.stdout.read()  # what is left in the pipe would keep it open
 
     async def _greeted(self, process: Process) -> Ready:
         try:
@@ -132,6 +135,14 @@ class PlanningProcess:
             (size,) = HEADER.unpack(await process.stdout.readexactly(HEADER.size))
             return await process.stdout.readexactly(size)
         except (asyncio.IncompleteReadError, ConnectionError):
+            _kill(process)  # it may only have closed its end
             code = await process.wait()
             how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
             raise PlanningProcessEnded(f"the planning process ended ({how})") from None
+
+
+def _kill(process: Process) -> None:
+    """End a process, and its group."""
+    if process.returncode is None:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)

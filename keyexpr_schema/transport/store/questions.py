@@ -23,7 +23,7 @@ from keyexpr_schema.payloads.system import (
     StoreStampsQuery,
 )
 from keyexpr_schema.transport.samples import text_of_stamp, time_s_of_stamp
-from keyexpr_schema.transport.store.storage import Store, Write, is_stored
+from keyexpr_schema.transport.store.storage import JournalQuery, Store, Write, is_stored
 
 _MAX_REPLY = 10_000
 
@@ -63,7 +63,8 @@ class StoreQuestions:
 
     def _journal(self, realm: str, asked: StoreQuery) -> StoreJournal:
         limit = max(0, min(asked.limit, _MAX_REPLY))
-        found, last = self._store.journal(realm, asked.after, limit)
+        query = JournalQuery(asked.after, limit, asked.pattern, asked.since_s, asked.newest)
+        found, last = self._store.journal(realm, query)
         entries = tuple(
             JournalEntry(
                 number=one.number,

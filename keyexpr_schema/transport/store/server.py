@@ -81,17 +81,16 @@ class StoreServer:
                 return
             batch: list[Write] = []
             mark = 0
-            for _ in range(CHANNEL):
-                if sample is None:
-                    break
+            while sample is not None:
                 try:
                     mark = self._collect(sample, batch) or mark
                 except Exception:
                     _log.exception("the store could not take in what is at %s", sample.key_expr)
-                try:
-                    sample = self._subscriber.handler.try_recv()
-                except zenoh.ZError:
-                    break
+                # What is taken out of the channel is taken in: look at the size before.
+                sample = None
+                if len(batch) < CHANNEL:
+                    with contextlib.suppress(zenoh.ZError):
+                        sample = self._subscriber.handler.try_recv()
             self._apply(batch)
             if mark:
                 with self._at_mark:

@@ -43,6 +43,21 @@ class AppliedWrite:
 
 
 @dataclass(frozen=True, slots=True)
+class JournalQuery:
+    """Entries numbered above `after`, of keys that `pattern` (without realm) matches.
+
+    Those applied at `since_s` [s, Unix] or later, at most `limit` of them; the first, or with
+    `newest` the last.
+    """
+
+    after: int = 0
+    limit: int = 1000
+    pattern: str = "**"
+    since_s: float | None = None
+    newest: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Changes:
     """The newest write of every key that changed since a position, in the order of change.
 
@@ -81,8 +96,8 @@ class Store(Protocol):
         `position` "": from the beginning, which lists what is there now.
         """
 
-    def journal(self, prefix: str, after: int, limit: int, /) -> tuple[list[AppliedWrite], int]:
-        """At most `limit` changes numbered above `after` of keys under `prefix/`, oldest first.
+    def journal(self, realm: str, asked: JournalQuery, /) -> tuple[list[AppliedWrite], int]:
+        """What is asked for of the journal of the keys of `realm`, oldest first.
 
         Also the number of the newest entry there is, of any key.
         """

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+import random
 
 import msgspec
 import numpy as np
 import pytest
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
 
 from sim.errors import NoPath, NoStance
 from sim.files.mission_file import load_mission
 from sim.files.world_schema import WorldFile
 from sim.navigation import Navigator
 from sim.navigation.clearance import Clearance, segment_gap
+from sim.navigation.distance_field import DistanceField
 from sim.navigation.lattice import PITCH_M, WALL_M, Lattice
 from sim.navigation.routes import Route, Routes
 from sim.navigation.spots import Spots
@@ -80,6 +84,44 @@ def test_fields_are_distances_and_go_around_what_is_blocked() -> None:
     by_door = np.flatnonzero(np.abs(LATTICE.points_m[:, 0] - 4.0) < 0.31).tolist()
     shut = frozenset(n for n in by_door if abs(LATTICE.points_m[n][1] - 3.0) < 0.5)
     assert LATTICE.field(frozenset({goal}), shut)[start] == math.inf
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_distances_are_the_same_in_whatever_order_they_are_asked_for(seed: int) -> None:
+    """And those of scipy over the straight steps, where nothing is slanted or blocked."""
+    chance = random.Random(seed)
+    nodes = list(range(len(LATTICE)))
+    goals, blocked = frozenset(chance.sample(nodes, 3)), frozenset(chance.sample(nodes, 12))
+    straight = [tuple((v, PITCH_M, ()) for v in around) for around in LATTICE.neighbours]
+    everything = [
+        (*steps, *((w, PITCH_M * math.sqrt(2.0), corners) for w, corners in slanted.items()))
+        for steps, slanted in zip(straight, LATTICE.diagonals, strict=True)
+    ]
+    in_order = DistanceField(everything, goals, blocked)
+    expected = [in_order[node] for node in nodes]
+    at_random, asked = DistanceField(everything, goals, blocked), nodes.copy()
+    chance.shuffle(asked)
+    assert {node: at_random[node] for node in asked} == dict(enumerate(expected))
+    ones = np.ones(len(LATTICE.edges)) * PITCH_M
+    graph = coo_array((ones, LATTICE.edges.T), shape=(len(nodes), len(nodes)))
+    oracle = dijkstra(graph, directed=False, indices=sorted(goals), min_only=True)
+    field = DistanceField(straight, goals, frozenset())
+    assert [field[node] for node in nodes] == pytest.approx(oracle.tolist())
+
+
+def test_what_is_near_is_found_without_a_look_at_the_whole_floor() -> None:
+    class Counted(list):
+        looked_at = 0
+
+        def __getitem__(self, node):
+            Counted.looked_at += 1
+            return super().__getitem__(node)
+
+    steps = Counted(tuple((v, PITCH_M, ()) for v in around) for around in LATTICE.neighbours)
+    goal = LATTICE.neighbours.index(max(LATTICE.neighbours, key=len))
+    field = DistanceField(steps, frozenset({goal}), frozenset())
+    assert field[LATTICE.neighbours[goal][0]] == PITCH_M
+    assert Counted.looked_at <= 5 < len(LATTICE)
 
 
 def test_nobody_waits_in_a_door() -> None:

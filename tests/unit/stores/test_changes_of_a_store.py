@@ -7,7 +7,7 @@ import sqlite3
 from pathlib import Path
 
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.transport.store.storage import Changes, Write
+from keyexpr_schema.transport.store.storage import Changes, JournalQuery, Write
 
 PLACES = ["north/world/places/*"]
 
@@ -112,9 +112,9 @@ def test_a_store_of_the_first_format_is_taken_over(tmp_path):
             assert store.select("**") == [writes[1], writes[0]]
             assert names(store.changes(PLACES, "", 100)) == ["z", "a"]
             assert store.apply([write("gone", 2)]) == 0  # the tombstone holds
-            assert [e.number for e in store.journal("north", 0, 100)[0]] == [1, 2, 3]
+            assert [e.number for e in store.journal("north", JournalQuery(0, 100))[0]] == [1, 2, 3]
     with SqliteStore(Path(tmp_path)) as store:
         position = store.changes(PLACES, "", 100).position
         store.apply([write("n", 9)])
         assert names(store.changes(PLACES, position, 100)) == ["n"]
-        assert store.journal("north", 3, 100)[0][0].number == 4
+        assert store.journal("north", JournalQuery(3, 100))[0][0].number == 4

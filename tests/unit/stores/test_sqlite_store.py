@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from fleet.errors import StoreError, StoreInUse
-from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.transport.store.storage import Write
+from fleet.stores.sqlite import SqliteStore, StoreMemory
+from keyexpr_schema.transport.store.storage import JournalQuery, Write
 
 
 def write(name: str, time: int, *, deleted: bool = False, data: bytes = b"1") -> Write:
@@ -70,18 +70,20 @@ def test_a_wildcard_write_concerns_older_values_that_exist_and_no_others(tmp_pat
 
 
 def test_the_journal_tells_realms_apart_pages_and_forgets(tmp_path):
-    with SqliteStore(tmp_path, journal_limit=10, wall_time_s=lambda: 5.0) as store:
+    with SqliteStore(
+        tmp_path, memory=StoreMemory(journal_entries=10), wall_time_s=lambda: 5.0
+    ) as store:
         store.apply([write(f"p{number}", number) for number in range(1, 31)])
-        entries, last = store.journal("north", 0, 1000)
+        entries, last = store.journal("north", JournalQuery(0, 1000))
         assert [entry.number for entry in entries] == list(range(21, 31))
         assert last == 30
         assert {entry.wall_time_s for entry in entries} == {5.0}
-        assert [e.number for e in store.journal("north", 25, 2)[0]] == [26, 27]
-        assert store.journal("north", 25, 0) == ([], 30)
-        assert store.journal("south", 0, 1000) == ([], 30)
+        assert [e.number for e in store.journal("north", JournalQuery(25, 2))[0]] == [26, 27]
+        assert store.journal("north", JournalQuery(25, 0)) == ([], 30)
+        assert store.journal("south", JournalQuery(0, 1000)) == ([], 30)
     with SqliteStore(tmp_path) as store:
         store.apply([write("q", 99)])
-        assert store.journal("north", 30, 10)[0][0].number == 31
+        assert store.journal("north", JournalQuery(30, 10))[0][0].number == 31
 
 
 def test_a_write_without_a_timestamp_is_refused_and_nothing_of_its_batch_is_applied(tmp_path):
@@ -120,7 +122,7 @@ def test_full_synchronous_is_what_it_says(tmp_path, monkeypatch):
 
     monkeypatch.setattr("fleet.stores.sqlite.sqlite3.connect", connected)
     with SqliteStore(tmp_path, synchronous="FULL"):
-        (db,) = opened
+        db = opened[0]
         assert db.execute("PRAGMA synchronous").fetchone()[0] == 2
         assert db.execute("PRAGMA journal_mode").fetchone()[0] == "wal"
 
@@ -131,7 +133,7 @@ def test_every_applied_write_survives_kill_9(tmp_path, round_number):
     program = f"""
 from pathlib import Path
 from fleet.stores.sqlite import SqliteStore
-from keyexpr_schema.transport.store.storage import Write
+from keyexpr_schema.transport.store.storage import JournalQuery, Write
 with SqliteStore(Path({str(tmp_path)!r})) as store:
     for number in range(1, 10**9):
         key = f"north/world/places/p{{number % 50}}"

@@ -37,7 +37,21 @@ def test_a_goal_without_a_planner_is_stored_and_said_so(robotctl: Robotctl) -> N
     assert "known are: bring-the-first-cup-to-the-hallway-2" in robotctl("goal", "show", "x").err
     # Nothing of it can stand in a key; a planner with a language model may understand it.
     assert robotctl("goal", "add", "把杯子拿到走廊", "--json").data["goal"] == "goal"
-    assert robotctl("goal", "add", "把杯子拿到走廊", "--json").data["goal"] == "goal-2"
+    assert (
+        robotctl("goal", "add", "把杯子拿到走廊", "--json").data["goal"] == "goal-5"
+    )  # a refused one has had 3
+
+
+def test_numbers_of_goals_do_not_come_back(robotctl: Robotctl) -> None:
+    text = "Bring the first cup to the hallway."
+    goals = [robotctl("goal", "add", text, "--json").data["goal"] for _ in range(3)]
+    for goal in goals[1:]:
+        assert robotctl("goal", "delete", goal).code == 0
+    again = robotctl("goal", "add", text, "--json").data["goal"]
+    assert again == "bring-the-first-cup-to-the-hallway-4"
+    first, last = (row["spec"] for row in robotctl("goal", "list", "--json").data)
+    assert (first["ordinal"], last["ordinal"]) == (1, 4)
+    assert last["said_s"] > first["said_s"]
 
 
 async def _answer_goals(session: Session, state: GoalState, reason: str | None) -> None:

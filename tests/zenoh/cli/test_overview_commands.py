@@ -13,11 +13,13 @@ import pytest
 import zenoh
 
 from keyexpr_schema.keyspace import (
+    DIAGNOSTIC,
     GOAL_SPEC,
     GOAL_STATUS,
     UNDECODABLE,
 )
 from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState, GoalStatus
+from keyexpr_schema.payloads.system import Diagnostic, DiagnosticAddress
 from keyexpr_schema.transport.connecting import zenoh_config
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from tests.support.robotctl import Robotctl
@@ -49,7 +51,58 @@ def test_the_journal_tells_what_was_stored_in_order(robotctl: Robotctl) -> None:
     ]
     last = told["entries"][-1]["number"]
     assert robotctl("journal", "--after", str(last), "--json").data["entries"] == []
-    assert len(robotctl("journal", "--limit", "1", "--json").data["entries"]) == 1
+    (newest,) = robotctl("journal", "--limit", "1", "--json").data["entries"]
+    assert newest["number"] == last
+    (first,) = robotctl("journal", "--after", "0", "--limit", "1", "--json").data["entries"]
+    assert first["number"] == 1
+    of_one = robotctl("journal", "--key", "robots/locobot/*", "--json").data["entries"]
+    assert [e["keyexpr"] for e in of_one] == ["robots/locobot/spec"]
+    assert len(robotctl("journal", "--since", "1h", "--json").data["entries"]) == last
+    shown = robotctl("journal", "--since", "1h", "--key", "robots/hsr/**").out.splitlines()
+    assert "deleted" in shown[-1]
+    bad = robotctl("journal", "--key", "goals//spec")
+    assert (bad.code, "--key 'goals//spec' is no pattern of keys" in bad.err) == (1, True)
+    bad = robotctl("journal", "--since", "yesterday")
+    assert (bad.code, "neither a time" in bad.err) == (1, True)
+
+
+@pytest.mark.parametrize("flags", [[], ["--json"]])
+async def test_the_journal_is_followed_through_a_restart_of_the_router(
+    robotctl: Robotctl, router: RouterProcess, session_config: MakeConfig, flags: list[str]
+) -> None:
+    async with open_session(session_config()) as session:
+        for name in ("g1", "g2", "g3"):
+            await session.confirm(GOAL_SPEC, GoalAddress(name), Goal(goal=name, text="Bring it."))
+        child = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "cli.main", "journal", "--tail", "--limit", "2"),
+            *("--key", "goals/*/spec", *flags),
+            env={**robotctl.env, "PYTHONUNBUFFERED": "1"},
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+        )
+        assert child.stdout is not None
+        try:
+            async with asyncio.timeout(60):
+                lines = [(await child.stdout.readline()).decode() for _ in range(2)]
+                router.restart()
+                status = GoalStatus(goal="g4", state=GoalState.WAITING)
+                await session.confirm(GOAL_STATUS, GoalAddress("g4"), status, 30)
+                await session.delete(GOAL_SPEC, GoalAddress("g1"), 30)
+                lines.append((await child.stdout.readline()).decode())
+            child.send_signal(signal.SIGINT)
+            assert await child.wait() == 130
+        finally:
+            if child.returncode is None:
+                child.kill()
+                await child.wait()
+    if flags:
+        entries = [json.loads(line) for line in lines]
+        assert [e["keyexpr"][6:8] for e in entries] == ["g2", "g3", "g1"]
+    else:
+        assert [f"goals/g{n}/spec" in line for n, line in zip("231", lines, strict=True)] == [
+            True
+        ] * 3
+        assert "deleted" in lines[-1]
 
 
 async def test_status_tells_what_is_unreadable_as_long_as_it_is(
@@ -74,6 +127,30 @@ async def test_status_tells_what_is_unreadable_as_long_as_it_is(
         await session.delete(GOAL_SPEC, GoalAddress("g2"))
         status = (await robotctl.soon("status", "--json")).data
         assert {r["keyexpr"] for r in status["rejects"]} <= {"planner/status"}
+
+
+async def test_status_shows_what_is_wrong_with_the_planner(
+    robotctl: Robotctl, session_config: MakeConfig
+) -> None:
+    """A value that decodes and could not be used is shown for as long as it is there."""
+    goal = Goal(goal="g1", text="Bring the cup.")
+    wrong = Diagnostic(
+        component="planner", check="store", sentence="the planner cannot read", since_s=0.0
+    )
+    at = DiagnosticAddress("planner", "store")
+    async with open_session(session_config(component="planner")) as session:
+        await session.confirm(GOAL_SPEC, GoalAddress("g1"), goal)
+        await session.confirm(DIAGNOSTIC, at, wrong)
+        session.report_unusable(GOAL_SPEC, GoalAddress("g1"), goal, "it breaks the core")
+        status = (await robotctl.soon("status", "--json")).data
+        assert [r["reason"] for r in status["rejects"]] == ["it breaks the core"]
+        assert [d["sentence"] for d in status["diagnostics"]] == ["the planner cannot read"]
+        page = (await robotctl.soon("status")).out
+        assert "planner: the planner cannot read" in page and "it breaks the core" in page
+        await session.delete(DIAGNOSTIC, at)
+        await session.confirm(GOAL_SPEC, GoalAddress("g1"), Goal(goal="g1", text="Bring it."))
+        status = (await robotctl.soon("status", "--json")).data
+        assert status["rejects"] == status["diagnostics"] == []
 
 
 @pytest.mark.parametrize("flags", [[], ["--json"]])

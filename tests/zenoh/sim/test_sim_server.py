@@ -16,7 +16,7 @@ import pytest
 from keyexpr_schema.errors import NoReply
 from keyexpr_schema.keyspace import SIM_CLOCK, SIM_MOTION, SIM_SCENE, SIM_SENSES, SIM_TRUTH
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState
-from keyexpr_schema.payloads.simulation import MotionCall, SimAddress, SimRobotAddress
+from keyexpr_schema.payloads.simulation import MotionCall, SimAddress, SimClock, SimRobotAddress
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.embodiment import SimEmbodiment
 from sim.files.mission_file import load_mission
@@ -24,7 +24,7 @@ from sim.kinematic.backend import KinematicBackend, MotionModel
 from sim.server.sim_server import SimServer
 from tests.support.polling import until
 from tests.support.router_process import RouterProcess
-from workers.embodiment import Embodiment
+from workers.embodiment import Embodiment, SensingEmbodiment
 from workers.errors import RobotUnreachable
 
 Make = Callable[..., SessionConfig]
@@ -191,6 +191,44 @@ async def test_senses_truths_and_scene_are_published(session_config: Make) -> No
 async def until_stored(asker: Session) -> None:
     await until(lambda: asker.get(SIM_SCENE, SimAddress()), "the scene")
     await until(lambda: asker.list(SIM_TRUTH), "the truths")
+
+
+async def test_senses_are_pushed_so_that_nobody_has_to_ask(session_config: Make) -> None:
+    async with served(session_config, speed=4.0, step_s=0.05) as (_, asker):
+        async with SimEmbodiment(asker, "hsr", "i1") as body:
+            assert isinstance(body, SensingEmbodiment)
+            driving = asyncio.create_task(body.perform(TO_KITCHEN))
+            heard = []
+            async with asyncio.timeout(30.0):
+                while not heard or heard[-1].place != "kitchen":
+                    heard.append(await body.next_senses())
+            outcome = await driving
+            assert [one.time_s for one in heard] == sorted(one.time_s for one in heard)
+            assert any(one.moving for one in heard)
+            assert body.now_s() >= outcome.senses.time_s
+
+
+async def test_robots_of_a_session_share_a_clock_that_goes_back_with_the_simulation(
+    session_config: Make,
+) -> None:
+    def tick(time_s: float) -> None:
+        clock = SimClock(time_s=time_s, wall_time_s=time.time(), speed=None)
+        sim.put(SIM_CLOCK, SimAddress(), clock)
+
+    async with (
+        open_session(session_config(component="sim")) as sim,
+        open_session(session_config()) as asker,
+        SimEmbodiment(asker, "hsr", "i1") as one,
+    ):
+        async with SimEmbodiment(asker, "locobot", "i2") as other:
+            for time_s in (50.0, 51.0, 0.5):
+
+                def heard(time_s: float = time_s) -> bool:
+                    tick(time_s)
+                    return one.now_s() == other.now_s() == time_s
+
+                await until(heard, f"both to hear of {time_s:g} s")
+        await until(lambda: tick(2.0) or one.now_s() == 2.0, "the one that is left to hear")
 
 
 async def test_an_unknown_robot_is_named_together_with_those_there_are(

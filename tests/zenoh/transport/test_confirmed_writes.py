@@ -6,11 +6,14 @@ import asyncio
 
 import pytest
 
+from fleet.service.router_process import with_port
+from fleet.stores.sqlite import SqliteStore
 from keyexpr_schema.errors import Overtaken, Unconfirmed
 from keyexpr_schema.keyspace import GOAL_SPEC, STORE_JOURNAL, STORE_STAMPS
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.system import StoreAddress, StoreQuery, StoreStampsQuery
 from keyexpr_schema.transport.link import Link, Put
+from keyexpr_schema.transport.router import run_router
 from keyexpr_schema.transport.samples import stamp_of_text, timestamp_of_stamp
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from tests.support.plain_storage import plain_storage
@@ -142,3 +145,31 @@ async def test_who_gives_up_waiting_leaves_the_others_alone(router, session_conf
             return GoalAddress("g3") in await session.list(GOAL_SPEC, 10.0)
 
         await until(stored)
+
+
+async def test_a_flood_that_fills_the_stores_channel_ends_in_its_order(tmp_path, monkeypatch):
+    """The mark of a query waits its turn in a full channel, too, and nothing locks up."""
+    monkeypatch.setattr("keyexpr_schema.transport.store.server.CHANNEL", 4)
+    endpoint = with_port("tcp/127.0.0.1:0")
+    with SqliteStore(tmp_path) as store:
+        async with (
+            run_router((endpoint,), store=store),
+            open_session(SessionConfig((endpoint,))) as one,
+            open_session(SessionConfig((endpoint,))) as other,
+        ):
+
+            async def look() -> int:
+                return len(await other.list(GOAL_SPEC, 60.0))
+
+            looking = [asyncio.create_task(look()) for _ in range(20)]
+            for number in range(3000):
+                one.put(GOAL_SPEC, GoalAddress(f"g{number}"), goal(f"g{number}"))
+            await one.confirm(GOAL_SPEC, GoalAddress("last"), goal("last"), 60.0)
+            await asyncio.gather(*looking)
+            assert len(await other.list(GOAL_SPEC, 60.0)) == 3001
+            names = []
+            while len(names) < 3001:
+                asked = StoreQuery(after=len(names), limit=1000)
+                page = await other.query(STORE_JOURNAL, StoreAddress(), asked, 60.0)
+                names += [e.keyexpr.split("/")[1] for e in page.entries]
+            assert names == [*(f"g{n}" for n in range(3000)), "last"]

@@ -71,6 +71,38 @@ def test_a_sentence_that_no_model_understands_is_refused() -> None:
     assert "no task for robots" in (model.goal_states["g"].reason or "")
 
 
+def read_by_model(model: FleetModel) -> list[str]:
+    """Sentences that went to the language model."""
+    return [e.given.text for e in model.effects if isinstance(e, Interpret)]
+
+
+def test_a_sentence_that_has_changed_is_read_again_and_the_old_reading_counts_no_more() -> None:
+    model = fleet()
+    model.receive(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(interpreter=True))
+    for text in ("hum a tune", "whistle a tune"):
+        model.receive(events.GoalPut, goal=Goal(goal="g", text=text))
+    assert read_by_model(model) == ["hum a tune", "whistle a tune"]
+    stages = ((at("cup_1", "hallway"),),)
+    model.receive(events.GoalInterpreted, goal="g", text="hum a tune", stages=stages)
+    assert model.goal_state("g") is GoalState.READING
+    reason = "it is no task for robots"
+    model.receive(events.GoalInterpreted, goal="g", text="whistle a tune", reason=reason)
+    assert model.goal_state("g") is GoalState.REJECTED
+
+
+def test_a_reading_is_not_taken_for_a_sentence_that_the_grammar_has_read_since() -> None:
+    model = fleet()
+    model.receive(events.PlannerStarted, epoch=2, incarnation="x", policy=Policy(interpreter=True))
+    model.receive(events.GoalPut, goal=Goal(goal="g", text="hum a tune"))
+    model.receive(events.GoalPut, goal=Goal(goal="g", text="Bring cup 1 to the hallway"))
+    stages = ((at("cup_1", "living_room"),),)
+    model.receive(events.GoalInterpreted, goal="g", text="hum a tune", stages=stages)
+    assert [str(c) for c in model.goal_states["g"].conditions] == ["at(cup_1) = hallway"]
+    model.receive(events.GoalDeleted, goal="g")
+    model.receive(events.GoalPut, goal=Goal(goal="g", text="hum a tune"))
+    assert read_by_model(model) == ["hum a tune", "hum a tune"]
+
+
 def test_a_deleted_goal_leaves_the_plan() -> None:
     model = fleet()
     model.plan(*BOTH)

@@ -153,6 +153,21 @@ def test_tasks_added_while_a_plan_is_made_are_added_one_after_the_other() -> Non
     ]
 
 
+def test_a_task_that_was_added_outlives_a_plan_made_anew() -> None:
+    model = running()
+    model.late = False
+    add_task(model, "one", args={"to": "kitchen"}, robot="r1")
+    assert accepted(model, "one")
+    replan(model, "anew")
+    assert accepted(model, "anew")
+    assert [r.args["to"] for r in entry(model).current() if r.goal is None] == ["kitchen"]
+    model.finish()
+    done = [r for r in model.plans["plan-1"].records.values() if r.goal is None]
+    assert [r.robot for r in done if r.state is TaskState.SUCCEEDED] == ["r1"]
+    replied = model.replies["one"]
+    assert replied.accepted
+
+
 def test_a_task_to_be_done_after_one_that_is_dropped_meanwhile_is_refused() -> None:
     model = running(robots=1)
     gone = [r.task for r in entry(model).current() if r.goal == "g2"]

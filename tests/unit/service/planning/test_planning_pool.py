@@ -85,12 +85,47 @@ class Exits(Their):
     def act(self, problem):
         sys.exit("that was enough")
 
+class Closes(Their):
+    """Whatever is open, and goes on."""
+    name = "closes"
+    def act(self, problem):
+        os.closerange(3, 256)
+        while True:
+            pass
+
+class Leaves(Their):
+    """Somebody behind who keeps the pipe and is in no group of ours."""
+    name = "leaves"
+    def act(self, problem):
+        if os.fork() == 0:
+            os.setsid()
+            (HERE / "child-").write_text(str(os.getpid()))
+            (HERE / "child-").rename(HERE / "child")
+            signal.pause()
+        while not (HERE / "child").exists():
+            pass
+        os.kill(os.getpid(), signal.SIGKILL)
+
 class Swells(Their):
     name = "swells"
     def act(self, problem):
         bytearray(1 << 40)
 '''
-PLANNERS = ("Loops", "Starts", "Prints", "Crashes", "Waits", "Patient", "Exits", "Swells")
+PLANNERS = (
+    "Loops",
+    "Starts",
+    "Prints",
+    "Crashes",
+    "Waits",
+    "Patient",
+    "Exits",
+    "Swells",
+    "Closes",
+    "Leaves",
+)
+
+
+REASON = ReplanReason(scope=ReplanScope.ANEW, number=1, sentence="so")
 
 
 @pytest.fixture
@@ -133,7 +168,7 @@ async def pool(failures: Path | None = None) -> AsyncIterator[PlanningPool]:
 
 
 async def answer_of(running: PlanningPool) -> Answer:
-    async with asyncio.timeout(DEADLINE_S):
+    async with asyncio.timeout(3 * DEADLINE_S):  # it runs at low priority
         return await running.answers.get()
 
 
@@ -206,6 +241,26 @@ async def test_a_loop_without_end_is_answered_at_the_limit(site: Path) -> None:
         await plan(running, 2)
 
 
+async def test_a_process_that_closes_its_pipe_is_no_better_than_one_that_ended(site: Path) -> None:
+    async with pool() as running:
+        running.submit(given(1, "closes"))
+        answer = await answer_of(running)
+        assert isinstance(answer, PlanningFailed)
+        assert answer.reason == "the planning process ended (SIGKILL)"
+        await plan(running, 2)
+
+
+async def test_who_is_left_behind_with_the_pipe_holds_nobody_up(site: Path) -> None:
+    async with pool() as running:
+        running.submit(replace(given(1, "leaves"), limit_s=5.0))
+        try:
+            answer = await answer_of(running)
+            assert isinstance(answer, PlanningFailed)
+            await plan(running, 2)
+        finally:
+            os.kill(int((site / "child").read_text()), signal.SIGKILL)
+
+
 @pytest.mark.parametrize(
     ("planner", "reason"),
     [("exits", "that was enough"), ("swells", "MemoryError")],
@@ -229,16 +284,32 @@ async def test_what_a_planner_prints_is_no_answer(site: Path) -> None:
 
 async def test_a_running_plan_comes_first_and_a_dry_run_last(site: Path) -> None:
     os.mkfifo(site / "p1")
-    reason = ReplanReason(scope=ReplanScope.ANEW, number=1, sentence="so")
     async with pool() as running:
-        running.submit(given(1, "waits"))
+        running.submit(given(1, "waits", reason=REASON))
         running.submit(given(2, dry_run=True))
         running.submit(given(3))
-        running.submit(given(4, reason=reason))
+        running.submit(given(4, reason=REASON))
         await until(lambda: begun(site))
         await asyncio.to_thread((site / "p1").write_bytes, b"go")
         answers = [await answer_of(running) for _ in range(4)]
         assert [getattr(answer, "job", None) for answer in answers] == [1, 4, 3, 2]
+
+
+async def test_a_running_plan_waits_for_no_dry_run(site: Path) -> None:
+    for name in ("p1", "p2"):
+        os.mkfifo(site / name)
+    async with pool() as running:
+        running.submit(given(1, "waits", dry_run=True))
+        running.submit(given(2, "waits", dry_run=True))
+        await until(lambda: begun(site))
+        running.submit(given(3, reason=REASON))
+        answer = await answer_of(running)
+        assert isinstance(answer, PlanningSucceeded)
+        assert answer.job == 3
+        assert [name for name, _ in begun(site)] == ["p1"], "dry runs go one after the other"
+        for name in ("p1", "p2"):
+            await asyncio.to_thread((site / name).write_bytes, b"go")
+            assert isinstance(await answer_of(running), PlanningSucceeded)
 
 
 async def test_jobs_that_wait_for_others_go_on_beside_each_other_and_the_rest(site: Path) -> None:

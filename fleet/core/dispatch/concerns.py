@@ -19,15 +19,14 @@ class Concerns:
     """What may have come to be otherwise.
 
     `plans` are looked at as a whole; of others `goals` that may be reached and `tasks` that may be
-    ready. `robots` may be free, or planned with, now. With another `team` every plan may have to be
-    made again, but no goal is reached by that.
+    ready. `robots` may be free now; plans in `teams` may have more to work with.
     """
 
     plans: set[str] = field(default_factory=set)
+    teams: set[str] = field(default_factory=set)
     goals: defaultdict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     tasks: defaultdict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     robots: set[str] = field(default_factory=set)
-    team: bool = False
 
     @classmethod
     def of(cls, state: State, touches: Iterable[Touch]) -> Concerns:
@@ -36,7 +35,7 @@ class Concerns:
         for part, name, task in touches:
             match part:
                 case Part.TEAM:
-                    found.team = True
+                    found.teams.update(state.index.active)
                 case Part.ROBOT:
                     found.robots.add(name)
                 case Part.PLAN:

@@ -235,11 +235,6 @@ EVENTS: tuple[Happening, ...] = (
 )
 
 
-TEAM_CHANGES = {"worker_disconnected"}
-"""The names of all robots that can be planned with are one tuple: it is copied, which calls nothing
-and is told by its memory alone."""
-
-
 def _reports(run: CoreRun, event: Event, skill: str, state: ReportState) -> bool:
     if not isinstance(event, events.ReportReceived) or event.report.state is not state:
         return False
@@ -252,14 +247,11 @@ def costs(size: Size) -> dict[str, Cost]:
     return {happens.__name__: cost_of(*happens(run)) for happens in EVENTS}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: "{}-{}-{}".format(*size))
 def test_an_event_of_a_running_plan_costs_the_same_in_any_size(size: Size) -> None:
     least, most = costs(SMALLEST), costs(size)
     dearer = {
-        name: (least[name], most[name])
-        for name in least
-        if not alike(least[name], most[name], memory=name not in TEAM_CHANGES)
+        name: (least[name], most[name]) for name in least if not alike(least[name], most[name])
     }
     assert dearer == {}
 
@@ -292,16 +284,13 @@ def goals_told(count: int, sentence: bool) -> Cost:
     return cost_of(run.state, event)
 
 
-def alike(one: Cost, other: Cost, memory: bool = True) -> bool:
-    """Whether neither takes more than `FACTOR` times what the other does; `memory` counts, too."""
+def alike(one: Cost, other: Cost) -> bool:
+    """Whether neither takes more than `FACTOR` times what the other does."""
     return (
         max(one.calls, other.calls) <= FACTOR * min(one.calls, other.calls)
         and max(one.instructions, other.instructions)
         <= FACTOR * min(one.instructions, other.instructions)
-        and (
-            not memory
-            or max(one.bytes, other.bytes) <= FACTOR * min(one.bytes, other.bytes) + SLACK_BYTES
-        )
+        and max(one.bytes, other.bytes) <= FACTOR * min(one.bytes, other.bytes) + SLACK_BYTES
     )
 
 

@@ -6,7 +6,7 @@ a test.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
 import immutables
@@ -37,7 +37,7 @@ class FleetIndex(msgspec.Struct, frozen=True, eq=False):
     `work` has, by robot, the orders that may be carried out with it, `things_at` the subjects of
     `at` facts by value, `goals_about` the goals that have not ended by the subjects of their
     conditions, `plans_of` the active plans by goal. `in_state` has the goals that wait, or were
-    rejected. `team`, and as a set `available`, are the robots that can be planned with.
+    rejected. `team` are the robots that can be planned with.
     """
 
     active: Table[str, int] = Table()
@@ -46,8 +46,7 @@ class FleetIndex(msgspec.Struct, frozen=True, eq=False):
     goals_about: Sets = immutables.Map()
     plans_of: immutables.Map[str, tuple[str, ...]] = immutables.Map()
     in_state: immutables.Map[GoalState, Names] = immutables.Map()
-    team: tuple[str, ...] = ()
-    available: frozenset[str] = frozenset()
+    team: Names = EMPTY
 
     def __eq__(self, other: object) -> bool:
         # Derived: two states that are otherwise equal have equal indexes.
@@ -97,7 +96,7 @@ def index_of(
     goals: Mapping[str, Goal],
     goal_states: Mapping[str, GoalStatus],
     facts: Mapping[FactKey, Fact],
-    team: Collection[str],
+    team: Iterable[str],
 ) -> FleetIndex:
     """The index of these plans, goals and facts, derived anew."""
     work: dict[str, dict[Order, None]] = {}
@@ -127,8 +126,7 @@ def index_of(
         goals_about=goals_about,
         plans_of=immutables.Map({goal: tuple(names) for goal, names in plans_of.items()}),
         in_state=in_state,
-        team=tuple(team),
-        available=frozenset(team),
+        team=immutables.Map(dict.fromkeys(team)),
     )
 
 

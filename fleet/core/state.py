@@ -126,14 +126,14 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             places=self.places,
             objects=self.objects,
             robots=self.robots,
-            available=self.index.available,
+            available=self.index.team,
             facts=FactValues(self.facts),
             durations=self.durations,
         )
 
     def team(self) -> tuple[str, ...]:
         """The robots that can be planned with, in a fixed order."""
-        return self.index.team
+        return tuple(sorted(self.index.team))
 
     def ready(self, robot: str) -> bool:
         """Whether a robot can be planned with: connected, and what its hand holds is known."""

@@ -103,10 +103,11 @@ def robot_changed(state: State, robot: str) -> State:
     ready, team = state.ready(robot), state.index.team
     if ready == (robot in team):
         return state
-    team = tuple(sorted({*team, robot} if ready else {*team} - {robot}))
-    state = replace(state, team_number=state.team_number + ready)
-    index = replace(state.index, team=team, available=frozenset(team))
-    return touch(replace(state, index=index), Touch(Part.TEAM))
+    team = team.set(robot, None) if ready else team.delete(robot)
+    state = replace(state, index=replace(state.index, team=team))
+    if not ready:
+        return state
+    return touch(replace(state, team_number=state.team_number + 1), Touch(Part.TEAM))
 
 
 def touch(state: State, what: Touch) -> State:

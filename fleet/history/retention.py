@@ -82,13 +82,21 @@ class Retirement:
             before_s = time.time() - self._retention.days * _DAY_S
             pause_s = LOOK_S
             try:
-                while due := self._due(before_s):
-                    await self.end(due)
+                await self.end_due(before_s)
                 if timed:
                     await self._delete_goals(self._rejected(before_s, self._retention.count))
             except SchemaError as error:
                 log.warning("keys of what is over stay for now: %s", error)
                 pause_s = _RETRY_S
+
+    async def end_due(self, before_s: float) -> None:
+        """Delete the keys of what ended before a Unix time [s], and of all but the newest.
+
+        Raises:
+            Unconfirmed: some were still there after a while.
+        """
+        while due := self._due(before_s):
+            await self.end(due)
 
     def _due(self, before_s: float) -> list[Live]:
         count = self._retention.count

@@ -117,6 +117,10 @@ class Past:
         if records := _records(effects):
             self._archive.add(records)
 
+    def sync(self) -> None:
+        """Before a snapshot that knows nothing of it is kept: what is over outlives a power cut."""
+        self._archive.sync()
+
     async def inherit(self, wall_time_s: float) -> None:
         """Archive what an earlier planner left on the keys, and is over."""
         self._archive.add(await inherited(self._session, wall_time_s))

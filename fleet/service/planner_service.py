@@ -147,6 +147,7 @@ class PlannerService:
             except* Superseded as group:
                 raise group.exceptions[0] from None
             finally:
+                self._past.sync()
                 self._core.keep_last_snapshot(self._outbox.unconfirmed)
 
     def _at(self) -> At:
@@ -298,6 +299,8 @@ class PlannerService:
         while True:
             await asyncio.sleep(SNAPSHOT_CHECK_S)
             if self._core.snapshot_due(idle=self._core.replayable == before):
+                await asyncio.to_thread(self._past.sync)
+                self._past.sync()  # the little that was added meanwhile
                 await self._core.keep_snapshot(self._outbox.unconfirmed)
             before = self._core.replayable
 

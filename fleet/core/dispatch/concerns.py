@@ -19,10 +19,11 @@ class Concerns:
     """What may have come to be otherwise.
 
     `plans` are looked at as a whole; of others `goals` that may be reached and `tasks` that may be
-    ready. `robots` may be free, or planned with, now.
+    ready. `robots` may be free now; plans in `teams` may have more to work with.
     """
 
     plans: set[str] = field(default_factory=set)
+    teams: set[str] = field(default_factory=set)
     goals: defaultdict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     tasks: defaultdict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     robots: set[str] = field(default_factory=set)
@@ -34,7 +35,7 @@ class Concerns:
         for part, name, task in touches:
             match part:
                 case Part.TEAM:
-                    found.plans.update(state.index.active)
+                    found.teams.update(state.index.active)
                 case Part.ROBOT:
                     found.robots.add(name)
                 case Part.PLAN:

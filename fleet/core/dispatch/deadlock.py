@@ -10,13 +10,10 @@ from fleet.core.state import State
 def break_deadlock(state: State) -> State:
     """Where nobody moves, one task gets its robots in spite of reservations; what that upsets is
     planned again."""
-    if state.index.work and not state.gone_since:
+    if any(not lost(state, robot) for robot in state.index.work):
         return state
     alive = [state.plans[plan] for plan in by_priority(state, state.index.active)]
     if any(entry.job is not None for entry in alive):
-        return state
-    robots = (record.robot for entry in alive for record in entry.outstanding())
-    if any(robot is not None and not lost(state, robot) for robot in robots):
         return state
     for entry in alive:
         if not may_order(state, entry):

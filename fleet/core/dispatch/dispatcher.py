@@ -52,7 +52,7 @@ def _look_at(state: State, concerns: Concerns) -> State:
     """What is reached is marked, what is done ends, and what is ready is ordered: also while the
     plan is made again, as far as that does not touch it."""
     robots = sorted(concerns.robots)
-    concerned = {*concerns.plans, *concerns.goals, *concerns.tasks}
+    concerned = {*concerns.plans, *concerns.teams, *concerns.goals, *concerns.tasks}
     if robots:
         concerned.update(state.index.active)
     for plan in by_priority(state, concerned):
@@ -60,12 +60,12 @@ def _look_at(state: State, concerns: Concerns) -> State:
         if may_order(state, entry):
             goals = entry.plan.goals if whole else sorted(concerns.goals.get(plan, ()))
             state = _mark_reached(state, entry, goals)
-            if whole:
+            if whole or plan in concerns.teams:
                 state = _end_or_replan(state, state.plans[plan])
             entry = state.plans[plan]
             ready = (robot for robot in robots if robot in entry.index.ready)
             state = order_ready(state, plan, concerns.tasks.get(plan, ()), ready)
-        if whole:
+        if whole or plan in concerns.teams:
             state = _cancel_or_make_again(state, state.plans[plan])
     return state
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -54,7 +54,7 @@ class WorldModel:
     places: Mapping[str, Place] = field(default_factory=dict)
     objects: Mapping[str, Object] = field(default_factory=dict)
     robots: Mapping[str, RobotSpec] = field(default_factory=dict)
-    available: frozenset[str] = frozenset()
+    available: Collection[str] = frozenset()
     facts: Mapping[FactKey, Value] = field(default_factory=dict)
     durations: Mapping[str, Durations] = field(default_factory=dict)
     hopeless: tuple[Hopeless, ...] = ()
@@ -97,7 +97,7 @@ class WorldModel:
     @cached_property
     def team(self) -> tuple[str, ...]:
         """The robots that can get work now, in a fixed order."""
-        return tuple(sorted(self.available & self.robots.keys()))
+        return tuple(sorted(robot for robot in self.robots if robot in self.available))
 
     @cached_property
     def _hopeless(self) -> dict[Call, Hopeless]:

@@ -14,7 +14,7 @@ from fleet.language.phrases.noun_phrases import NounPhrases
 from fleet.language.phrases.subjects import THINGS, Subject, Subjects
 from fleet.language.refusals import listed, one_of
 from fleet.language.vocabulary import Vocabulary
-from fleet.language.words.lexicon import EntityType, Lexicon
+from fleet.language.words.lexicon import EntityType, lexicon_of
 from fleet.language.words.morphology import gerund
 from fleet.language.words.verb_senses import PARTICLES
 from fleet.language.words.wordlists import HOME, RELATIVE
@@ -36,7 +36,7 @@ class Moving:
 
     def __init__(self, text: str, vocabulary: Vocabulary, what: str = "a goal") -> None:
         self.vocabulary = vocabulary
-        self.cursor = Cursor(text, Lexicon(vocabulary), what)
+        self.cursor = Cursor(text, lexicon_of(vocabulary), what)
         self.nouns = NounPhrases(self.cursor)
         self.subjects = Subjects(self.cursor, self.nouns, vocabulary)
         self.locations = Locations(self.cursor, self.nouns, vocabulary)

@@ -20,7 +20,7 @@ class Heads:
 
     def __init__(self, cursor: Cursor) -> None:
         self.cursor = cursor
-        self.kind: tuple[Entity, ...] = ()  # whom "one" may mean in "the second one"
+        self._kind_of: Entity | None = None
 
     def noun_phrase(
         self,
@@ -52,7 +52,7 @@ class Heads:
     def is_pronoun_one(self) -> bool:
         """Whether "one" or "ones" stands for the kind that was spoken of last."""
         cursor = self.cursor
-        if cursor.ended or not self.kind:
+        if cursor.ended or self._kind_of is None:
             return False
         spoken = cursor.tokens[cursor.at].spoken
         behind = cursor.tokens[cursor.at - 1].word if cursor.at else ""
@@ -159,9 +159,14 @@ class Heads:
             )
         return chosen
 
+    @property
+    def kind(self) -> tuple[Entity, ...]:
+        """Whom "one" may mean in "the second one"."""
+        return () if self._kind_of is None else self.cursor.lexicon.kin(self._kind_of)
+
     def _remember_kind(self, entity: Entity) -> None:
         if entity.type in ("object", "robot"):
-            self.kind = self.cursor.lexicon.kin(entity)
+            self._kind_of = entity
 
     def unknown(self, start: int, what: str, types: Sequence[EntityType]) -> NotUnderstood:
         """The phrase that began at token `start` names nothing known."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections import defaultdict, deque
+from collections.abc import Iterable, Iterator, MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -22,9 +22,10 @@ CATEGORIES: dict[EntityType, tuple[str, ...]] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Entity:
-    """Something that has a name. A surface stands for the place that it belongs to."""
+    """Something that has a name; of each there is one in a lexicon. A surface stands for the place
+    that it belongs to."""
 
     id: str
     type: EntityType
@@ -50,9 +51,12 @@ class Lexicon:
         self._exact: dict[Phrase, list[Entity]] = defaultdict(list)
         self._kinds: dict[Phrase, tuple[bool, list[Entity]]] = {}
         self._by_word: dict[str, set[Entity]] = defaultdict(set)
+        self._by_kin: dict[tuple[EntityType, Phrase], list[Entity]] = defaultdict(list)
         for entity in self.entities:
             for name in entity.names:
                 self._exact[name].append(entity)
+            for kind in entity.kin:
+                self._by_kin[entity.type, kind].append(entity)
             for kind in entity.kinds:
                 self._kinds.setdefault(kind, (False, []))[1].append(entity)
                 for word in kind:
@@ -111,9 +115,10 @@ class Lexicon:
         self, tokens: Sequence[Token], at: int, types: Sequence[EntityType]
     ) -> tuple[int, tuple[Entity, ...]]:
         """The longest run of words that all occur in names or kinds of the same entities."""
-        end, found = at, {e for e in self.entities if e.type in types}
+        end, found = at, set[Entity]()
         while end < len(tokens) and (word := tokens[end].word) not in GRAMMAR_WORDS:
-            narrower = found & self._by_word.get(word, set())
+            named = self._by_word.get(word, set())
+            narrower = found & named if end > at else {e for e in named if e.type in types}
             if not narrower or number_of(word) is not None:
                 break
             end, found = end + 1, narrower
@@ -139,9 +144,8 @@ class Lexicon:
 
     def kin(self, entity: Entity) -> tuple[Entity, ...]:
         """All of the same kind; the entity too."""
-        own = entity.kin
-        kin = {e for e in self.entities if e.type == entity.type and (e == entity or own & e.kin)}
-        return tuple(sorted(kin, key=lambda e: e.rank))
+        kin = {e for kind in entity.kin for e in self._by_kin[entity.type, kind]}
+        return tuple(sorted({entity, *kin}, key=lambda e: e.rank))
 
     def starts_name(self, tokens: Sequence[Token], at: int) -> bool:
         """Whether a known name or kind starts at this token."""
@@ -162,6 +166,26 @@ class Lexicon:
                 for name in names:
                     if name not in self._exact:
                         self._exact[name] = list(meant)
+
+
+_KEPT: deque[tuple[Vocabulary, Lexicon]] = deque(maxlen=4)
+
+
+def lexicon_of(vocabulary: Vocabulary) -> Lexicon:
+    """The lexicon of a vocabulary: made once for the very same places, objects and robots, where
+    those mappings cannot change."""
+    for known, lexicon in _KEPT:
+        if (
+            known.places is vocabulary.places
+            and known.objects is vocabulary.objects
+            and known.robots is vocabulary.robots
+        ):
+            return lexicon
+    lexicon = Lexicon(vocabulary)
+    mappings = (vocabulary.places, vocabulary.objects, vocabulary.robots)
+    if not any(isinstance(names, MutableMapping) for names in mappings):
+        _KEPT.append((vocabulary, lexicon))
+    return lexicon
 
 
 def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:

@@ -116,6 +116,7 @@ COLUMNS: dict[str, Sequence[Column]] = {
             "ready after",
             lambda row: "not in 60 s" if row["ready_s"] is None else f"{row['ready_s']:.2f} s",
         ),
+        _number("cpu_s", ".2f", " s"),
         _number("rss_mb", ".0f", " MB"),
         _number("store_mb", ".1f", " MB"),
         _number("journal_mb", ".1f", " MB"),
@@ -217,8 +218,10 @@ def _table(part: str, about: dict[str, Any]) -> str:
 
 
 def _how(about: dict[str, Any]) -> str:
+    niceness = about.get("niceness", 0)
+    command = f"nice -n {niceness} {about['command']}" if niceness else about["command"]
     return (
-        f"`{about['command']}` at commit {about['commit']}: {about['took_s']:.0f} s on "
+        f"`{command}` at commit {about['commit']}: {about['took_s']:.0f} s on "
         f"{about['machine']}; load average {about['load_before']} before, "
         f"{about['load_after']} after."
     )

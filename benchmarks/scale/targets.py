@@ -108,7 +108,8 @@ def _ready(rows: Rows) -> str:
 
 
 def _seconds(row: dict[str, Any]) -> str:
-    return f"{row['ready_s']:.2f} s"
+    cpu_s = row.get("cpu_s")
+    return f"{row['ready_s']:.2f} s" + (f" ({cpu_s:.2f} s CPU)" if cpu_s else "")
 
 
 def _full(rows: Rows) -> str:

@@ -19,9 +19,9 @@ from rich.table import Table
 from fleet.core import events
 from fleet.core.effects import MakePlan
 from fleet.core.events import PlanningSucceeded
+from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.model.durations import FACTOR, MARGIN_S
 from fleet.core.plan_entry import PlanEntry
-from fleet.core.plan_index import OUTSTANDING
 from fleet.core.state import Policy, State
 from fleet.core.step import step
 from fleet.service.composition import Composition, compose

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.replan_reasons import GoalsAdded, ReplanAsked, TaskAdded
 from fleet.core.state import State
@@ -21,7 +22,6 @@ from fleet.core.state_updates import (
     set_entry,
     touch,
 )
-from fleet.core.touches import Part, Touch
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest, ReplanRequest

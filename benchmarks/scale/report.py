@@ -123,8 +123,8 @@ COLUMNS: dict[str, Sequence[Column]] = {
     ),
     "idle": (
         ("process", lambda row: row["process"]),
-        _number("reports", ",.0f", " reports stored"),
-        _number("robots", ",.0f", " robots"),
+        _number("reports"),
+        _number("robots"),
         ("of a core", lambda row: f"{100 * row['share_of_core']:.2f} %"),
         _number("rss_mb", ".0f", " MB"),
     ),
@@ -218,10 +218,8 @@ def _table(part: str, about: dict[str, Any]) -> str:
 
 
 def _how(about: dict[str, Any]) -> str:
-    niceness = about.get("niceness", 0)
-    command = f"nice -n {niceness} {about['command']}" if niceness else about["command"]
     return (
-        f"`{command}` at commit {about['commit']}: {about['took_s']:.0f} s on "
+        f"`{about['command']}` at commit {about['commit']}: {about['took_s']:.0f} s on "
         f"{about['machine']}; load average {about['load_before']} before, "
         f"{about['load_after']} after."
     )

@@ -68,7 +68,6 @@ def _measured(part: str, quick: bool) -> dict[str, Any]:
         "command": _command(),
         "machine": machine(),
         "commit": _commit(),
-        "niceness": os.nice(0),
         "load_before": round(load, 1),
         "load_after": round(os.getloadavg()[0], 1),
         "took_s": round(time.perf_counter() - began_s, 1),

@@ -164,14 +164,6 @@ class Errands:
         """The name of a task: of which goal in the plan's order, and which of its four."""
         return f"t{TASKS_A_GOAL * place + step + 1}"
 
-    def predecessor(self, task: str) -> str | None:
-        """The one task that another waits for; the robot's last one where it begins anew."""
-        place, step = divmod(int(task[1:]) - 1, TASKS_A_GOAL)
-        if step:
-            return self.task(place, step - 1)
-        earlier = place - self.robots
-        return None if earlier < 0 else self.task(earlier, TASKS_A_GOAL - 1)
-
 
 def _origin(number: int) -> str:
     return f"room_{number % ROOMS}"

@@ -54,12 +54,15 @@ class KeysRun:
     """When the order of a plan's task came to its worker."""
     reported: dict[tuple[str, str], float] = field(default_factory=dict)
     """When its worker put the report that it is done."""
+    latencies_s: list[float] = field(default_factory=list)
+    """From a robot's report that it is done to its next order, which waited for nothing else."""
     plans: dict[str, PlanState] = field(default_factory=dict)
     ended: dict[str, float] = field(default_factory=dict)
     goals: set[str] = field(default_factory=set)
     """Goals of which the planner has said something."""
     epoch: int = 0
     """The epoch of the newest order."""
+    _free_since: dict[str, float] = field(default_factory=dict)
     _reporting: set[asyncio.Task[None]] = field(default_factory=set)
     _news: asyncio.Event = field(default_factory=asyncio.Event)
 
@@ -75,6 +78,8 @@ class KeysRun:
                 now_s = time.perf_counter()
                 self.epoch = max(self.epoch, order.epoch)
                 if self.ordered.setdefault((order.plan, order.task), now_s) == now_s:
+                    if (free_s := self._free_since.pop(order.robot, None)) is not None:
+                        self.latencies_s.append(now_s - free_s)
                     task = asyncio.create_task(self._carry_out(order))
                     self._reporting.add(task)
                     task.add_done_callback(self._reporting.discard)
@@ -86,7 +91,8 @@ class KeysRun:
         if pace_s := self.pace_s():
             await asyncio.sleep(pace_s)
         report = replace(report, state=ReportState.SUCCEEDED, ended_s=began_s + errands.DURATION_S)
-        self.reported[order.plan, order.task] = time.perf_counter()
+        now_s = time.perf_counter()
+        self.reported[order.plan, order.task] = self._free_since[order.robot] = now_s
         await self.workers.confirm(REPORT, ReportAddress.of(report), report, CONFIRM_S)
 
     # --- what the operator sees ------------------------------------------------------------------

@@ -29,6 +29,12 @@ def _number(name: str, form: str = ",.0f", unit: str = "") -> Column:
     return name.replace("_", " "), cell
 
 
+def _of_cpu(row: Row) -> str:
+    """What there would be with nothing else on the machine, and one core."""
+    had_s = [row.get(f"{name}_cpu_s") for name in PROCESSES]
+    return "" if None in had_s else f"{row['done'] / sum(filter(None, had_s)):,.0f}"
+
+
 def _finished(row: Row) -> str:
     if row["finished"]:
         return "yes"
@@ -45,6 +51,7 @@ def _ms(name: str, title: str) -> tuple[Column, Column]:
     )  # type: ignore[return-value]
 
 
+PROCESSES = ("planner", "router", "robots")
 _SIZE = (_number("robots"), _number("tasks"))
 _PLANNED = ("until the first order", lambda row: f"{row['planned_s']:.1f} s")
 COLUMNS: dict[str, Sequence[Column]] = {
@@ -83,6 +90,8 @@ COLUMNS: dict[str, Sequence[Column]] = {
         ("to the end", _finished),
         _number("planner_cpu_s", ".1f", " s"),
         _number("router_cpu_s", ".1f", " s"),
+        _number("robots_cpu_s", ".1f", " s"),
+        ("tasks a second of all CPU", _of_cpu),
         _number("planner_rss_mb", ".0f", " MB"),
     ),
     "dispatch": (
@@ -107,14 +116,15 @@ COLUMNS: dict[str, Sequence[Column]] = {
             "ready after",
             lambda row: "not in 60 s" if row["ready_s"] is None else f"{row['ready_s']:.2f} s",
         ),
+        _number("cpu_s", ".2f", " s"),
         _number("rss_mb", ".0f", " MB"),
         _number("store_mb", ".1f", " MB"),
         _number("journal_mb", ".1f", " MB"),
     ),
     "idle": (
         ("process", lambda row: row["process"]),
-        _number("reports", ",.0f", " reports stored"),
-        _number("robots", ",.0f", " robots"),
+        _number("reports"),
+        _number("robots"),
         ("of a core", lambda row: f"{100 * row['share_of_core']:.2f} %"),
         _number("rss_mb", ".0f", " MB"),
     ),

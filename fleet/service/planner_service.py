@@ -123,7 +123,7 @@ class PlannerService:
             if first_run:
                 await self._past.inherit(self._at()["wall_time_s"])
                 self._apply(await prior_state(self._session, self._at()))
-            await self._take_charge()
+            await self._take_charge(first_run)
             await stack.enter_async_context(
                 self._session.token(PLANNER_ALIVE, PlannerAliveAddress(self._incarnation))
             )
@@ -138,6 +138,7 @@ class PlannerService:
                 ready.set()
             try:
                 async with asyncio.TaskGroup() as tasks:
+                    tasks.create_task(self._tell_what_it_can())
                     tasks.create_task(self._listen(watch))
                     tasks.create_task(self._watch_workers(tokens))
                     tasks.create_task(self._take_events())
@@ -153,21 +154,20 @@ class PlannerService:
     def _at(self) -> At:
         return self._clock.at()
 
-    async def _take_charge(self) -> None:
+    async def _take_charge(self, first_run: bool) -> None:
         """Take the next epoch: no two planners ever have the same, however they were started.
 
         What is there that is no status counts for nothing: it must not keep a planner from
-        starting.
+        starting. Until the planning process says what it can do, what an earlier run could stands.
         """
-        parts = await self._pool.ready()
+        if first_run:
+            await self._pool.ready()
 
         def next_epoch(status: PlannerStatus | None) -> PlannerStatus:
-            return PlannerStatus(
+            return replace(
+                status or PlannerStatus(epoch=0, incarnation=self._incarnation),
                 epoch=1 + max(self.state.epoch, status.epoch if status else 0),
                 incarnation=self._incarnation,
-                planners=tuple(parts.planners_wait_s),
-                strategies=parts.strategies,
-                allocators=tuple(parts.allocators_wait_s),
                 skills=tuple(self._skills),
             )
 
@@ -185,6 +185,22 @@ class PlannerService:
                 **self._at(),
             )
         )
+
+    async def _tell_what_it_can(self) -> None:
+        """Publish what planners and allocators there are, as soon as the planning process knows."""
+        can = await self._pool.ready()
+
+        def with_parts(status: PlannerStatus | None) -> PlannerStatus:
+            if status is None or status.incarnation != self._incarnation:
+                return status or PlannerStatus(epoch=0, incarnation=self._incarnation)
+            return replace(
+                status,
+                planners=tuple(can.planners_wait_s),
+                strategies=can.strategies,
+                allocators=tuple(can.allocators_wait_s),
+            )
+
+        await self._session.update(PLANNER_STATUS, PlannerAddress(), with_parts, timeout_s=CHARGE_S)
 
     async def _catch_up(
         self, watch: Watch, tokens: TokenWatch[Any], concluded: Collection[FactKey]

@@ -18,7 +18,7 @@ from fleet.core.events import Event
 
 ROBOTS = (10, 50, 200, 1000)
 TASKS = (100, 1000, 10_000)
-LIMIT_S = 15.0
+LIMIT_S = 30.0
 
 
 def measure(quick: bool) -> list[dict[str, Any]]:

@@ -39,7 +39,7 @@ async def _run(robots: int, tasks: int) -> dict[str, Any]:
             await run.propose(wanted)
             await run.until(lambda: bool(run.ordered) or "p" in run.ended, PLANNED_S)
             first_s = time.perf_counter()
-            had_s = fleet.planner.cpu_s(), fleet.router.cpu_s()
+            had_s = fleet.planner.cpu_s(), fleet.router.cpu_s(), time.process_time()
             await run.until(lambda: "p" in run.ended, LIMIT_S)
             took_s = run.ended.get("p", time.perf_counter()) - first_s
             done = run.done("p")
@@ -54,5 +54,6 @@ async def _run(robots: int, tasks: int) -> dict[str, Any]:
                 "finished": "p" in run.ended and done == tasks,
                 "planner_cpu_s": fleet.planner.cpu_s() - had_s[0],
                 "router_cpu_s": fleet.router.cpu_s() - had_s[1],
+                "robots_cpu_s": time.process_time() - had_s[2],
                 "planner_rss_mb": fleet.planner.rss_mb(),
             }

@@ -166,10 +166,10 @@ async def test_a_cup_that_is_not_there_is_not_looked_for_for_ever(fleet_of: Make
 
 async def test_a_cancelled_order_stops_the_robot(fleet_of: MakeFleet) -> None:
     async with fleet_of() as fleet, fleet.worker("hsr"):
+        fleet.world.paused = True  # it sets out, and is not there before all of this has happened
         order = await fleet.order("hsr", "t1", "navigate", to="kitchen")
         waiting = await fleet.order("hsr", "t2", "navigate", to="hallway")
         await fleet.report(order, ReportState.STARTED)
-        fleet.world.paused = True
         await fleet.order("hsr", "t2", "navigate", to="hallway", cancelled=True)
         dropped = await fleet.report(waiting)
         assert dropped.state is ReportState.CANCELLED and dropped.tries == ()
@@ -196,9 +196,9 @@ async def test_what_is_not_done_by_its_deadline_has_failed(fleet_of: MakeFleet) 
 
 async def test_an_order_that_is_withdrawn_before_its_start_is_dropped(fleet_of: MakeFleet) -> None:
     async with fleet_of() as fleet, fleet.worker("hsr"):
+        fleet.world.paused = True
         first = await fleet.order("hsr", "t1", "navigate", to="kitchen")
         await fleet.report(first, ReportState.STARTED)
-        fleet.world.paused = True
         await fleet.order("hsr", "t2", "pick", object="cup_1", place="kitchen")
         await fleet.session.delete(ORDER, OrderAddress("hsr", "p", "t2"))
         third = await fleet.order("hsr", "t3", "navigate", to="hallway")
@@ -298,8 +298,10 @@ async def first_report(fleet: Fleet, **fixed: str) -> Report:
 
 async def test_orders_that_make_no_sense_disturb_nobody(fleet_of: MakeFleet) -> None:
     async with fleet_of() as fleet, fleet.worker("hsr"):
+        fleet.world.paused = True
         running = await fleet.order("hsr", "t1", "navigate", to="kitchen")
         await fleet.report(running, ReportState.STARTED)
+        fleet.world.paused = False
         keys = [ORDER.build(OrderAddress("hsr", "p", f"bad{n}")) for n in (1, 2, 3)]
         zeroth = replace(running, task="bad2", attempt=0)
         huge = replace(running, task="bad3", epoch=2**70)
@@ -325,9 +327,11 @@ async def test_orders_that_make_no_sense_disturb_nobody(fleet_of: MakeFleet) -> 
 
 async def test_a_later_attempt_takes_the_place_of_the_one_that_runs(fleet_of: MakeFleet) -> None:
     async with fleet_of() as fleet, fleet.worker("hsr"):
+        fleet.world.paused = True
         first = await fleet.order("hsr", "t1", "navigate", to="kitchen")
         await fleet.report(first, ReportState.STARTED)
         second = await fleet.order("hsr", "t1", "navigate", attempt=2, to="hallway")
+        fleet.world.paused = False
         assert (await fleet.report(first)).state is ReportState.CANCELLED
         assert (await fleet.report(second)).state is ReportState.SUCCEEDED
         late = await fleet.order("hsr", "t1", "navigate", attempt=1, epoch=2, to="kitchen")
@@ -390,9 +394,9 @@ async def test_a_report_survives_a_router_that_was_away(
     fleet_of: MakeFleet, router: RouterProcess
 ) -> None:
     async with fleet_of() as fleet, fleet.worker("hsr") as worker:
+        fleet.world.paused = True
         order = await fleet.order("hsr", "t1", "navigate", to="kitchen")
         await fleet.report(order, ReportState.STARTED)
-        fleet.world.paused = True
         router.kill()
         fleet.world.paused = False
         async with asyncio.timeout(DEADLINE_S):
@@ -411,6 +415,7 @@ async def test_a_worker_that_is_told_to_end_says_what_it_leaves_behind(
 ) -> None:
     async with fleet_of() as fleet:
         async with fleet.worker("hsr"):
+            fleet.world.paused = True
             order = await fleet.order("hsr", "t1", "navigate", to="kitchen")
             await fleet.report(order, ReportState.STARTED)
         report = await fleet.report(order)
@@ -418,6 +423,7 @@ async def test_a_worker_that_is_told_to_end_says_what_it_leaves_behind(
         assert not fleet.world.backend.senses("hsr").moving
         state = await state_of(fleet, "hsr", lambda s: s.activity is RobotActivity.STOPPED)
         assert state.place != "kitchen"
+        fleet.world.paused = False
         async with fleet.worker("hsr"):  # the order still stands, and is not begun again
             other = await fleet.order("hsr", "t2", "navigate", to="hallway")
             assert (await fleet.report(other)).state is ReportState.SUCCEEDED

@@ -273,7 +273,10 @@ def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State | st
             return f"the new task cannot wait for {before}: plan {ask.plan} has {tasks}"
     if "robot" in ask.args:
         robot = ask.args["robot"]
-        return f"name the robot that does it as the request's robot, not as robot={robot}"
+        return (
+            f"who does the task is no argument: instead of robot={robot} give the robot by itself "
+            f"(`robotctl task add … --robot {robot}`)"
+        )
     wish = TaskAdded(
         request=ask.request, skill=ask.skill, args=ask.args, after=ask.after, robot=ask.robot
     )

@@ -69,6 +69,11 @@ COLUMNS: dict[str, Sequence[Column]] = {
         ("ended plans behind it", lambda row: f"{row['ended']}"),
         ("a task starts", lambda row: f"{row['task_started_ms']:.3f} ms"),
         ("a task ends", lambda row: f"{row['task_ended_ms']:.3f} ms"),
+        ("a goal is told", lambda row: f"{row['goal_ms']:.3f} ms" if "goal_ms" in row else ""),
+        (
+            "as a sentence",
+            lambda row: f"{row['sentence_ms']:.3f} ms" if "sentence_ms" in row else "",
+        ),
         ("a report again", lambda row: f"{row['said_again_ms']:.3f} ms"),
         ("own fact comes back", lambda row: f"{row['own_fact_ms']:.3f} ms"),
         ("a timer", lambda row: f"{row['timer_ms']:.3f} ms"),

@@ -289,14 +289,14 @@ def record(
     from cli.demo.child_processes import end_with_parent
     from cli.errors import BadArgument
     from fleet.timeline.process import run_recorder
-    from fleet.timeline.rolling import BadRolling, rolling
+    from fleet.timeline.rolling import BadRolling, parse_rolling
 
     if keep is not None and roll_every is None:
         raise BadArgument("--keep is for recordings that roll; say --roll-every, too")
     if view and roll_every is not None:
         raise BadArgument("--view shows one recording; leave out --roll-every")
     try:
-        rolls = None if roll_every is None else rolling(roll_every, keep)
+        rolls = None if roll_every is None else parse_rolling(roll_every, keep)
     except BadRolling as error:
         raise BadArgument(f"--roll-every: {error}") from None
     end_with_parent()

@@ -24,7 +24,7 @@ else:
             "process": "run_recorder",
             "reader": "RecordingSummary Row rows summary",
             "recorder": "Recorder",
-            "rolling": "BadRolling Rolling rolling",
+            "rolling": "BadRolling Rolling parse_rolling",
             "screenshot": "save_screenshot",
         },
     )

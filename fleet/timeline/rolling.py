@@ -31,7 +31,7 @@ class Rolling:
     keep: int | None = None
 
 
-def rolling(every: str, keep: int | None = None) -> Rolling:
+def parse_rolling(every: str, keep: int | None = None) -> Rolling:
     """What `30min`, `2h`, `500MB` or `2GB` means; the latest `keep` files stay, or all.
 
     Raises:

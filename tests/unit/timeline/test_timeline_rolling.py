@@ -13,7 +13,7 @@ from fleet.timeline.drawing.gantt import LOOKS, Bar, Lane
 from fleet.timeline.drawing.sink import open_stream
 from fleet.timeline.reader import rows, summary
 from fleet.timeline.recorder import Recorder
-from fleet.timeline.rolling import BadRolling, Rolling, RollingFiles, rolling
+from fleet.timeline.rolling import BadRolling, Rolling, RollingFiles, parse_rolling
 from keyexpr_schema import keyspace as keys
 from keyexpr_schema.payloads.plans import PlanAddress, PlanState
 from keyexpr_schema.payloads.simulation import SimAddress, SimClock
@@ -141,25 +141,25 @@ def test_each_file_is_complete_in_itself(tmp_path: Path) -> None:
     ],
 )
 def test_when_to_roll_is_a_time_or_a_size(every: str, meant: Rolling) -> None:
-    assert rolling(every) == meant
+    assert parse_rolling(every) == meant
 
 
 @pytest.mark.parametrize("every", ["", "30", "min", "0min", "-1h", "5 minutes", "1e3MB", "nanMB"])
 def test_what_is_neither_is_told(every: str) -> None:
     with pytest.raises(BadRolling, match=re.escape(f"{every!r} is no time and no size")):
-        rolling(every)
+        parse_rolling(every)
 
 
 def test_less_than_one_file_cannot_be_kept() -> None:
     with pytest.raises(BadRolling, match="keep at least 1"):
-        rolling("1h", 0)
+        parse_rolling("1h", 0)
 
 
 def test_files_are_numbered_on_and_the_oldest_go(tmp_path: Path) -> None:
     now: list[Any] = [100.0]
     for name in ("m-0007.rrd", "m-0003.rrd", "m-12.rrd", "other-0001.rrd", "m-0001.rrd.bak"):
         (tmp_path / name).touch()
-    files = RollingFiles(tmp_path / "m.rrd", rolling("1min", 2), lambda: now[0])
+    files = RollingFiles(tmp_path / "m.rrd", parse_rolling("1min", 2), lambda: now[0])
     assert files.due()
     files.next().touch()
     files.drop_oldest()

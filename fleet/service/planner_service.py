@@ -107,6 +107,11 @@ class PlannerService:
         async with AsyncExitStack() as stack:
             await stack.enter_async_context(self._outbox.running())
             await stack.enter_async_context(self._past.running())
+            scenes = await self._session.list(SIM_SCENE)
+            self._clock.resume(self.state.time_s, bool(scenes))
+            if first_run:  # before the watch: it asks for the reports of the plans that are open
+                await self._past.inherit(self._at()["wall_time_s"])
+                self._apply(await prior_state(self._session, self._at()))
             watch = await stack.enter_async_context(
                 self._session.watch(
                     *(key for key in WATCHED if key is not REPORT),
@@ -118,11 +123,6 @@ class PlannerService:
                 )
             )
             tokens = await stack.enter_async_context(self._session.watch_tokens(ROBOT_ALIVE))
-            scenes = await self._session.list(SIM_SCENE)
-            self._clock.resume(self.state.time_s, bool(scenes))
-            if first_run:
-                await self._past.inherit(self._at()["wall_time_s"])
-                self._apply(await prior_state(self._session, self._at()))
             await self._take_charge(first_run)
             await stack.enter_async_context(
                 self._session.token(PLANNER_ALIVE, PlannerAliveAddress(self._incarnation))

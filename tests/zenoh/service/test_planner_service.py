@@ -126,6 +126,24 @@ async def test_a_planner_that_lost_its_journal_cancels_what_the_other_ordered(
             await until(gone, "the order is withdrawn")
 
 
+async def test_a_planner_that_lost_its_journal_hears_what_was_reported_before_it_came(
+    router: RouterProcess, tmp_path: Path
+) -> None:
+    async with person(router.endpoint) as session:
+        async with planner(router.endpoint, tmp_path / "one") as first:
+            await ask_for_plan(session)
+            order = await next_order(session, set())
+            first.kill()
+        shutil.rmtree(tmp_path / "one")
+        await carry_out(session, order)
+        async with planner(router.endpoint, tmp_path / "two"):
+
+            async def gone() -> bool:
+                return await session.get(ORDER, OrderAddress.of(order)) is None
+
+            await until(gone, "the order is withdrawn")
+
+
 async def test_durations_are_learned_and_outlive_the_planners_journal(
     router: RouterProcess, tmp_path: Path
 ) -> None:

@@ -27,7 +27,7 @@ imports: $(VENV)/development ## which package may import which
 
 check: lint types imports test ## everything that CI runs
 
-bench: $(VENV)/development ## measure key-space, planner, running plan and start; prints tables
+bench: $(VENV)/development ## measure planner, running plan and start; prints tables
 	for file in benchmarks/bench_*.py; do $(BIN)/python $$file || exit 1; done
 
 bench-planning: $(VENV)/development ## the suite of household missions; writes docs/benchmarks/planning.md

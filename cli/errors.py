@@ -43,12 +43,12 @@ class TooLate(CliError):
 
 
 HOW_TO_ADD = {
-    "goal": "say one with `robotctl goal add`",
-    "plan": "make one with `robotctl plan create`",
+    "goal": "say one with `robotctl goal add`, or see what is over with `robotctl history`",
+    "plan": "make one with `robotctl plan create`, or see what is over with `robotctl history`",
     "robot": "declare one with `robotctl register FILE`",
     "place": "tell one with `robotctl world add --place`",
 }
-"""Where there is none of a kind yet: how there comes to be one."""
+"""Where there is none of a kind yet: how there comes to be one, or where they have gone."""
 
 
 def check_known(what: str, name: str, known: Iterable[str], how_to_add: str = "") -> None:
@@ -64,7 +64,7 @@ def check_known(what: str, name: str, known: Iterable[str], how_to_add: str = ""
     if not names:
         how_to_add = how_to_add or HOW_TO_ADD.get(what, "")
         how = f"; {how_to_add}" if how_to_add else ""
-        raise Unknown(f"there is no {what} {name!r}: none is known yet{how}")
+        raise Unknown(f"there is no {what} {name!r}: there is none now{how}")
     raise Unknown(
         f"there is no {what} {name!r}{near_miss(name, names)}; known are: {', '.join(names)}"
     )

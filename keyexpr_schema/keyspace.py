@@ -117,7 +117,7 @@ PLAN_SPEC = Key(
 )
 PLAN_PROPOSAL = Key(
     "plan_proposal", "plans/{plan}/proposal", plans.PlanAddress, plans.Plan,
-    delivery=STORED, writers=PERSON, readers=PLANNER,
+    delivery=STORED, writers=PERSON, readers=PLANNER | PERSON,
     about="A plan that somebody wants checked, allocated and carried out.",
 )
 PLAN_STATUS = Key(

@@ -11,6 +11,7 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+from cli.demo.child_processes import END_WITH_STDIN
 from fleet.service.router_process import with_port
 
 REALM = "benchmark"
@@ -39,8 +40,10 @@ class Child:
             self._process = await asyncio.create_subprocess_exec(
                 sys.executable,
                 *self._command,
+                stdin=asyncio.subprocess.PIPE,  # ends when we do, however, and the child with it
                 stdout=asyncio.subprocess.PIPE,
                 stderr=log,
+                env={**os.environ, END_WITH_STDIN: "1"},
                 start_new_session=True,
             )
         assert self._process.stdout is not None
@@ -160,9 +163,9 @@ class Processes:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.endpoint = with_port("tcp/127.0.0.1:0")
-        self.router = Child(
-            "router", folder, ("router listening",),
-            "-m", "fleet.service.router_process", self.endpoint, str(folder / "router"),
+        self.router = self.robotctl(
+            "router", ("router listening",),
+            "router", "--listen", self.endpoint, "--data", str(folder / "router"),
         )  # fmt: skip
         self.planner = self.robotctl(
             "planner", ("planner ready",), "planner", "--data", str(folder / "planner")

@@ -76,8 +76,8 @@ def _measured(part: str, quick: bool) -> dict[str, Any]:
 
 
 def _command() -> str:
-    """What was called, wherever results were to go."""
-    own = [Path(word).name if "/" in word else word for word in sys.argv[1:]]
+    """What was called; of folders the last two parts, wherever they lie."""
+    own = ["/".join(Path(word).parts[-2:]) if "/" in word else word for word in sys.argv[1:]]
     return " ".join(["python -m benchmarks.scale.run", *own])
 
 

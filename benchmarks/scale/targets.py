@@ -108,7 +108,8 @@ def _ready(rows: Rows) -> str:
 
 
 def _seconds(row: dict[str, Any]) -> str:
-    return f"{row['ready_s']:.2f} s"
+    cpu_s = row.get("cpu_s")
+    return f"{row['ready_s']:.2f} s" + (f" ({cpu_s:.2f} s CPU)" if cpu_s else "")
 
 
 def _full(rows: Rows) -> str:
@@ -140,9 +141,15 @@ def _idle_workers(rows: Rows) -> str:
             if row["process"].startswith("worker")
         ]
         said.append(
-            f"{robots} robots in {len(shares)} processes: {100 * sum(shares) / robots:.2f} % each"
+            f"{_counted(robots, 'robot')}, {_counted(len(shares), 'process')}: "
+            f"{100 * sum(shares) / robots:.2f} % each"
         )
     return "; ".join(said) or NOTHING
+
+
+def _counted(number: int, thing: str) -> str:
+    many = f"{thing}es" if thing.endswith("s") else f"{thing}s"
+    return f"{number} {thing if number == 1 else many}"
 
 
 def _physics(rows: Rows) -> str:
@@ -179,7 +186,7 @@ def _recorder(rows: Rows) -> str:
 
 ROWS = (
     Target("tasks a second through `step` alone: 50 robots x 1,000 tasks · 50 x 10,000 · "
-           "1,000 x 10,000", "", "core", _tasks_a_second),
+           "1,000 x 10,000", "as below", "core", _tasks_a_second),
     Target("tasks a second from end to end over Zenoh: 50 x 1,000 · 50 x 10,000 · "
            "1,000 x 10,000", "≥ 500 · ≥ 500 · ≥ 300, to the end", "keys", _tasks_a_second),
     Target("an event of a running plan of 1,000 · 10,000 tasks (`step` alone, the dearest)",

@@ -13,8 +13,9 @@ from typing import Any
 
 from msgspec.structs import asdict
 
+from fleet.core.indexes.plan_index import OUTSTANDING
+from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry
-from fleet.core.plan_index import OUTSTANDING
 from fleet.core.planning_input import (
     InterpretationInput,
     PlanningInput,
@@ -22,7 +23,6 @@ from fleet.core.planning_input import (
     planning_input,
 )
 from fleet.core.state import State
-from fleet.core.touches import Part, Touch
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
     ANSWER,

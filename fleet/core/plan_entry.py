@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import msgspec
 from msgspec.structs import replace
 
+from fleet.core.indexes.plan_index import EMPTY_INDEX, PlanGraph, PlanIndex
 from fleet.core.model.skills import Skills
 from fleet.core.model.world import Hopeless
-from fleet.core.plan_index import EMPTY_INDEX, PlanGraph, PlanIndex
 from fleet.core.replan_reasons import ReplanReason, ReplanScope, TaskAdded, Wish
 from fleet.core.table import Table
 from keyexpr_schema.facts import FactKey

@@ -5,14 +5,14 @@ from __future__ import annotations
 import msgspec
 from msgspec.structs import replace
 
-from fleet.core.fact_views import FactValues, Resting, Whereabouts
-from fleet.core.fleet_index import NO_FLEET, FleetIndex, index_of
+from fleet.core.indexes.fact_views import FactValues, Resting, Whereabouts
+from fleet.core.indexes.fleet_index import NO_FLEET, FleetIndex, index_of
+from fleet.core.indexes.plan_index import EMPTY_INDEX
+from fleet.core.indexes.touches import UNTOUCHED, Touches
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import PlanEntry, PlanningJob
-from fleet.core.plan_index import EMPTY_INDEX
 from fleet.core.table import Table
-from fleet.core.touches import UNTOUCHED, Touches
 from fleet.language import Vocabulary
 from fleet.language.vocabulary import SkillPhrase
 from keyexpr_schema.facts import HOLDING, FactKey

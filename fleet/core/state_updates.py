@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 from msgspec.structs import replace
 
-from fleet.core.fleet_index import (
+from fleet.core.indexes.fleet_index import (
     NO_ORDERS,
     UNPLANNED,
     FleetIndex,
@@ -19,11 +19,11 @@ from fleet.core.fleet_index import (
     priority_of,
     subjects_of,
 )
+from fleet.core.indexes.plan_index import OUTSTANDING, robots_of
+from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry
-from fleet.core.plan_index import OUTSTANDING, robots_of
 from fleet.core.state import State
 from fleet.core.table import Table
-from fleet.core.touches import Part, Touch
 from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, Violation

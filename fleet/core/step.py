@@ -26,10 +26,10 @@ from fleet.core.handlers import (
     statements,
     world,
 )
+from fleet.core.indexes.touches import UNTOUCHED, Part, Touch
 from fleet.core.over import SINCE_LOGIC, everything_perhaps_over, let_go
 from fleet.core.state import State
 from fleet.core.state_updates import touch
-from fleet.core.touches import UNTOUCHED, Part, Touch
 
 
 def _planner_started(state: State, event: events.PlannerStarted) -> State:

@@ -15,12 +15,13 @@ from fleet.core import events
 from fleet.core.effects import Effect, Publish, Retract
 from fleet.core.events import Event, encode_event
 from fleet.core.model.skills import SkillModel
-from fleet.core.state import State
+from fleet.core.state import LOGIC, State
 from fleet.core.step import step
 from fleet.service.event_journal import EventJournal
 from fleet.service.recovery import Recovered, recover
 from fleet.service.snapshots import Snapshot
 from keyexpr_schema.keyspace import FACT
+from keyexpr_schema.payloads.world import FactAddress
 
 SNAPSHOT_EVERY = 1000
 """Events between two snapshots: replaying them takes some tenths of a second."""
@@ -61,13 +62,17 @@ class JournaledCore:
     ) -> Recovered:
         """Come back to where the journal ends; `skills` are for journals that have none.
 
-        `on_effects` gets what was to be done about each event, and perhaps was not.
+        `on_effects` gets what was to be done about each event, and perhaps was not. What another
+        logic of the core has led to is kept as a snapshot: this logic does not go over it again.
 
         Raises:
             JournalUnreadable: another version of the program wrote it.
         """
         recovered = recover(self._journal, skills, on_effects)
         self._state, self._replayable = recovered.state, recovered.replayed
+        if recovered.state.logic != LOGIC:
+            concluded = (Retract(FACT, FactAddress.of(key)) for key in recovered.concluded)
+            self.keep_last_snapshot((*recovered.retracted, *concluded))
         return recovered
 
     def apply(self, event: Event) -> tuple[Effect, ...]:

@@ -83,41 +83,62 @@ async def _record(config: SessionConfig, out: Path, view: bool) -> None:
 async def _follow(watch: Watch, recorder: Recorder, live: bool) -> None:
     """Hand changes to the recorder until cancelled; what was stored first, as it was written."""
     loop = asyncio.get_running_loop()
-    backlog: list[Change[Any, Any]] | None = []
-    give_up_at = loop.time() + BACKLOG_S
-    synced = asyncio.ensure_future(watch.synced())
-    following = asyncio.ensure_future(anext(watch))
+    inbox = _Inbox(recorder)
     flush_s, poses_s = (LIVE_FLUSH_S, LIVE_FLUSH_S) if live else (FLUSH_S, POSES_S)
-    flush_at, poses_at = loop.time() + flush_s, loop.time() + poses_s
+    poses_at = loop.time() + poses_s
+    taking = asyncio.create_task(inbox.take(watch))
+    settling = asyncio.create_task(inbox.settle(watch))
     try:
-        while True:
-            await asyncio.wait(
-                {following},
-                timeout=IDLE_S if backlog is not None else max(0.0, flush_at - loop.time()),
-            )
-            idle = not following.done()
-            if not idle:
-                change = following.result()
-                if backlog is None:
-                    recorder.record(change)
-                else:
-                    backlog.append(change)
-                following = asyncio.ensure_future(anext(watch))
-            now = loop.time()
-            if backlog is not None and ((idle and synced.done()) or now >= give_up_at):
-                recorder.record_all(backlog)
-                backlog = None
-            if now >= flush_at:
-                recorder.flush(whole=now >= poses_at)
-                if now >= poses_at:
-                    poses_at = loop.time() + poses_s
-                flush_at = loop.time() + flush_s
+        while not taking.done():
+            await asyncio.wait({taking}, timeout=flush_s)
+            whole = loop.time() >= poses_at
+            recorder.flush(whole)
+            if whole:
+                poses_at = loop.time() + poses_s
+        taking.result()
     finally:
-        if backlog:
-            recorder.record_all(backlog)
-        for task in (synced, following):
+        inbox.settled()
+        for task in (taking, settling):
             task.cancel()
-        await asyncio.gather(synced, following, return_exceptions=True)
+        await asyncio.gather(taking, settling, return_exceptions=True)
+
+
+class _Inbox:
+    """Changes on their way to the recorder; the first ones wait until all that was stored came."""
+
+    def __init__(self, recorder: Recorder) -> None:
+        self._recorder = recorder
+        self._backlog: list[Change[Any, Any]] | None = []
+
+    async def take(self, watch: Watch) -> None:
+        """Take changes for ever."""
+        async for change in watch:
+            if self._backlog is None:
+                self._recorder.record(change)
+            else:
+                self._backlog.append(change)
+
+    async def settle(self, watch: Watch) -> None:
+        """Wait until all that was stored is there and nothing more comes, but not for long."""
+        loop = asyncio.get_running_loop()
+        give_up_at = loop.time() + BACKLOG_S
+        synced = asyncio.ensure_future(watch.synced())
+        try:
+            had = -1
+            while self._backlog is not None and loop.time() < give_up_at:
+                if synced.done() and had == len(self._backlog):
+                    break
+                had = len(self._backlog)
+                await asyncio.sleep(IDLE_S)
+        finally:
+            synced.cancel()
+        self.settled()
+
+    def settled(self) -> None:
+        """Record what has waited, in the order in which it was written."""
+        backlog, self._backlog = self._backlog, None
+        if backlog:
+            self._recorder.record_all(backlog)
 
 
 def _show(port: int) -> subprocess.Popen[bytes] | None:

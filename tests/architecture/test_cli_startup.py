@@ -26,7 +26,7 @@ def run_help(*options: str, command: tuple[str, ...] = ()) -> subprocess.Complet
         capture_output=True,
         text=True,
         check=True,
-        timeout=30,
+        timeout=120,
     )
 
 
@@ -52,7 +52,7 @@ def test_help_loads_little_beyond_typer() -> None:
             capture_output=True,
             text=True,
             check=True,
-            timeout=30,
+            timeout=120,
         )
         return {line.rsplit("|", 1)[-1].strip() for line in done.stderr.splitlines()}
 
@@ -91,7 +91,7 @@ def test_the_shell_completes(words: str, expected: set[str]) -> None:
         [sys.executable, "-c", "from cli.main import main; main()"],
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=120,
         env={
             **os.environ,
             "_ROBOTCTL_COMPLETE": "complete_bash",

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from fleet.core import events
 from fleet.core.events import Event
+from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.plan_entry import PlanEntry, PlanningJob
-from fleet.core.plan_index import OUTSTANDING
 from fleet.core.planning_input import PlanningInput
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.revision.reconcile import Revision, reconcile

@@ -9,8 +9,8 @@ from msgspec.structs import asdict, replace
 
 from fleet.core.dispatch.dispatcher import advance
 from fleet.core.effects import Effect, all_touches, effects_between
+from fleet.core.indexes.touches import UNTOUCHED, Part, Touch
 from fleet.core.state import State
-from fleet.core.touches import UNTOUCHED, Part, Touch
 
 
 def check_derived(before: State, after: State, effects: tuple[Effect, ...]) -> None:

@@ -15,8 +15,8 @@ from fleet.allocators.makespan import MakespanAllocator
 from fleet.core import events
 from fleet.core.effects import Archive, Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
+from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.plan_entry import PlanEntry, PlanOutcome
-from fleet.core.plan_index import OUTSTANDING
 from fleet.core.planning_input import PlanningInput
 from fleet.core.state import LOGIC, Policy, State
 from fleet.core.step import step

@@ -34,12 +34,12 @@ async def not_connected(session: Session) -> bool:
     return not session.connected
 
 
-async def take(watch: Any, count: int, timeout_s: float = 10.0) -> list[Any]:
+async def take(watch: Any, count: int, timeout_s: float = 60.0) -> list[Any]:
     async with asyncio.timeout(timeout_s):
         return [await anext(watch) for _ in range(count)]
 
 
-async def take_until_value(watch: Watch, value: object, timeout_s: float = 15.0) -> list[Any]:
+async def take_until_value(watch: Watch, value: object, timeout_s: float = 60.0) -> list[Any]:
     seen = []
     async with asyncio.timeout(timeout_s):
         async for change in watch:

@@ -12,13 +12,15 @@ from statistics import median
 from typing import Any
 
 from benchmarks.scale.core_run import CoreRun
-from benchmarks.scale.errands import TASKS_A_GOAL
+from benchmarks.scale.errands import TASKS_A_GOAL, Errands
 from fleet.core import events
 from fleet.core.events import Event
 
 ROBOTS = (10, 50, 200, 1000)
 TASKS = (100, 1000, 10_000)
 LIMIT_S = 30.0
+TAKEN_OVER = 3
+"""How often the same plan is taken over by the same state; the median counts."""
 
 
 def measure(quick: bool) -> list[dict[str, Any]]:
@@ -35,9 +37,17 @@ def _run(robots: int, tasks: int, limit_s: float) -> dict[str, Any]:
 
     run = CoreRun(robots, watched)
     began_s = time.process_time()
-    wanted = run.begin("p", range(tasks // TASKS_A_GOAL))
+    wanted = Errands("p", range(tasks // TASKS_A_GOAL), robots)
+    run.put_cups(wanted.numbers)
+    run.put_goals(wanted.numbers)
+    answer = run.ask(wanted)
     setup_s = time.process_time() - began_s
-    taken_over_s = took["taken over"][0]
+    for _ in range(TAKEN_OVER - 1):
+        before_s = time.process_time()
+        run.tried(answer)
+        took["taken over"].append(time.process_time() - before_s)
+    run.apply(answer)
+    taken_over_s = median(took["taken over"])
     took.clear()
     worked_s = run.work(limit_s)
     done = run.succeeded["p"]

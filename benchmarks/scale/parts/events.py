@@ -10,6 +10,7 @@ from collections.abc import Callable
 from statistics import median
 from typing import Any
 
+from benchmarks.scale import errands
 from benchmarks.scale.core_run import CoreRun
 from benchmarks.scale.errands import TASKS_A_GOAL
 from fleet.core import events
@@ -22,6 +23,8 @@ ENDED = (1, 100)
 REPEATS = 200
 LIMIT_S = 2.0
 FIRST_ENDED = 20_000
+ONE_MORE = 30_000
+"""A goal that no plan has."""
 
 
 def measure(quick: bool) -> list[dict[str, Any]]:
@@ -33,12 +36,17 @@ def measure(quick: bool) -> list[dict[str, Any]]:
 def _row(robots: int, tasks: int, ended: int) -> dict[str, Any]:
     run = CoreRun(robots)
     run.live(ended, first=FIRST_ENDED)
+    run.put_cups([ONE_MORE])
     run.begin("p", range(tasks // TASKS_A_GOAL))
     run.work(limit_s=30.0, tasks=10)
     started = _next(run, lambda event: _reports(event, ReportState.STARTED))
     begun_ms = _median_ms(run, started)
     run.apply(started)
     run.waiting.remove(started)
+    goal, sentence = (
+        events.GoalPut(goal=errands.goal(ONE_MORE, as_sentence), **run.at())
+        for as_sentence in (False, True)
+    )
     return {
         "robots": robots,
         "tasks": tasks,
@@ -49,6 +57,8 @@ def _row(robots: int, tasks: int, ended: int) -> dict[str, Any]:
         "task_ended_ms": _median_ms(
             run, _next(run, lambda event: _reports(event, ReportState.SUCCEEDED))
         ),
+        "goal_ms": _median_ms(run, goal),
+        "sentence_ms": _median_ms(run, sentence),
         "own_fact_ms": _median_ms(run, _next(run, lambda e: isinstance(e, events.FactPut))),
     }
 

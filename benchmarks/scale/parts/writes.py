@@ -30,6 +30,7 @@ TOGETHER = 10_000
 PUTS = 20_000
 LISTED = 10_000
 ROUNDS = 3
+RAW_S = 5.0
 BATCHES, BATCH = 100, 500
 SYNCHRONOUS: tuple[Literal["NORMAL", "FULL"], ...] = ("NORMAL", "FULL")
 
@@ -47,19 +48,18 @@ async def _measured(fraction: int) -> list[dict[str, Any]]:
             async with open_session(config) as writer, open_session(config) as reader:
                 calls = CALLS // fraction
                 async with raw_latencies(fleet.endpoint) as raw:
-                    latencies = {
-                        "confirmed write": await _repeat(
-                            lambda i: writer.confirm(
-                                FACT, _at(f"c{i % 100}"), _of(f"c{i % 100}", i)
-                            ),
-                            calls,
-                        ),
-                        "get": await _repeat(lambda i: reader.get(FACT, _at(f"c{i % 100}")), calls),
-                        "put to another session's watch": await _watched(
-                            writer, reader, WATCHED // fraction
-                        ),
-                    }
-                latencies["Zenoh alone: put to subscriber"] = raw
+                    await asyncio.sleep(RAW_S)
+                latencies = {
+                    "Zenoh alone: put to subscriber": raw,
+                    "put to another session's watch": await _watched(
+                        writer, reader, WATCHED // fraction
+                    ),
+                    "get": await _repeat(lambda i: reader.get(FACT, _at(f"c{i % 100}")), calls),
+                    "confirmed write": await _repeat(
+                        lambda i: writer.confirm(FACT, _at(f"c{i % 100}"), _of(f"c{i % 100}", i)),
+                        calls,
+                    ),
+                }
                 rates = {
                     f"confirmed writes, {AT_ONCE} at once": [
                         await _confirmed(writer, TOGETHER // fraction) for _ in range(ROUNDS)

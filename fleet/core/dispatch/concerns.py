@@ -6,10 +6,10 @@ from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from fleet.core.fleet_index import place_of, subjects_of
-from fleet.core.plan_index import robots_of
+from fleet.core.indexes.fleet_index import place_of, subjects_of
+from fleet.core.indexes.plan_index import robots_of
+from fleet.core.indexes.touches import Part, Touch
 from fleet.core.state import State
-from fleet.core.touches import Part, Touch
 from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 

@@ -14,12 +14,12 @@ from fleet.core.dispatch.ready_tasks import by_priority, may_order, order_ready
 from fleet.core.dispatch.replan_triggers import unforeseen
 from fleet.core.handlers.goals import next_stage
 from fleet.core.handlers.requests import plan_waiting_goals
+from fleet.core.indexes.touches import UNTOUCHED
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.revision.replanning import start_replanning
 from fleet.core.state import State
 from fleet.core.state_updates import give_up, mark_goals, set_entry, with_waiting_cancelled
-from fleet.core.touches import UNTOUCHED
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import PlanState
 

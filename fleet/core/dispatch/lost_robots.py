@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from fleet.core.plan_index import robots_of
+from fleet.core.indexes.plan_index import robots_of
+from fleet.core.indexes.touches import Part, Touch
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import set_entry, touch
-from fleet.core.touches import Part, Touch
 from keyexpr_schema.payloads.tasks import TaskState
 
 SINCE_LOGIC = 1

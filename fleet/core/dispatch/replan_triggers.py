@@ -9,10 +9,10 @@ and the shell runs that: `planners.plan_repair` first, a new plan otherwise.
 
 from __future__ import annotations
 
+from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.model.preconditions import action_of
 from fleet.core.model.skills import Action
 from fleet.core.plan_entry import PlanEntry
-from fleet.core.plan_index import OUTSTANDING
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from keyexpr_schema.facts import AT

@@ -6,6 +6,7 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
+from fleet.core.indexes.touches import Part, Touch
 from fleet.core.over import goal_taken_back
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import GoalsAdded, ReplanScope
@@ -19,7 +20,6 @@ from fleet.core.state_updates import (
     touch,
     without_goal,
 )
-from fleet.core.touches import Part, Touch
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, read_goal
 from keyexpr_schema.facts import AT, NOTHING, SEARCHED, Value

@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.dispatch.replan_triggers import contradicted
 from fleet.core.effects import status_of
+from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.replan_reasons import ReplanReason, TaskAdded, Wish
 from fleet.core.revision.reconcile import reconcile
@@ -24,7 +25,6 @@ from fleet.core.state_updates import (
     without_goal,
 )
 from fleet.core.table import Table
-from fleet.core.touches import Part, Touch
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Answer

@@ -6,12 +6,13 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
+from fleet.core.indexes.plan_index import OUTSTANDING
+from fleet.core.indexes.touches import Part, Touch
 from fleet.core.model.durations import learn
 from fleet.core.model.preconditions import action_of, effects_hold, unmet_before
 from fleet.core.model.skills import Action
 from fleet.core.model.world import Hopeless
 from fleet.core.plan_entry import PlanEntry
-from fleet.core.plan_index import OUTSTANDING
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import (
@@ -24,7 +25,6 @@ from fleet.core.state_updates import (
     touch,
     without_goal,
 )
-from fleet.core.touches import Part, Touch
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.tasks import Report, ReportState, TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.replan_reasons import GoalsAdded, ReplanAsked, TaskAdded
 from fleet.core.state import State
@@ -21,7 +22,6 @@ from fleet.core.state_updates import (
     set_entry,
     touch,
 )
-from fleet.core.touches import Part, Touch
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest, ReplanRequest
@@ -273,7 +273,10 @@ def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State | st
             return f"the new task cannot wait for {before}: plan {ask.plan} has {tasks}"
     if "robot" in ask.args:
         robot = ask.args["robot"]
-        return f"name the robot that does it as the request's robot, not as robot={robot}"
+        return (
+            f"who does the task is no argument: instead of robot={robot} give the robot by itself "
+            f"(`robotctl task add … --robot {robot}`)"
+        )
     wish = TaskAdded(
         request=ask.request, skill=ask.skill, args=ask.args, after=ask.after, robot=ask.robot
     )

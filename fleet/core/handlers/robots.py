@@ -6,9 +6,9 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.handlers.world import vocabulary_changed
+from fleet.core.indexes.touches import Part, Touch
 from fleet.core.state import State
 from fleet.core.state_updates import robot_changed, touch
-from fleet.core.touches import Part, Touch
 
 
 def robot_registered(state: State, event: events.RobotRegistered) -> State:

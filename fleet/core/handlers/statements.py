@@ -6,9 +6,9 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.effects import PLANNER_SOURCE
+from fleet.core.indexes.touches import Part, Touch
 from fleet.core.state import State
 from fleet.core.state_updates import conclude, touch
-from fleet.core.touches import Part, Touch
 from fleet.errors import NotUnderstood
 from fleet.language import statement_facts
 from keyexpr_schema.payloads.world import Fact, Statement, StatementStatus

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.model.preconditions import effects_hold
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import Call, WorldModel, call_of
 from fleet.core.plan_entry import PlanEntry
-from fleet.core.plan_index import OUTSTANDING
 from keyexpr_schema.ids import bound
 from keyexpr_schema.payloads.plans import Plan, PlanChange, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState

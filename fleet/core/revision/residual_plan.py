@@ -6,9 +6,9 @@ from collections.abc import Set
 
 from msgspec.structs import replace
 
+from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.plan_entry import PlanEntry
-from fleet.core.plan_index import OUTSTANDING
 from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskState
 

@@ -15,6 +15,15 @@ from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 IDLE = ""
 """The state of a robot without a task: the viewer draws a gap."""
 
+LOOKS = 500
+"""Of so many bars a lane, the latest of a file, label and colour are written: they are one list."""
+
+FRESH = 8
+"""The list goes out when one in so many is new."""
+
+FRESH_S = 10.0
+"""Or so long after the last time [s, wall time]; proportionally longer with more than 100."""
+
 
 @dataclass
 class Bar:
@@ -29,13 +38,20 @@ class Bar:
 
 @dataclass
 class Lane:
-    """The bars of one robot, by `plan/task#attempt`."""
+    """The bars of one robot, by `plan/task#attempt`: those that may still change."""
 
     path: str
     bars: dict[str, Bar] = field(default_factory=dict)
     logged: dict[float, str] = field(default_factory=dict)
     """What was logged as holding from a time on."""
-    dirty: bool = False
+    looks: dict[str, tuple[str, Rgba]] = field(default_factory=dict)
+    """Label and colour of the latest bars."""
+    news: int = 0
+    """How many looks are new since they were logged at `written_s` [s, wall time]."""
+    written_s: float = float("-inf")
+    settled_s: float = float("-inf")
+    """Bars that ended before are counted in `settled_busy_s`, and forgotten."""
+    settled_busy_s: float = 0.0
 
     def at(self, time_s: float) -> Bar | None:
         """The bar that covers `time_s`, the one that began last if there are several."""
@@ -47,16 +63,39 @@ class Lane:
         return max(covering, key=lambda bar: bar.start_s, default=None)
 
     def busy_s(self, start_s: float, end_s: float) -> float:
-        """Seconds of `start_s`…`end_s` that a bar covers; overlapping bars count once."""
+        """Seconds of `start_s`…`end_s` that a bar covers; overlapping bars count once.
+
+        `start_s` is no later than the first bar, and `end_s` no earlier than what is settled.
+        """
+        start_s = max(start_s, self.settled_s)
         spans = sorted(
             (max(start_s, bar.start_s), min(end_s, end_s if bar.end_s is None else bar.end_s))
             for bar in self.bars.values()
         )
-        total, reach = 0.0, start_s
+        total, reach = self.settled_busy_s, start_s
         for low, high in spans:
             total += max(0.0, high - max(low, reach))
             reach = max(reach, high)
         return total
+
+    def look(self, bar: Bar) -> None:
+        """The label and the colour of a bar are news."""
+        self.looks.pop(bar.key, None)
+        self.looks[bar.key] = bar.label, bar.colour
+        if len(self.looks) > LOOKS:
+            del self.looks[next(iter(self.looks))]
+        self.news += 1
+
+    def settle(self, before_s: float) -> None:
+        """Count what ended before, and forget it."""
+        if before_s <= self.settled_s:
+            return
+        self.settled_busy_s = self.busy_s(self.settled_s, before_s)
+        self.settled_s = before_s
+        for key in [k for k, b in self.bars.items() if b.end_s is not None and b.end_s < before_s]:
+            del self.bars[key]
+        for at_s in [at_s for at_s in self.logged if at_s < before_s]:
+            del self.logged[at_s]
 
 
 class Lanes:
@@ -66,6 +105,7 @@ class Lanes:
         self._sink = sink
         self._palette = palette
         self._last: dict[tuple[str, str], tuple[str, str]] = {}  # task -> robot and bar
+        self._plans: dict[str, set[str]] = {}  # tasks of each plan
         self.lanes: dict[str, Lane] = {}
         self.first_s: float | None = None
 
@@ -94,6 +134,7 @@ class Lanes:
         if before is not None and before != (record.robot, key):
             self._close(*before, record.started_s)
         self._last[task] = (record.robot, key)
+        self._plans.setdefault(record.plan, set()).add(record.task)
         lane = self.robot(record.robot)
         end_s = record.ended_s
         if record.state not in (TaskState.RUNNING, TaskState.ORDERED) and end_s is None:
@@ -104,33 +145,45 @@ class Lanes:
         label, colour = _label(record), self._colour(record)
         if bar is None:
             bar = lane.bars[key] = Bar(key, label, colour, record.started_s)
-            lane.dirty = True
+            lane.look(bar)
             self._transition(lane, bar.start_s)
             first_s = bar.start_s if self.first_s is None else self.first_s
             self.first_s = min(first_s, bar.start_s)
         elif (bar.label, bar.colour) != (label, colour):
             bar.label, bar.colour = label, colour
-            lane.dirty = True
+            lane.look(bar)
         if bar.end_s != end_s:
             bar.end_s = end_s
             if end_s is not None:
                 self._transition(lane, end_s)
 
-    def flush(self) -> None:
+    def flush(self, wall_s: float = 0.0, final: bool = True) -> None:
         """Log the labels and colours of bars that are new or ended otherwise than well.
 
-        They are one list a lane and go out whole, so not at every change.
+        They are one list a lane and go out whole, so not at every change if it is not `final`.
         """
         for lane in self.lanes.values():
-            if lane.dirty:
-                lane.dirty = False
+            pause_s = FRESH_S * max(1.0, len(lane.looks) / 100)
+            many = lane.news * FRESH >= len(lane.looks)
+            if lane.news and (final or many or not 0.0 <= wall_s - lane.written_s < pause_s):
+                lane.news, lane.written_s = 0, wall_s
                 self._configure(lane)
+
+    def settle(self, before_s: float) -> None:
+        """Count what ended before, and forget it."""
+        for lane in self.lanes.values():
+            lane.settle(before_s)
 
     def drop(self, plan: str, task: str, now_s: float) -> None:
         """The planner deleted its record of a task: what still ran there ended."""
         before = self._last.pop((plan, task), None)
         if before is not None:
             self._close(*before, now_s)
+
+    def forget(self, plan: str, now_s: float) -> None:
+        """The plan is over: nothing is heard of its tasks any more."""
+        for task in self._plans.pop(plan, ()):
+            self.drop(plan, task, now_s)
 
     @property
     def running(self) -> bool:
@@ -166,16 +219,16 @@ class Lanes:
             state = bar.key if bar else IDLE
             if lane.logged.get(at_s) != state:
                 lane.logged[at_s] = state
-                self._sink.log(lane.path, rr.StateChange(state=state), at_s)
+                self._sink.row(lane.path, rr.StateChange, at_s, None, state=state)
 
     def _configure(self, lane: Lane) -> None:
-        bars = list(lane.bars.values())
+        looks = lane.looks
         self._sink.fix(
             lane.path,
             rr.StateConfiguration(
-                values=[bar.key for bar in bars],
-                labels=[bar.label for bar in bars],
-                colors=[bar.colour for bar in bars],
+                values=list(looks),
+                labels=[label for label, _ in looks.values()],
+                colors=[colour for _, colour in looks.values()],
             ),
         )
 

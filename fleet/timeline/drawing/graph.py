@@ -12,7 +12,7 @@ from fleet.timeline.drawing.palette import TASK_STATES
 from fleet.timeline.drawing.sink import Sink, entity
 from fleet.timeline.drawing.text import drawable
 from keyexpr_schema.ids import actor_in, natural_order
-from keyexpr_schema.payloads.plans import Plan, PlanStatus, Task
+from keyexpr_schema.payloads.plans import ENDED_PLANS, Plan, PlanStatus, Task
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
 ROW_PX = 58.0
@@ -21,8 +21,12 @@ GAP_PX = 40.0
 PLANS = 6
 """At most so many plans are drawn, one below the other: the latest."""
 
+STEP_S = 0.5
+"""A plan is drawn again after so much of the fleet's time and of wall time at the earliest: a
+simulation may run fast. What ended is drawn at once."""
+
 EAGER = 60
-"""Plans up to this many tasks are drawn at each change; larger ones every `tasks / 60` seconds."""
+"""Plans of many tasks wait `tasks / 60` seconds instead."""
 
 GLYPHS = {
     TaskState.WAITING: "…",
@@ -53,9 +57,34 @@ class Drawing:
     plan: Plan | None = None
     status: PlanStatus | None = None
     records: dict[str, TaskRecord] = field(default_factory=dict)
-    drawn: object = None
+    nodes_drawn: list[Node] = field(default_factory=list)
+    top_drawn: float = 0.0
+    positions: dict[str, tuple[float, float]] = field(default_factory=dict)
+    """Of `nodes_drawn`, from 0 down."""
     drawn_s: float = float("-inf")
+    drawn_wall_s: float = float("-inf")
+    changed_s: float = float("-inf")
     dirty: bool = False
+
+    @property
+    def height(self) -> float:
+        """How much room [px] it takes as it was last drawn."""
+        if not self.positions:
+            return 0.0
+        return max(y for _, y in self.positions.values()) + 1.5 * ROW_PX
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing of it goes on."""
+        return self.status is not None and self.status.state in ENDED_PLANS
+
+    def due(self, now_s: float, wall_s: float) -> bool:
+        """Whether it changed, and was drawn long enough ago."""
+        if not self.dirty:
+            return False
+        pause_s = max(STEP_S, len(self.nodes_drawn) / EAGER)
+        late = now_s - self.drawn_s >= pause_s and wall_s - self.drawn_wall_s >= STEP_S
+        return self.over or late or now_s < self.drawn_s or wall_s < self.drawn_wall_s
 
     def nodes(self) -> list[Node]:
         """The tasks of the plan's latest revision, and what was done or runs from older ones."""
@@ -83,67 +112,69 @@ class Graphs:
         self._sink = sink
         self.drawings: dict[str, Drawing] = {}
 
-    def of(self, plan: str) -> Drawing:
-        """The drawing of a plan, marked for drawing again."""
+    def of(self, plan: str, at_s: float) -> Drawing:
+        """The drawing of a plan, marked for drawing again: something changed at `at_s` [s]."""
         drawing = self.drawings.get(plan)
         if drawing is None:
             drawing = self.drawings[plan] = Drawing(entity("fleet", "dag", plan))
         drawing.dirty = True
+        drawing.changed_s = max(drawing.changed_s, at_s)
         return drawing
 
-    def draw(self, now_s: float, final: bool = False) -> None:
-        """Log the plans that changed, at fleet time `now_s` [s]."""
-        if not any(drawing.dirty for drawing in self.drawings.values()):
+    def forget(self, plan: str, now_s: float) -> None:
+        """The plan is over and others came: draw it no more."""
+        drawing = self.drawings.pop(plan, None)
+        if drawing is not None:
+            self._log(drawing, [], 0.0, now_s)
+
+    def draw(self, now_s: float, wall_s: float, final: bool = False) -> None:
+        """Log the plans that changed and may be drawn by `now_s` [s, fleet time]."""
+        if not any(d.dirty and (final or d.due(now_s, wall_s)) for d in self.drawings.values()):
             return
         top = 0.0
         for at, drawing in enumerate(self.drawings.values()):
+            at_s = min(now_s, max(drawing.changed_s, drawing.drawn_s)) if drawing.dirty else now_s
             if at < len(self.drawings) - PLANS:
-                self._clear(drawing, now_s)
+                drawing.dirty = False
+                self._log(drawing, [], 0.0, at_s)
                 continue
-            nodes = drawing.nodes()
-            positions = layout(nodes)
-            depth = 1 + max((row for _, row in positions.values()), default=0.0) / ROW_PX
-            big = len(nodes) > EAGER and not final
-            late = now_s - drawing.drawn_s >= len(nodes) / EAGER or now_s < drawing.drawn_s
-            if not big or late:
-                self._log(
-                    drawing, nodes, {t: (x, y + top) for t, (x, y) in positions.items()}, now_s
-                )
-            top += (depth + 0.5) * ROW_PX if nodes else 0.0
+            if drawing.dirty and (final or drawing.due(now_s, wall_s)):
+                drawing.dirty = False
+                drawing.drawn_s, drawing.drawn_wall_s = now_s, wall_s
+                self._log(drawing, drawing.nodes(), top, at_s)
+            elif drawing.top_drawn != top:  # what is above it takes more room, or less
+                self._log(drawing, drawing.nodes_drawn, top, now_s)
+            top += drawing.height
 
-    def _log(
-        self,
-        drawing: Drawing,
-        nodes: list[Node],
-        positions: dict[str, tuple[float, float]],
-        now_s: float,
-    ) -> None:
-        drawing.dirty = False
-        now = (tuple(nodes), tuple(positions.items()))
-        if now == drawing.drawn:
+    def _log(self, drawing: Drawing, nodes: list[Node], top: float, at_s: float) -> None:
+        if nodes == drawing.nodes_drawn and top == drawing.top_drawn:
             return
-        drawing.drawn, drawing.drawn_s = now, now_s
+        if _shape(nodes) != _shape(drawing.nodes_drawn):
+            drawing.positions = layout(nodes)
+        drawing.nodes_drawn, drawing.top_drawn = nodes, top
         if not nodes:
-            self._sink.log(drawing.path, rr.Clear(recursive=False), now_s)
+            self._sink.log(drawing.path, rr.Clear(recursive=False), at_s)
             return
         names = {node.task for node in nodes}
         edges = [(first, node.task) for node in nodes for first in node.after if first in names]
+        places = [drawing.positions[node.task] for node in nodes]
         drawn = rr.GraphNodes(
             node_ids=[node.task for node in nodes],
-            positions=[positions[node.task] for node in nodes],
+            positions=[(x, y + top) for x, y in places],
             labels=[node.label for node in nodes],
             colors=[TASK_STATES[node.state] for node in nodes],
             show_labels=True,
         )
         # One entity for both, or the viewer does not know which nodes the edges mean.
         edged = rr.GraphEdges(edges=edges, graph_type="directed")
-        self._sink.log(drawing.path, drawn, now_s, None, edged)
+        self._sink.log(drawing.path, drawn, at_s, None, edged)
 
-    def _clear(self, drawing: Drawing, now_s: float) -> None:
-        drawing.dirty = False
-        if drawing.drawn is not None:
-            drawing.drawn = None
-            self._sink.log(drawing.path, rr.Clear(recursive=False), now_s)
+
+def _shape(nodes: list[Node]) -> list[object]:
+    """All of the nodes that their positions follow from."""
+    return [
+        (node.task, node.lane, node.after, max(map(len, node.label.split("\n")))) for node in nodes
+    ]
 
 
 def layout(nodes: list[Node]) -> dict[str, tuple[float, float]]:

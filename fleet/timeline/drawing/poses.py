@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 import rerun as rr
 
-from fleet.timeline.drawing.sink import Sink, entity
+from fleet.timeline.drawing.sink import ROWS, Sink, entity
 from keyexpr_schema.payloads.motions import PointM
 from keyexpr_schema.payloads.simulation import QuaternionWxyz
 
-ROWS = 400
-"""Rows of one body that are sent at once, at the latest."""
+POSES = 64
+"""So many poses of one body are worth a piece of the file of their own."""
 
 _STILL_M = 0.0005
 _STILL_QUATERNION = 0.0005

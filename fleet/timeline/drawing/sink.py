@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -21,12 +22,49 @@ SIM_TIME = "sim_time"
 WALL_TIME = "wall_time"
 
 
+ROWS = 400
+"""Rows of one entity that are sent at once, at the latest."""
+
+
+@dataclass
+class _Rows:
+    """Rows of one archetype of one entity that wait to be sent."""
+
+    fields: dict[str, list[Any]]
+    sim_s: list[float] = field(default_factory=list)
+    wall_s: list[float] = field(default_factory=list)
+
+
 class Sink:
     """Logs to a Rerun stream on `sim_time` (duration) and `wall_time` (timestamp)."""
 
     def __init__(self, stream: rr.RecordingStream, clock: Clock) -> None:
         self.stream = stream
         self.clock = clock
+        self._waiting: dict[tuple[str, Any], _Rows] = {}
+
+    def row(self, path: str, kind: Any, sim_s: float, wall_s: float | None, **fields: Any) -> None:
+        """A row of an archetype at a fleet time [s]; it goes out with others at the next flush."""
+        rows = self._waiting.get((path, kind))
+        if rows is None:
+            rows = self._waiting[path, kind] = _Rows({name: [] for name in fields})
+        if wall_s is None:
+            wall_s = self.clock.wall_at(sim_s)
+        rows.sim_s.append(sim_s)
+        rows.wall_s.append(time.time() if wall_s is None else wall_s)
+        for name, value in fields.items():
+            rows.fields[name].append(value)
+        if len(rows.sim_s) >= ROWS:
+            self._send(path, kind, self._waiting.pop((path, kind)))
+
+    def flush(self) -> None:
+        """Send the rows that wait."""
+        waiting, self._waiting = self._waiting, {}
+        for (path, kind), rows in waiting.items():
+            self._send(path, kind, rows)
+
+    def _send(self, path: str, kind: Any, rows: _Rows) -> None:
+        self.columns(path, rows.sim_s, rows.wall_s, kind.columns(**rows.fields))
 
     def log(
         self, path: str, what: Any, sim_s: float, wall_s: float | None = None, *more: Any

@@ -50,11 +50,14 @@ class Trail:
         else:
             points.append(point_m)
         del points[:-CORNERS]
-        sink.log(
+        sink.row(
             self._path,
-            rr.LineStrips3D([points], colors=[self._colour], radii=[self._radius_m]),
+            rr.LineStrips3D,
             sim_s,
             wall_s,
+            strips=tuple(points),
+            colors=self._colour,
+            radii=self._radius_m,
         )
 
 

@@ -16,6 +16,9 @@ STEP_S = 1.0
 LAG_S = 1.0
 """Samples are taken this late, so that a task record which arrives late still counts."""
 
+SETTLED_S = 60.0
+"""So long after a sample nothing changes what it says any more."""
+
 _MAX_SAMPLES = 5_000
 
 
@@ -35,6 +38,8 @@ class Utilisation:
         if start_s is None:
             return
         until_s = now_s if final else now_s - LAG_S
+        if self._next_s is not None and until_s < self._next_s:
+            return
         if not self._lanes.running:
             until_s = min(until_s, self._lanes.last_s)
         if self._next_s is None:
@@ -46,6 +51,7 @@ class Utilisation:
         times = [self._next_s + i * step_s for i in range(int(count * STEP_S / step_s))]
         self._next_s += count * STEP_S
         self._log(start_s, times)
+        self._lanes.settle(times[-1] - SETTLED_S)
 
     def _log(self, start_s: float, times: list[float]) -> None:
         if not times:

@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from fleet.core import events, over, step
-from fleet.core.effects import Publish, Retract
+from fleet.core.effects import MakePlan, Publish, Retract
 from fleet.core.events import Event, decode_event
 from fleet.core.handlers import plan_results
 from fleet.core.state import LOGIC, State
@@ -19,8 +19,11 @@ from fleet.service.event_journal import EventJournal
 from fleet.service.journaled_core import JournaledCore
 from fleet.service.recovery import recover
 from keyexpr_schema.keyspace import FACT, ORDER
+from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.payloads.tasks import OrderAddress
 from keyexpr_schema.payloads.world import FactAddress
+from tests.replay.journal_files import events_in
 from tests.support.fleet_model import FleetModel
 from tests.support.household import PLACES, SKILLS, bring, carrier, fact, manipulator
 
@@ -163,21 +166,22 @@ def test_it_does_not_come_again_at_the_next_start(
 
 
 def test_one_in_the_journal_is_taken_out_of_it(tmp_path: Path, atlantis: Event) -> None:
-    """As another logic of the core kept it, or one before this one."""
+    """As a run before this one kept it."""
     with EventJournal(tmp_path) as journal:
         for event in (
+            events.PlannerStarted(epoch=1, incarnation="i", skills=SKILLS, logic=LOGIC, **AT),
             events.PlacePut(place=replace(PLACES[0], place="kitchen"), **AT),
             atlantis,
             events.FactPut(fact=fact("cup_1", "at", "kitchen"), **AT),
         ):
             journal.append(event)
-    for replayed in (2, 2):
+    for replayed in (3, 3):
         with Run(tmp_path) as run:
             assert run.recovered.replayed == replayed
             assert set(run.core.state.places) == {"kitchen"}
             assert run.core.state.facts
     with EventJournal(tmp_path) as journal:
-        assert [number for number, _ in journal.events()] == [1, 3]
+        assert [number for number, _ in journal.events()] == [1, 2, 4]
 
 
 def test_a_plan_that_cannot_be_taken_over_has_failed(
@@ -209,3 +213,23 @@ async def test_a_snapshot_that_cannot_be_written_costs_nothing_but_time(
         run.core.keep_last_snapshot(())
     with EventJournal(tmp_path) as journal:
         assert recover(journal, SKILLS).replayed == 1
+
+
+def test_a_journal_of_before_starts_becomes_a_snapshot_and_goes_on(tmp_path: Path) -> None:
+    """Its events bring no skills and no logic number; new logic does not go over them again."""
+    with EventJournal(tmp_path) as journal:
+        for event in events_in("two-cups"):
+            journal.append(event)
+    with Run(tmp_path) as run:
+        assert run.recovered.replayed > 0
+        assert run.core.replayable == 0
+        assert run.told == []
+        run.start(epoch=run.core.state.epoch + 1)
+        goal = Goal(goal="another", text="bring cup 1 to the kitchen")
+        run.core.apply(events.GoalPut(goal=goal, **AT))
+        request = PlanRequest(request="r", goals=("another",))
+        effects = run.core.apply(events.PlanRequested(request=request, **AT))
+        assert any(isinstance(effect, MakePlan) for effect in effects)
+    with Run(tmp_path) as run:
+        assert run.recovered.replayed == 3
+        assert run.core.state.logic == LOGIC

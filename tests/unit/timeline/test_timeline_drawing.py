@@ -140,14 +140,16 @@ def test_a_task_that_starts_as_another_ends_is_not_hidden(tmp_path: Path) -> Non
     path = tmp_path / "lanes.rrd"
     stream = open_stream(path, "test")
     clock = Clock()
-    lanes = Lanes(Sink(stream, clock), Palette())
+    sink = Sink(stream, clock)
+    lanes = Lanes(sink, Palette())
     first, second = STEPS[0], STEPS[1]
     lanes.record(record(first, TaskState.RUNNING, started_s=0.0), 0.0)
     lanes.record(record(second, TaskState.RUNNING, started_s=15.0), 15.1)
     lanes.record(record(first, TaskState.SUCCEEDED, started_s=0.0, ended_s=15.0), 15.2)
     lanes.flush()
-    use = Utilisation(Sink(stream, clock), lanes, Palette())
+    use = Utilisation(sink, lanes, Palette())
     use.advance(20.0)
+    sink.flush()
     stream.disconnect()
     held = {row.sim_s: row.value[0] for row in rows(path, "/robots/hsr", "state")}
     assert held == {0.0: "p1/t1#1", 15.0: "p1/t2#1"}
@@ -161,10 +163,12 @@ def test_a_task_that_starts_as_another_ends_is_not_hidden(tmp_path: Path) -> Non
 def test_a_bar_is_not_hidden_by_what_was_shown_before_it_was_known(tmp_path: Path) -> None:
     path = tmp_path / "lanes.rrd"
     stream = open_stream(path, "test")
-    lanes = Lanes(Sink(stream, Clock()), Palette())
+    sink = Sink(stream, Clock())
+    lanes = Lanes(sink, Palette())
     lanes.show_empty(lanes.robot("hsr"), 0.2)
     lanes.record(record(STEPS[0], TaskState.RUNNING, started_s=0.0), 0.3)
     lanes.record(record(STEPS[0], TaskState.SUCCEEDED, started_s=0.0, ended_s=15.0), 15.2)
+    sink.flush()
     stream.disconnect()
     held = {row.sim_s: row.value[0] for row in rows(path, "/robots/hsr", "state")}
     assert held == {0.0: "p1/t1#1", 0.2: "p1/t1#1", 15.0: ""}
@@ -179,6 +183,7 @@ def test_a_trail_has_a_corner_where_the_way_turns_and_no_end_of_them(tmp_path: P
         straight.visit(sink, (0.2 * min(i, 50), 0.2 * max(0, i - 50), 0.0), 0.1 * i, 0.1 * i)
     for i in range(CORNERS + 50):
         zigzag.visit(sink, (0.2 * i, 0.5 * (i % 2), 0.0), 0.1 * i, 0.1 * i)
+    sink.flush()
     stream.disconnect()
     corner = rows(path, "/a", "strips")[-1].value[0]
     assert [tuple(round(x, 2) for x in point[:2]) for point in corner] == [

@@ -18,7 +18,7 @@ WORLD = str(CONFIGS / "worlds" / "home.yaml")
     ("arguments", "words"),
     [
         (["plan", "create", "big-dag", "milp"], "no planner is running; start one with"),
-        (["plan", "create", "big-dag", "milp", "g"], "there is no goal 'g': none is known yet"),
+        (["plan", "create", "big-dag", "milp", "g"], "there is no goal 'g': there is none now"),
         (["plan", "show"], "there is no plan yet; make one with `robotctl plan create`"),
         (["plan", "start", "p"], "there is no plan 'p'"),
         (["replan", "p"], "there is no plan 'p'"),

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.effects import DropJob, MakePlan
-from fleet.core.plan_index import OUTSTANDING
+from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.planning_input import PlanningInput
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import PlanState

@@ -12,8 +12,8 @@ from typing import TypeVar
 import immutables
 import msgspec
 
+from fleet.core.indexes.plan_index import robots_of
 from fleet.core.plan_entry import PlanEntry
-from fleet.core.plan_index import robots_of
 from fleet.core.table import Table
 from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus

@@ -9,12 +9,13 @@ from contextlib import suppress
 from msgspec.structs import replace
 
 from keyexpr_schema.errors import SchemaError
+from keyexpr_schema.facts import HOLDING, FactKey
 from keyexpr_schema.keyspace import ROBOT_ALIVE
 from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotSpec
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState
 from keyexpr_schema.transport.session import Session
 from workers.embodiment import Embodiment
-from workers.errors import BadArguments, UnknownSkill
+from workers.errors import BadArguments, RobotUnreachable, UnknownSkill
 from workers.orders.fencing import Phase
 from workers.orders.journal import Journal
 from workers.orders.order_queue import OrderQueue
@@ -132,9 +133,28 @@ class Worker:
         while True:
             connections = self._session.connections
             await self._order_queue.repeat_what_is_missing()
+            await self._observe_what_is_missing()
             with suppress(TimeoutError):
                 async with asyncio.timeout(REPEAT_S):
                     await self._session.wait_reconnected(connections)
+
+    async def _observe_what_is_missing(self) -> None:
+        """Observe the robot again where the store has lost what was known of it, as when it was
+        emptied. While an attempt runs, the attempt itself says what it changes."""
+        robot = self.spec.robot
+        if (
+            FactKey(HOLDING, robot) in self._world.facts
+            or robot not in self._world.specs
+            or any(self._journal.ledger.in_phase(Phase.STARTED))
+            or self._journal.unsent() is not None
+        ):
+            return
+        ctx = self._context()
+        with suppress(RobotUnreachable, SchemaError, TimeoutError):
+            async with asyncio.timeout(REPEAT_S):
+                await observe_robot(ctx)
+            self._journal.send(*ctx.observed)
+            self._outbox.wake()
 
     # --- what is done ----------------------------------------------------------------------------
 

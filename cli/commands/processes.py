@@ -274,13 +274,39 @@ def record(
     call: Call,
     out: Annotated[Path, typer.Argument(metavar="OUT.rrd", help="The recording.")],
     view: Annotated[bool, typer.Option("--view", help="Show it live in Rerun, too.")] = False,
+    roll_every: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME|SIZE",
+            help="Begin a new file, OUT-0001.rrd and so on, every 30min, 2h, 500MB or 2GB.",
+        ),
+    ] = None,
+    keep: Annotated[
+        int | None, typer.Option(help="With --roll-every: keep so many files, the latest.")
+    ] = None,
 ) -> None:
     """Record everything that happens for Rerun."""
     from cli.demo.child_processes import end_with_parent
+    from cli.errors import BadArgument
     from fleet.timeline.process import run_recorder
+    from fleet.timeline.rolling import BadRolling, parse_rolling
 
+    if keep is not None and roll_every is None:
+        raise BadArgument("--keep is for recordings that roll; say --roll-every, too")
+    if view and roll_every is not None:
+        raise BadArgument("--view shows one recording; leave out --roll-every")
+    try:
+        rolls = None if roll_every is None else parse_rolling(roll_every, keep)
+    except BadRolling as error:
+        raise BadArgument(f"--roll-every: {error}") from None
     end_with_parent()
-    run_recorder(endpoints=call.settings.routers, realm=call.settings.realm, out=out, view=view)
+    run_recorder(
+        endpoints=call.settings.routers,
+        realm=call.settings.realm,
+        out=out,
+        view=view,
+        rolling=rolls,
+    )
 
 
 def parse_speed(written: str) -> float | None:

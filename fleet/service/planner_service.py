@@ -89,6 +89,7 @@ class PlannerService:
         )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
         self._held: list[Effect] | None = []
+        self._status_lost = asyncio.Event()
         """Effects held back until everything stored is known; afterwards `None`."""
 
     @property
@@ -107,6 +108,11 @@ class PlannerService:
         async with AsyncExitStack() as stack:
             await stack.enter_async_context(self._outbox.running())
             await stack.enter_async_context(self._past.running())
+            scenes = await self._session.list(SIM_SCENE)
+            self._clock.resume(self.state.time_s, bool(scenes))
+            if first_run:  # before the watch: it asks for the reports of the plans that are open
+                await self._past.inherit(self._at()["wall_time_s"])
+                self._apply(await prior_state(self._session, self._at()))
             watch = await stack.enter_async_context(
                 self._session.watch(
                     *(key for key in WATCHED if key is not REPORT),
@@ -118,11 +124,6 @@ class PlannerService:
                 )
             )
             tokens = await stack.enter_async_context(self._session.watch_tokens(ROBOT_ALIVE))
-            scenes = await self._session.list(SIM_SCENE)
-            self._clock.resume(self.state.time_s, bool(scenes))
-            if first_run:
-                await self._past.inherit(self._at()["wall_time_s"])
-                self._apply(await prior_state(self._session, self._at()))
             await self._take_charge(first_run)
             await stack.enter_async_context(
                 self._session.token(PLANNER_ALIVE, PlannerAliveAddress(self._incarnation))
@@ -187,20 +188,28 @@ class PlannerService:
         )
 
     async def _tell_what_it_can(self) -> None:
-        """Publish what planners and allocators there are, as soon as the planning process knows."""
+        """Publish what planners and allocators there are, as soon as the planning process knows;
+        again when the store has lost the planner's status."""
         can = await self._pool.ready()
 
         def with_parts(status: PlannerStatus | None) -> PlannerStatus:
-            if status is None or status.incarnation != self._incarnation:
-                return status or PlannerStatus(epoch=0, incarnation=self._incarnation)
-            return replace(
-                status,
+            if status is not None and status.incarnation != self._incarnation:
+                return status
+            return PlannerStatus(
+                epoch=self.state.epoch,
+                incarnation=self._incarnation,
+                skills=tuple(self._skills),
                 planners=tuple(can.planners_wait_s),
                 strategies=can.strategies,
                 allocators=tuple(can.allocators_wait_s),
             )
 
-        await self._session.update(PLANNER_STATUS, PlannerAddress(), with_parts, timeout_s=CHARGE_S)
+        while True:
+            self._status_lost.clear()
+            await self._session.update(
+                PLANNER_STATUS, PlannerAddress(), with_parts, timeout_s=CHARGE_S
+            )
+            await self._status_lost.wait()
 
     async def _catch_up(
         self, watch: Watch, tokens: TokenWatch[Any], concluded: Collection[FactKey]
@@ -263,7 +272,9 @@ class PlannerService:
                 self._clock.ticked(change.value.time_s)
         elif change.key is PLANNER_STATUS:
             other = change.value
-            if other is not None and other.epoch > self.state.epoch:
+            if other is None:
+                self._status_lost.set()
+            elif other.epoch > self.state.epoch:
                 raise Superseded(
                     f"planner {other.incarnation} took charge of realm "
                     f"{self._session.config.realm} (epoch {other.epoch}); this one stops"

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from fleet.timeline.process import *  # noqa: F403
     from fleet.timeline.reader import *  # noqa: F403
     from fleet.timeline.recorder import *  # noqa: F403
+    from fleet.timeline.rolling import *  # noqa: F403
     from fleet.timeline.screenshot import *  # noqa: F403
 else:
     __all__, __getattr__, __dir__ = lazy_names(
@@ -23,6 +24,7 @@ else:
             "process": "run_recorder",
             "reader": "RecordingSummary Row rows summary",
             "recorder": "Recorder",
+            "rolling": "BadRolling Rolling parse_rolling",
             "screenshot": "save_screenshot",
         },
     )

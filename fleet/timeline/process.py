@@ -5,14 +5,15 @@ from __future__ import annotations
 import asyncio
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from fleet.timeline import viewer
 from fleet.timeline.drawing.sink import free_port, open_stream
-from fleet.timeline.errors import NoPicture
+from fleet.timeline.errors import NoPicture, UnwritableRecording
 from fleet.timeline.recorder import RECORDED, Recorder
+from fleet.timeline.rolling import Rolling, RollingFiles
 from keyexpr_schema.signals import run_until_signal
 from keyexpr_schema.transport.session import Change, SessionConfig, Watch, open_session
 
@@ -42,10 +43,12 @@ def run_recorder(
     out: Path,
     view: bool = False,
     connect_timeout_s: float | None = 3.0,
+    rolling: Rolling | None = None,
 ) -> None:
     """Record a realm to `out` until SIGTERM or SIGINT; then close the file.
 
-    With `view` Rerun's viewer is opened on what is being recorded, where there is a screen.
+    With `view` Rerun's viewer is opened on what is being recorded, where there is a screen. With
+    `rolling` a new file is begun now and then, and `out` is what their names begin with.
 
     Raises:
         Unreachable: no router answers at the endpoints.
@@ -57,22 +60,26 @@ def run_recorder(
         component="recorder",
         connect_timeout_s=connect_timeout_s,
     )
-    run_until_signal(_record(config, out, view))
+    files = None if rolling is None else RollingFiles(out, rolling)
+    run_until_signal(_record(config, out, view, files))
 
 
-async def _record(config: SessionConfig, out: Path, view: bool) -> None:
+async def _record(config: SessionConfig, out: Path, view: bool, files: RollingFiles | None) -> None:
     shown: subprocess.Popen[bytes] | None = None
+    name = f"{config.realm} · {out.stem}"
     try:
         async with open_session(config) as session:
             port = free_port() if view else None
-            stream = open_stream(out, f"{config.realm} · {out.stem}", port)
-            recorder = Recorder(stream)
+            first = out if files is None else files.next()
+            recorder = Recorder(open_stream(first, name, port))
+            if files is not None:
+                files.drop_oldest()
             if port is not None:
                 shown = _show(port)
             try:
                 async with session.watch(*RECORDED) as watch:
-                    _print_line(f"recording to {out}")
-                    await _follow(watch, recorder, view)
+                    _print_line(f"recording to {first}")
+                    await _follow(watch, recorder, view, lambda: _roll(recorder, files, name))
             finally:
                 recorder.close()
     finally:
@@ -80,7 +87,26 @@ async def _record(config: SessionConfig, out: Path, view: bool) -> None:
             viewer.end(shown)
 
 
-async def _follow(watch: Watch, recorder: Recorder, live: bool) -> None:
+def _roll(recorder: Recorder, files: RollingFiles | None, name: str) -> None:
+    """Go on in the next file if it is time; where it cannot be made, in the one there is."""
+    if files is None or not files.due():
+        return
+    before = files.current
+    path = files.next()
+    try:
+        stream = open_stream(path, name)
+    except UnwritableRecording as error:
+        _print_line(f"{error}; recording goes on in {before}")
+        files.stay(before)
+        return
+    recorder.continue_in(stream)
+    files.drop_oldest()
+    _print_line(f"recording to {path}")
+
+
+async def _follow(
+    watch: Watch, recorder: Recorder, live: bool, flushed: Callable[[], None]
+) -> None:
     """Hand changes to the recorder until cancelled; what was stored first, as it was written."""
     loop = asyncio.get_running_loop()
     inbox = _Inbox(recorder)
@@ -93,6 +119,7 @@ async def _follow(watch: Watch, recorder: Recorder, live: bool) -> None:
             await asyncio.wait({taking}, timeout=flush_s)
             whole = loop.time() >= poses_at
             recorder.flush(whole)
+            flushed()
             if whole:
                 poses_at = loop.time() + poses_s
         taking.result()

@@ -78,6 +78,10 @@ class Recorder:
         self._frame: tuple[Frame, float] | None = None
         self._picture = Picture(stream, self._clock, self._palette)
 
+    def __len__(self) -> int:
+        """How much it remembers, in values, bars and drawings."""
+        return len(self._known) + len(self._picture)
+
     @property
     def now_s(self) -> float:
         """Fleet time [s] of the newest value."""

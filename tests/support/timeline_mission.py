@@ -12,6 +12,7 @@ from math import atan2, cos, hypot, sin
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import yaml
 
 from keyexpr_schema import keyspace as keys
@@ -510,3 +511,27 @@ def mission(step_s: float = 0.1) -> list[Put]:
     """The whole mission as it would be watched live."""
     everything = [*script(), *frames(step_s)]
     return sorted(everything, key=lambda one: int(one.timestamp.split("/")[0]))
+
+
+def again(number: int) -> list[Put]:
+    """The mission's plan and goals under other names, so many times its length later."""
+    later_s = number * END_S
+    times = ("time_s", "ordered_s", "started_s", "ended_s")
+
+    def moved(one: Any) -> Any:
+        names = {
+            name: f"{getattr(one, name)}-{number}"
+            for name in ("plan", "goal")
+            if isinstance(getattr(one, name, None), str)
+        }
+        own = {name: getattr(one, name, None) for name in times}
+        return msgspec.structs.replace(
+            one, **names, **{name: at + later_s for name, at in own.items() if at}
+        )
+
+    puts = []
+    for change in script():
+        stamp = int(change.timestamp.split("/")[0]) + int(later_s * 2**32)
+        value = None if change.value is None else moved(change.value)
+        puts.append(Put(change.key, moved(change.address), value, f"{stamp}/33"))
+    return puts

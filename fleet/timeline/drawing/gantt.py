@@ -109,6 +109,12 @@ class Lanes:
         self.lanes: dict[str, Lane] = {}
         self.first_s: float | None = None
 
+    def __len__(self) -> int:
+        """How many bars, and ends of bars, may still change, and how many tasks have a bar."""
+        lanes = self.lanes.values()
+        bars = sum(len(lane.bars) + len(lane.logged) for lane in lanes)
+        return bars + len(self._last) + sum(map(len, self._plans.values()))
+
     def robot(self, robot: str) -> Lane:
         """The lane of a robot; made, and empty, if it is new."""
         lane = self.lanes.get(robot)

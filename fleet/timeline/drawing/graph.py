@@ -25,8 +25,8 @@ STEP_S = 0.5
 """A plan is drawn again after so much of the fleet's time and of wall time at the earliest: a
 simulation may run fast. What ended is drawn at once."""
 
-EAGER = 60
-"""Plans of many tasks wait `tasks / 60` seconds instead."""
+EAGER = 120
+"""Plans of more than 60 tasks wait `tasks / 120` seconds instead."""
 
 GLYPHS = {
     TaskState.WAITING: "…",
@@ -111,6 +111,10 @@ class Graphs:
     def __init__(self, sink: Sink) -> None:
         self._sink = sink
         self.drawings: dict[str, Drawing] = {}
+
+    def __len__(self) -> int:
+        """How many plans and tasks are remembered."""
+        return sum(1 + len(d.records) + len(d.nodes_drawn) for d in self.drawings.values())
 
     def of(self, plan: str, at_s: float) -> Drawing:
         """The drawing of a plan, marked for drawing again: something changed at `at_s` [s]."""

@@ -72,6 +72,10 @@ class Picture:
         self._framed: object = None
         self._wall_s = 0.0
 
+    def __len__(self) -> int:
+        """How much it remembers: bars and tasks."""
+        return len(self._lanes) + len(self._graphs)
+
     def show(self, key: str, value: Any, at_s: float, wall_s: float) -> None:
         """Draw a value of the key of that name."""
         if key == SIM_SCENE.name:

@@ -126,6 +126,40 @@ async def test_a_planner_that_lost_its_journal_cancels_what_the_other_ordered(
             await until(gone, "the order is withdrawn")
 
 
+async def test_a_planner_that_lost_its_journal_hears_what_was_reported_before_it_came(
+    router: RouterProcess, tmp_path: Path
+) -> None:
+    async with person(router.endpoint) as session:
+        async with planner(router.endpoint, tmp_path / "one") as first:
+            await ask_for_plan(session)
+            order = await next_order(session, set())
+            first.kill()
+        shutil.rmtree(tmp_path / "one")
+        await carry_out(session, order)
+        async with planner(router.endpoint, tmp_path / "two"):
+
+            async def gone() -> bool:
+                return await session.get(ORDER, OrderAddress.of(order)) is None
+
+            await until(gone, "the order is withdrawn")
+
+
+async def test_a_status_that_the_store_has_lost_is_published_again(
+    router: RouterProcess, tmp_path: Path
+) -> None:
+    async with person(router.endpoint) as session, planner(router.endpoint, tmp_path):
+
+        async def said() -> bool:
+            status = await session.get(PLANNER_STATUS, PlannerAddress())
+            return status is not None and bool(status.planners)
+
+        await until(said, "what the planner can do")
+        before = await session.get(PLANNER_STATUS, PlannerAddress())
+        await session.delete(PLANNER_STATUS, PlannerAddress())
+        await until(said, "the same again")
+        assert await session.get(PLANNER_STATUS, PlannerAddress()) == before
+
+
 async def test_durations_are_learned_and_outlive_the_planners_journal(
     router: RouterProcess, tmp_path: Path
 ) -> None:

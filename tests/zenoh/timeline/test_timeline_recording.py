@@ -30,11 +30,15 @@ from tests.support.polling import until
 DEADLINE_S = 30.0
 
 
-def start(endpoint: str, out: Path, view: bool = False) -> subprocess.Popen[str]:
+def start(
+    endpoint: str, out: Path, view: bool = False, rolls: str = "None"
+) -> subprocess.Popen[str]:
     """A recorder in a process of its own, on a machine without a screen."""
     code = (
         "from pathlib import Path; from fleet.timeline.process import run_recorder; "
-        f"run_recorder(({endpoint!r},), 'robotfleet', Path({str(out)!r}), view={view})"
+        "from fleet.timeline.rolling import Rolling; "
+        f"run_recorder(({endpoint!r},), 'robotfleet', Path({str(out)!r}), view={view}, "
+        f"rolling={rolls})"
     )
     env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     return subprocess.Popen(
@@ -146,6 +150,33 @@ async def test_a_recorder_carries_on_after_the_router_was_away(router, session_c
             assert lane[-1] == Row(7.0, [""])
         process.send_signal(signal.SIGTERM)
         assert await asyncio.to_thread(process.wait, DEADLINE_S) == 0
+
+
+async def test_a_recording_that_rolls_goes_on_in_the_next_file(router, session_config, tmp_path):
+    """A file of any size is large enough here: a new one is begun at each flush."""
+    process = start(router.endpoint, tmp_path / "run.rrd", rolls="Rolling(size_bytes=1, keep=2)")
+    assert process.stdout is not None
+    try:
+        assert process.stdout.readline().strip() == f"recording to {tmp_path / 'run-0001.rrd'}"
+        async with open_session(session_config(component="test")) as session:
+            await work(session, TaskState.RUNNING)
+            for number in (2, 3, 4):
+                line = await asyncio.to_thread(process.stdout.readline)
+                assert line.strip() == f"recording to {tmp_path / f'run-{number:04d}.rrd'}"
+            await work(session, TaskState.SUCCEEDED, 7.0)
+            line = await asyncio.to_thread(process.stdout.readline)
+        process.send_signal(signal.SIGTERM)
+        said = await asyncio.to_thread(process.stdout.read)
+        assert await asyncio.to_thread(process.wait, DEADLINE_S) == 0
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+    last = int(Path([*line.split(), *said.split()][-1]).stem[-4:])
+    files = sorted(tmp_path.glob("*.rrd"))
+    assert [path.name for path in files] == [f"run-{last - 1:04d}.rrd", f"run-{last:04d}.rrd"]
+    for path in files:
+        assert "/fleet/dag/p1" in summary(path).entities
 
 
 @pytest.mark.slow

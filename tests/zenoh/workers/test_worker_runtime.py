@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from keyexpr_schema.facts import NOTHING
+from keyexpr_schema.facts import AT, HOLDING, NOTHING
 from keyexpr_schema.keyspace import FACT, ORDER, REPORT, ROBOT_ALIVE, ROBOT_STATE, UNDECODABLE
 from keyexpr_schema.payloads.motions import MotionKind
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
@@ -21,6 +21,7 @@ from keyexpr_schema.transport.session import SessionConfig
 from sim.backend import Backend
 from sim.files.mission_file import Mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
+from tests.support.polling import until
 from tests.support.router_process import RouterProcess
 from tests.support.worker_world import DEADLINE_S, Fleet, running_fleet
 from workers.skill_context import SkillContext
@@ -68,6 +69,25 @@ async def state_of(fleet: Fleet, robot: str, holds: Callable[[RobotState], bool]
 
 def kinds(fleet: Fleet, robot: str) -> list[MotionKind]:
     return [motion.kind for name, motion in fleet.world.begun if name == robot]
+
+
+async def test_what_a_store_has_lost_of_a_robot_is_observed_again(fleet_of: MakeFleet) -> None:
+    async with fleet_of() as fleet, fleet.worker("hsr"):
+        lost = [FactAddress("hsr", AT), FactAddress("hsr", HOLDING)]
+        for address in lost:
+
+            async def said(address: FactAddress = address) -> bool:
+                return await fleet.session.get(FACT, address) is not None
+
+            await until(said, "what the worker knows when it starts")
+        for address in lost:
+            await fleet.session.delete(FACT, address)
+        for address in lost:
+
+            async def again(address: FactAddress = address) -> bool:
+                return await fleet.session.get(FACT, address) is not None
+
+            await until(again, f"{address.relation} of the robot")
 
 
 async def test_a_cup_is_fetched_and_put_down_and_every_fact_is_true(fleet_of: MakeFleet) -> None:

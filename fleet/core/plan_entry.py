@@ -173,7 +173,7 @@ class PlanEntry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         """The entry with its index, as far as it differs from the entry `known` before."""
         graph = known.index.graph if known is not None else None
         if known is None or known.plan.tasks is not self.plan.tasks or graph is None:
-            graph = PlanGraph(self.current(), skills)
+            graph = PlanGraph((task.task for task in self.plan.tasks), self.records, skills)
         elif known.records is self.records:
             return self
         names = (task.task for task in self.plan.tasks)

@@ -46,21 +46,25 @@ class PlanGraph:
     such a variable, `consumers` the tasks and variables that a task is such a supplier of.
     """
 
-    def __init__(self, records: Iterable[TaskRecord], skills: Skills) -> None:
-        current = {record.task: record for record in records}
+    def __init__(
+        self, tasks: Iterable[str], records: Mapping[str, TaskRecord], skills: Skills
+    ) -> None:
+        current = {task: records[task] for task in tasks if task in records}
+        # A task that was added may wait for one of a revision before.
         befores = {
-            name: [b for b in (*record.after, *record.behind) if b in current]
+            name: tuple(dict.fromkeys(b for b in (*record.after, *record.behind) if b in records))
             for name, record in current.items()
         }
-        graph = TaskGraph(befores)
+        graph = TaskGraph(
+            {name: [b for b in waits_for if b in current] for name, waits_for in befores.items()}
+        )
         self.position = {name: number for number, name in enumerate(current)}
-        self.befores: Mapping[str, tuple[str, ...]] = {
-            name: tuple(dict.fromkeys(found)) for name, found in befores.items()
-        }
-        self.successors = {
-            name: tuple(sorted(later, key=self.position.__getitem__))
-            for name, later in graph.successors.items()
-        }
+        self.befores: Mapping[str, tuple[str, ...]] = befores
+        successors: dict[str, list[str]] = defaultdict(list)
+        for name, waits_for in befores.items():  # in the plan's order
+            for before in waits_for:
+                successors[before].append(name)
+        self.successors = {name: tuple(later) for name, later in successors.items()}
         self.needs: dict[str, tuple[FactKey, ...]] = {}
         setters: dict[FactKey, list[str]] = defaultdict(list)
         for name, record in current.items():
@@ -184,7 +188,26 @@ class PlanIndex(msgspec.Struct, frozen=True, eq=False):
         self._count_actor(new, before, after, changes)
         if new.task in self.graph.position:
             self._move_current(new, before, after, records, changes)
+        elif new.task in self.graph.successors:
+            open_, ready = self._passed_on(new.task, before, after, records)
+            changes.update(open=open_, ready=ready)
         return replace(self, **changes)
+
+    def _passed_on(
+        self,
+        task: str,
+        before: TaskState | None,
+        after: TaskState,
+        records: Mapping[str, TaskRecord],
+    ) -> tuple[Counts[str], immutables.Map[str, tuple[str, ...]]]:
+        """`open` and `ready`, after a task that others wait for has succeeded, or no longer has."""
+        open_, ready, graph = self.open, self.ready, self.graph
+        undone = (after is not TaskState.SUCCEEDED) - (before is not TaskState.SUCCEEDED)
+        for later in graph.successors.get(task, ()) if undone else ():
+            if later in open_:
+                open_ = open_.set(later, open_[later] + undone)
+                ready = _offered(ready, records[later], open_[later] == 0, graph.position)
+        return open_, ready
 
     def _count_actor(
         self, new: TaskRecord, before: TaskState | None, after: TaskState, changes: dict[str, Any]
@@ -236,12 +259,7 @@ class PlanIndex(msgspec.Struct, frozen=True, eq=False):
                 )
                 exposed = _listed(exposed, variable, later, show, graph.position)
             changes["exposed"] = exposed
-        open_, ready = self.open, self.ready
-        if undone:
-            for later in graph.successors[task]:
-                if later in open_:
-                    open_ = open_.set(later, open_[later] + undone)
-                    ready = _offered(ready, records[later], open_[later] == 0, graph.position)
+        open_, ready = self._passed_on(task, before, after, records)
         if (before is TaskState.WAITING) != (after is TaskState.WAITING):
             needs = self.needs
             for name in robots_of(new):
@@ -318,5 +336,5 @@ def _offered(
     return ready
 
 
-EMPTY_INDEX = PlanIndex.of((), {}, PlanGraph((), {}))
+EMPTY_INDEX = PlanIndex.of((), {}, PlanGraph((), {}, {}))
 """That of a plan without tasks."""

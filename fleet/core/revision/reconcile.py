@@ -22,7 +22,7 @@ from fleet.core.model.world import Call, WorldModel, call_of
 from fleet.core.plan_entry import PlanEntry
 from keyexpr_schema.ids import bound
 from keyexpr_schema.payloads.plans import Plan, PlanChange, Task
-from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord, TaskState
 
 
 @dataclass(frozen=True)
@@ -114,8 +114,12 @@ def _going_on(
     for task in graph.order:
         if not under_way.get(calls[task]):
             continue
-        before = {name for name in graph.order if graph.precedes(name, task)} - names.keys()
-        if all(_holds_already(calls[name], world) for name in before):
+        before = {name for name in graph.order if graph.precedes(name, task)}
+        ended = {new for new, old in names.items() if entry.records[old].state in ENDED_TASKS}
+        before -= ended
+        if names.keys().isdisjoint(before) and all(
+            _holds_already(calls[name], world) for name in before
+        ):
             # The same call twice: in the order in which they were given out.
             names[task] = under_way[calls[task]].pop(0)
             skipped |= before

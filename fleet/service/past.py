@@ -42,10 +42,12 @@ from keyexpr_schema.payloads.history import (
     HistoryStats,
     HistoryStatsQuery,
     PastEntry,
+    PlanRecord,
     RequestRecord,
     Retired,
     RetireQuery,
 )
+from keyexpr_schema.payloads.plans import PlanState, PlanStatus
 from keyexpr_schema.payloads.requests import (
     Answer,
     Control,
@@ -174,7 +176,12 @@ class Past:
                     self._archive.retire_goal(event.goal)
                     self._outbox.send([Retract(GOAL_STATUS, GoalAddress(event.goal))])
             case events.PlanProposed() if event.plan.plan not in state.plans:
-                return None if self._archive.live_plan(event.plan.plan) is not None else event
+                past = self._archive.plan(event.plan.plan)
+                if past is None:
+                    return event
+                if self._archive.live_plan(event.plan.plan) is None:
+                    self._reject(event, past)
+                return None
             case events.PlanRequested() | events.ReplanRequested() | events.ControlRequested():
                 ask = event.request
                 if self._archive.answered(ask.request) or self._deal_with(ask, event, state):
@@ -199,8 +206,8 @@ class Past:
         self, ask: Request, past: PastEntry | None, now_s: float, state: State
     ) -> str | None:
         if isinstance(ask, PlanRequest):
-            if ask.plan is not None and past and self._archive.live_plan(ask.plan) is not None:
-                return f"there is a plan {ask.plan} already; choose another name or delete it"
+            if past is not None:
+                return _name_is_used(past, now_s)
         elif past is not None:
             return f"plan {ask.plan} is not running: it {ended(past, now_s)}"
         for goal in () if isinstance(ask, ControlRequest) else ask.goals:
@@ -209,6 +216,28 @@ class Past:
                 reason = f": {known.reason}" if known.reason else ""
                 return f"goal {goal} is {known.outcome.value}{reason}"
         return None
+
+    def _reject(self, event: events.PlanProposed, past: PastEntry) -> None:
+        """Say of a proposal that its name has been used: nothing of it is ever carried out."""
+        plan, at_s, at_wall_s = event.plan, event.time_s, event.wall_time_s
+        status = PlanStatus(
+            plan=plan.plan,
+            revision=plan.revision,
+            state=PlanState.REJECTED,
+            goals=plan.goals,
+            reason=_name_is_used(past, at_wall_s),
+            time_s=at_s,
+        )
+        record = PlanRecord(
+            spec=plan,
+            status=status,
+            begun_s=at_s,
+            begun_wall_s=at_wall_s,
+            ended_s=at_s,
+            ended_wall_s=at_wall_s,
+        )
+        self._archive.add([record])
+        self._publish(record)
 
     def _answer(self, ask: Request, event: Event, accepted: bool, sentence: str) -> None:
         record = RequestRecord(
@@ -298,3 +327,10 @@ def _span(span_s: float) -> str:
             in_s = {"days": 86_400.0, "h": 3600.0, "min": 60.0}[unit]
             return f"{span_s / in_s:.0f} {unit}"
     return f"{max(0.0, span_s):.0f} s"
+
+
+def _name_is_used(past: PastEntry, now_s: float) -> str:
+    """Why a plan cannot be called so: its orders would be those of the one before."""
+    return (
+        f"there has been a plan {past.plan} already: it {ended(past, now_s)}; choose another name"
+    )

@@ -79,6 +79,8 @@ async def test_the_journal_is_followed_through_a_restart_of_the_router(
             env={**robotctl.env, "PYTHONUNBUFFERED": "1"},
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE,
+            # What runs in the background of a shell has it ignored, and hands that on.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
         assert child.stdout is not None
         try:

@@ -19,7 +19,7 @@ from keyexpr_schema.keyspace import (
     TASK_RECORD,
 )
 from keyexpr_schema.payloads.goals import Goal, GoalAddress, GoalState
-from keyexpr_schema.payloads.plans import PlanAddress, PlanState
+from keyexpr_schema.payloads.plans import Plan, PlanAddress, PlanState
 from keyexpr_schema.payloads.requests import (
     Control,
     ControlRequest,
@@ -174,7 +174,7 @@ async def test_a_plan_that_ended_is_answered_for_and_deleted_with_its_reports(
         taken = PlanRequest(request="r2", plan="p1", goals=("g1",))
         await session.confirm(PLAN_REQUEST, RequestAddress("r2"), taken)
         answer = await value(session, ANSWER, RequestAddress("r2"), accepted=False)
-        assert "there is a plan p1 already" in answer.sentence
+        assert "there has been a plan p1 already" in answer.sentence
         deleted = await robotctl.soon("plan", "delete", "p1")
         assert deleted.out.strip() == "plan p1 is deleted"
         assert await keys_about(session, 1) == {PLAN_REQUEST.name, ANSWER.name}
@@ -220,3 +220,29 @@ async def test_a_goal_of_the_same_name_is_a_new_one_when_the_old_one_was_deleted
         again = Goal(goal="g1", text="Bring cup 1 to the kitchen")
         await session.confirm(GOAL_SPEC, GoalAddress("g1"), again)
         await value(session, GOAL_STATUS, GoalAddress("g1"), state=GoalState.WAITING)
+
+
+async def test_the_name_of_a_plan_that_was_deleted_is_not_used_again(
+    router: RouterProcess, tmp_path: Path
+) -> None:
+    """Its orders would be taken for those of the plan before: the robot has done them."""
+    async with (
+        person(router.endpoint) as session,
+        planner(router.endpoint, tmp_path / "planner"),
+    ):
+        await mission(session, 1)
+        delete = ControlRequest(request="d", control=Control.DELETE, plan="p1")
+        await session.confirm(CONTROL_REQUEST, RequestAddress("d"), delete)
+        await value(session, ANSWER, RequestAddress("d"), accepted=True)
+        assert not await session.list(PLAN_STATUS)
+        goal = Goal(goal="g9", text="Bring cup 1 to the kitchen")
+        await session.confirm(GOAL_SPEC, GoalAddress("g9"), goal)
+        await value(session, GOAL_STATUS, GoalAddress("g9"), state=GoalState.WAITING)
+        again = PlanRequest(request="again", plan="p1")
+        await session.confirm(PLAN_REQUEST, RequestAddress("again"), again)
+        answer = await value(session, ANSWER, RequestAddress("again"), accepted=False)
+        assert answer.sentence.startswith("there has been a plan p1 already: it succeeded")
+        proposal = Plan(plan="p1", goals=("g9",), conditions=(), tasks=())
+        await session.confirm(PLAN_PROPOSAL, PlanAddress("p1"), proposal)
+        status = await value(session, PLAN_STATUS, PlanAddress("p1"), state=PlanState.REJECTED)
+        assert status.reason == answer.sentence

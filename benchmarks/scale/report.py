@@ -210,10 +210,17 @@ def write(folder: Path) -> None:
 
 def _summary(now: dict[str, Any], before: dict[str, Any]) -> str:
     rows = [
-        (row.what, row.to_reach, row.measured(before), row.measured(now), row.load(now))
+        (
+            row.what,
+            row.to_reach,
+            row.measured(before),
+            row.load(before),
+            row.measured(now),
+            row.load(now),
+        )
         for row in ROWS
     ]
-    return as_markdown(("what", "to reach", "before", "now", "load average, now"), rows)
+    return as_markdown(("what", "to reach", "before", "at load", "now", "at load"), rows)
 
 
 def _table(part: str, about: dict[str, Any]) -> str:

@@ -20,7 +20,7 @@ from keyexpr_schema.payloads.plans import PlanAddress
 from keyexpr_schema.payloads.tasks import TaskState
 from keyexpr_schema.transport.session import Session
 
-ROBOTS = (10, 50)
+ROBOTS = (50,)
 LAPS = 8
 WATCHED_S = 60.0
 BEGIN_S = 120.0

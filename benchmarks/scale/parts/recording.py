@@ -17,7 +17,7 @@ FOLDER = "recording"
 
 def measure(quick: bool) -> list[dict[str, Any]]:
     """A row for each sixth of the time."""
-    return asyncio.run(_run(30.0 if quick else SECONDS))
+    return asyncio.run(_run(60.0 if quick else SECONDS))
 
 
 async def _run(seconds: float) -> list[dict[str, Any]]:

@@ -72,7 +72,7 @@ def test_the_page_says_what_was_measured_before_and_now(tmp_path: Path) -> None:
         (tmp_path / name).write_text(as_json(parts), encoding="utf-8")
     report.write(tmp_path)
     page = (tmp_path / "scale.md").read_text(encoding="utf-8")
-    assert "| - · - · 9 (of 77, then cut off) | - · - · 500 | 0.5, 0.7 |" in page
+    assert "| - · - · 9 (of 77, then cut off) | 0.5, 0.7 | - · - · 500 | 0.5, 0.7 |" in page
     assert "not finished in 60 s, 120 tasks done" in page
     assert "p50 2.0, p99 4.0 ms; p50 2.0 x Zenoh's 1.00" in page
     assert "0.10 s · cut off at 4,000" in page

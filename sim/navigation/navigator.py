@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from operator import itemgetter
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.errors import NoPath, NoStance
+from sim.files.solids import Solid
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation.clearance import segment_gap
 from sim.navigation.distance_field import DistanceField
@@ -109,10 +112,59 @@ class Navigator:
             raise NoPath(f"there is no way to {place} from where {robot} stands")
         self._tasks[robot] = _Task(place, place=place)
 
+    def look_out_for(self, obstacles: Callable[[], Sequence[Solid]]) -> None:
+        """Keep stances, and the ways to them, clear of what stands there for the time being."""
+        self._spots.obstacles = obstacles
+
+    def reserve(self, robot: str, points_m: Sequence[tuple[float, float]]) -> bool:
+        """Keep others away from the line through `points_m`, which `robot` will drive by itself.
+
+        Only for a robot at a stance. False, and nothing is kept, while others are there.
+        """
+        traveller = self._robots[robot]
+        parked = traveller.parked
+        if parked is None:
+            return False
+        gap = traveller.radius_m + LARGEST_RADIUS_M + 2 * TRACKING_M
+        owned = parked.owned.union(*(self._lattice.near(a, b, gap) for a, b in pairwise(points_m)))
+        if owned & self._claimed_by_others(robot):
+            return False
+        traveller.parked = replace(parked, owned=owned)
+        traveller.recount()
+        return True
+
+    def settle(self, robot: str) -> None:
+        """Note that `robot` has driven by itself to where it stands now: that is its stance."""
+        traveller = self._robots[robot]
+        parked = traveller.parked
+        if parked is None:
+            return
+        x, y, yaw = self._poses[robot]
+        ways = self._spots.ways_out((x, y), traveller.radius_m)
+        taken = self._claimed_by_others(robot)
+        for node in sorted(ways, key=lambda node: node != parked.node):
+            dock = self._spots.dock((x, y), node, traveller.radius_m, yaw)
+            if not dock.owned & taken:
+                traveller.parked, traveller.track, traveller.corners = dock, [node], []
+                break
+        else:
+            traveller.parked = replace(parked, point_m=(x, y), yaw_rad=yaw)
+        traveller.recount()
+
+    def _claimed_by_others(self, robot: str) -> frozenset[int]:
+        return frozenset().union(
+            *(other.claims for name, other in self._robots.items() if name != robot)
+        )
+
     def approach(
-        self, robot: str, point_m: tuple[float, float, float], reach_m: tuple[float, float]
+        self,
+        robot: str,
+        point_m: tuple[float, float, float],
+        reach_m: tuple[float, float],
+        heading_rad: float | None = None,
     ) -> None:
-        """Let `robot` stand facing `point_m`, its centre between `reach_m` (min, max) away from it.
+        """Let `robot` stand facing `point_m`, its centre between `reach_m` (min, max) away from it,
+        and itself turned to `heading_rad` if that is given.
 
         If all such stances are taken, it waits for one for `PATIENCE_S`, then its leg has failed.
 
@@ -123,7 +175,7 @@ class Navigator:
         self.cancel(robot)
         traveller = self._robots[robot]
         what = f"({point_m[0]:.2f}, {point_m[1]:.2f})"
-        docks = self._spots.stances(point_m, traveller.radius_m, reach_m)
+        docks = self._spots.stances(point_m, traveller.radius_m, reach_m, heading_rad)
         if not docks:
             why = self._spots.why_not(point_m, traveller.radius_m, reach_m)
             raise NoStance(f"{robot} does not get to {what}: {why}")

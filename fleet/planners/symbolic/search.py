@@ -225,7 +225,7 @@ def uniform_cost_search(
             continue
         closed.add(state)
         facts = {**start, **dict(zip(variables, state, strict=True))}
-        if condition_holds(facts, goal):
+        if condition_holds(facts, goal, world):
             return Solution(_path(state, came), spent, facts)
         for number, action, reads, needed, writes in moves:
             if [state[i] for i in reads] != needed:

@@ -35,12 +35,13 @@ class ParameterType:
     @cached_property
     def bases(self) -> tuple[str, ...]:
         """Which of `robot`, `place` and `object` its names can be."""
-        found = {word if word in BASE_TYPES else OBJECT for row in self.alternatives for word in row}
+        found = {
+            word if word in BASE_TYPES else OBJECT for row in self.alternatives for word in row
+        }
         return tuple(base for base in BASE_TYPES if base in found)
 
     def admits(self, kind: str | None, thing: Object | None) -> bool:
-        """Whether a name of that base type may stand here; `thing` is what it names, if an object.
-        """
+        """Whether a name of that base type may stand here; `thing` is the object."""
         return any(
             all(word == kind or (thing is not None and thing.is_a(word)) for word in words)
             for words in self.alternatives
@@ -64,10 +65,14 @@ def parse_type(text: str) -> ParameterType:
                     "things, joined by & and |"
                 )
         if len(words) > 1 and not {ROBOT, PLACE}.isdisjoint(words):
-            raise BadType(f"{text!r} narrows {ROBOT} or {PLACE}, which stand alone; & is for things")
+            raise BadType(
+                f"{text!r} narrows {ROBOT} or {PLACE}, which stand alone; & is for things"
+            )
         alternatives.append(words)
     if any(words == (ROBOT,) for words in alternatives) and len(alternatives) > 1:
-        raise BadType(f"{text!r} would be a robot or something else; a robot takes part or does not")
+        raise BadType(
+            f"{text!r} would be a robot or something else; a robot takes part or does not"
+        )
     return ParameterType(tuple(alternatives))
 
 

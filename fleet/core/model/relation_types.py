@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from fleet.core.model.formulas import (
+from fleet.core.model.formulas.evaluation import is_number
+from fleet.core.model.formulas.nodes import (
     ConditionalEffect,
     Formula,
     Holds,
     atoms,
-    is_number,
 )
 from fleet.core.model.parameter_types import BadType, narrowed, parse_type
 from fleet.errors import BadSkillFile
@@ -97,9 +97,7 @@ def check_literals(
             )
 
 
-def _fits(
-    value: Value, wanted: str | tuple[str, ...], parameters: Mapping[str, str]
-) -> bool:
+def _fits(value: Value, wanted: str | tuple[str, ...], parameters: Mapping[str, str]) -> bool:
     if value is None or (isinstance(value, str) and value.startswith("$")):
         return True
     if not isinstance(wanted, str):

@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from fleet.core.model.formula_text import KEYWORDS, BadFormula, parse_effect, parse_formula
-from fleet.core.model.formulas import TRUE, ConditionalEffect, Formula, relations_of
+from fleet.core.model.formulas.nodes import TRUE, ConditionalEffect, Formula, relations_of
+from fleet.core.model.formulas.text import KEYWORDS, BadFormula, parse_effect, parse_formula
 from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, BadType, parse_type
 from fleet.core.model.relation_types import (
     RelationType,
@@ -39,9 +39,7 @@ def skills_from_data(data: Any, where: str) -> dict[str, SkillModel]:
     }
 
 
-def _skill(
-    name: str, model: Any, relations: Mapping[str, RelationType], where: str
-) -> SkillModel:
+def _skill(name: str, model: Any, relations: Mapping[str, RelationType], where: str) -> SkillModel:
     if not isinstance(model, dict):
         raise BadSkillFile(f"{where} must be a mapping with {', '.join(sorted(_FIELDS))}")
     if unknown := set(model) - _FIELDS:
@@ -73,7 +71,11 @@ def _skill(
     spoken_of = {
         *(literal.variable.relation for literal in always),
         *(effect.variable.relation for effect in conditional),
-        *(name for row in (*conditions, *(e.when for e in conditional)) for name in relations_of(row)),
+        *(
+            name
+            for row in (*conditions, *(e.when for e in conditional))
+            for name in relations_of(row)
+        ),
     }
     return SkillModel(
         name=name,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
-from fleet.core.model.formulas import ConditionalEffect, Formula, grounded, grounded_effect
+from fleet.core.model.formulas.nodes import ConditionalEffect, Formula, grounded, grounded_effect
 from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, ParameterType, parse_type
 from fleet.core.model.relation_types import RelationType
 from fleet.language.vocabulary import SkillPhrase

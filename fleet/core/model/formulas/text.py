@@ -1,13 +1,13 @@
 """Formulas as skill files write them, read by recursive descent; errors are one sentence.
 
-    formula  := part ("or" part)*            part := bit ("and" bit)*
-    bit      := "not" bit | "(" formula ")" | ("all" | "any") "(" x ":" type "," formula ")"
-              | type "(" name ")" | term (= | != | < | <= | > | >=) term
-    term     := item (("+" | "-") item)*
-    item     := number | word | relation "(" name ")" | "count" "(" x ":" type "," formula ")"
-              | "sum" "(" x ":" type "," formula "," term ")"
-    effect   := "all" "(" x ":" type "," effect ")" | "if" formula ":" effect
-              | relation "(" name ")" ("=" value | "+=" term | "-=" term)
+formula  := part ("or" part)*            part := bit ("and" bit)*
+bit      := "not" bit | "(" formula ")" | ("all" | "any") "(" x ":" type "," formula ")"
+          | type "(" name ")" | term (= | != | < | <= | > | >=) term
+term     := item (("+" | "-") item)*
+item     := number | word | relation "(" name ")" | "count" "(" x ":" type "," formula ")"
+          | "sum" "(" x ":" type "," formula "," term ")"
+effect   := "all" "(" x ":" type "," effect ")" | "if" formula ":" effect
+          | relation "(" name ")" ("=" value | "+=" term | "-=" term)
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from __future__ import annotations
 import re
 from collections.abc import Collection
 
-from fleet.core.model.formulas import (
-    COMPARISONS,
+from fleet.core.model.formulas.evaluation import COMPARISONS
+from fleet.core.model.formulas.nodes import (
     TRUE,
     And,
     Compare,

@@ -77,9 +77,8 @@ def test_the_checker_refuses_an_argument_of_another_type() -> None:
     checked = check_plan(dusting("tv_1"), house())
     assert isinstance(checked, InvalidPlan)
     assert [(v.code, v.task) for v in checked.violations] == [("wrong-type", "t1")]
-    assert (
-        "must be movable & dish | jar and is tv_1, which is not" in checked.violations[0].sentence
-    )
+    sentence = checked.violations[0].sentence
+    assert "must be movable & dish | jar and is tv_1, which is not" in sentence
     assert "there are jar_1, mug_1" in sentence
     assert not check_plan(dusting("mug_1"), house()).violations
 

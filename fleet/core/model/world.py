@@ -11,6 +11,7 @@ import msgspec
 
 from fleet.core.model.derived import Inventory, holds
 from fleet.core.model.durations import pace, work_s
+from fleet.core.model.parameter_types import ParameterType, names_of, parse_type
 from fleet.core.model.skills import Action, SkillModel
 from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Literal, Value
 from keyexpr_schema.payloads.durations import Durations
@@ -95,6 +96,23 @@ class WorldModel:
         if name in self.objects:
             return "object"
         return "place" if name in self.places else None
+
+    def is_of_type(self, name: str, type_: ParameterType) -> bool:
+        """Whether a name may stand where that type is asked for; not if nothing has the name."""
+        return type_.admits(self.kind_of(name), self.objects.get(name))
+
+    def of_type(self, type_: ParameterType | str) -> tuple[str, ...]:
+        """Every name that may stand where that type is asked for, in a fixed order."""
+        text = str(type_)
+        if text not in self._of_type:
+            kind = parse_type(type_) if isinstance(type_, str) else type_
+            things = self.objects.values()
+            self._of_type[text] = names_of(kind, self.robots, self.places, things)
+        return self._of_type[text]
+
+    @cached_property
+    def _of_type(self) -> dict[str, tuple[str, ...]]:
+        return {}
 
     @cached_property
     def team(self) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from functools import cache
 
 from msgspec.structs import replace
 
+from fleet.core.model.parameter_types import OBJECT
 from fleet.core.model.world import WorldModel, condition_holds
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import PlanningProblem
@@ -147,7 +148,7 @@ def _needs_a_tool(condition: Condition, world: WorldModel) -> bool:
     """Whether a skill for it takes more objects than the one that the condition is about."""
     own = condition.subject in world.objects
     return any(
-        list(skill.parameters.values()).count("object") > own
+        sum(kind.bases == (OBJECT,) for kind in skill.types.values()) > own
         for skill in world.skills.values()
         if any(row.variable.relation == condition.relation for row in skill.after)
     )

@@ -43,11 +43,15 @@ def ground_actions(
     only undoes, or makes true what nobody asks for (that another place was searched), is left out:
     it would never be on a cheapest way, and would multiply the states to be looked at.
     """
-    names = {"robot": robots, "object": objects, "place": tuple(world.places)}
+    there = (*robots, *objects, *world.places)
     possible: list[Action] = []
     for name in sorted(_related(world, goal)):
         skill = world.skills[name]
-        for values in product(*(names[kind] for kind in skill.parameters.values())):
+        names = (
+            [name for name in there if world.is_of_type(name, kind)]
+            for kind in skill.types.values()
+        )
+        for values in product(*names):
             action = skill.ground(dict(zip(skill.parameters, values, strict=True)))
             if len(set(action.participants)) == len(action.participants) and not any(
                 world.lacks(action.args[parameter], action, parameter)

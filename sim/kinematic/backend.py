@@ -24,7 +24,8 @@ from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from sim.backend import Backend
 from sim.files.world_schema import WorldFile
 from sim.kinematic.scene import draw_frame, draw_scene
-from sim.kinematic.state import STATE_OF, KinematicObject, KinematicRobot, KinematicState
+from sim.kinematic.state import STATE_OF, KinematicState
+from sim.kinematic.whereabouts import KinematicObject, KinematicRobot
 from sim.navigation.routes import Route, Routes
 from sim.states import ThingStates
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 from operator import itemgetter
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.errors import NoPath, NoStance
 from sim.files.solids import Solid
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
+from sim.navigation import own_ways
 from sim.navigation.clearance import segment_gap
 from sim.navigation.distance_field import DistanceField
 from sim.navigation.lattice import TRACKING_M
@@ -121,40 +121,11 @@ class Navigator:
 
         Only for a robot at a stance. False, and nothing is kept, while others are there.
         """
-        traveller = self._robots[robot]
-        parked = traveller.parked
-        if parked is None:
-            return False
-        gap = traveller.radius_m + LARGEST_RADIUS_M + 2 * TRACKING_M
-        owned = parked.owned.union(*(self._lattice.near(a, b, gap) for a, b in pairwise(points_m)))
-        if owned & self._claimed_by_others(robot):
-            return False
-        traveller.parked = replace(parked, owned=owned)
-        traveller.recount()
-        return True
+        return own_ways.reserve(self._robots, robot, self._lattice, points_m)
 
     def settle(self, robot: str) -> None:
         """Note that `robot` has driven by itself to where it stands now: that is its stance."""
-        traveller = self._robots[robot]
-        parked = traveller.parked
-        if parked is None:
-            return
-        x, y, yaw = self._poses[robot]
-        ways = self._spots.ways_out((x, y), traveller.radius_m)
-        taken = self._claimed_by_others(robot)
-        for node in sorted(ways, key=lambda node: node != parked.node):
-            dock = self._spots.dock((x, y), node, traveller.radius_m, yaw)
-            if not dock.owned & taken:
-                traveller.parked, traveller.track, traveller.corners = dock, [node], []
-                break
-        else:
-            traveller.parked = replace(parked, point_m=(x, y), yaw_rad=yaw)
-        traveller.recount()
-
-    def _claimed_by_others(self, robot: str) -> frozenset[int]:
-        return frozenset().union(
-            *(other.claims for name, other in self._robots.items() if name != robot)
-        )
+        own_ways.settle(self._robots, robot, self._spots, self._poses[robot])
 
     def approach(
         self,

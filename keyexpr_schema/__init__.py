@@ -40,8 +40,8 @@ else:
                 "UndecodablePayload Unreachable"
             ),
             "facts": (
-                "AT HELD HOLDING LOCATED NOTHING ON SEARCHED FactKey Literal Value parse_literal "
-                "parse_value render_value"
+                "AT HELD HOLDING IN IS_OPEN LOCATED NOTHING ON REACHABLE SEARCHED FactKey Literal "
+                "Value parse_literal parse_value render_value"
             ),
             "ids": "Id actor_arg check_id slug",
             "key": "Address Component Delivery Key Payload",
@@ -83,8 +83,8 @@ else:
                 "TaskAddress TaskRecord TaskState Try"
             ),
             "payloads.world": (
-                "Claim ClaimAddress Fact FactAddress Object ObjectAddress Place PlaceAddress "
-                "Statement StatementAddress StatementStatus Surface"
+                "Claim ClaimAddress Fact FactAddress Feature Object ObjectAddress Place "
+                "PlaceAddress Statement StatementAddress StatementStatus Surface"
             ),
             "transport.router": "run_router",
             "transport.session": (

@@ -20,17 +20,25 @@ NOTHING = "nothing"
 """The value of `holding` for an empty hand."""
 
 AT = "at"
-"""Where an object or a robot is: a place; for what a robot has in hand or basket, that robot."""
+"""What carries an object or a robot directly, as finely as is known: a place, a thing that it is on
+or in, or a robot or person who has it. `fleet.core.model.derived` says what follows from that."""
 ON = "on"
-"""The surface, or `floor`, that an object lies on."""
+"""What an object lies on. Of a thing it says the same as `at`; `floor`, and a surface that is no
+thing of its own, stand beside `at`, which is then a place."""
+IN = "in"
+"""The thing that an object is in: another reading of `at`."""
 HOLDING = "holding"
 """What a robot's hand holds: an object or `nothing`."""
 SEARCHED = "searched"
 """Whether somebody has looked around in a place."""
+IS_OPEN = "is_open"
+"""Whether something that opens is open."""
 LOCATED = "located"
-"""Derived, in goals only: whether it is known where an object is."""
+"""Derived: whether it is known where an object is."""
 HELD = "held"
-"""Derived, in goals only: whether a hand holds an object."""
+"""Derived: whether a robot's hand holds an object."""
+REACHABLE = "reachable"
+"""Derived: whether an object can be seen and taken, because it is in nothing that is closed."""
 
 
 class FactKey(NamedTuple):

@@ -97,7 +97,7 @@ def actions(steps: Sequence[Step], world: WorldModel) -> list[Action]:
 
 
 def _action(skill: SkillModel) -> str:
-    parameters = [f"?{name} - a-{kind}" for name, kind in skill.parameters.items()]
+    parameters = [f"?{name} - a-{kind.bases[0]}" for name, kind in skill.types.items()]
     known = dict(skill.before)
     before = [f"(is-{r} ?{s} {_term(v, skill)})" for (r, s), v in skill.before]
     before += [f"(skilled-{skill.name} ?{skill.actor_parameter})"]

@@ -45,7 +45,7 @@ class Goal(Payload, frozen=True, kw_only=True):
     With no `conditions` the planner reads them out of `text`. `due_s` is when it should be done, on
     the fleet's clock [s]; plans are made so that goals are as little late as can be. `said_s` is
     when it was said, on the same clock; 0: it does not say. The same words said again later, after
-    the goal was deleted, are another wish.
+    the goal was deleted, are another wish. `speaker` is the person who says it: "me" in the text.
     """
 
     goal: Id
@@ -56,6 +56,7 @@ class Goal(Payload, frozen=True, kw_only=True):
     """Order in which goals were given; ties in priority go to the lower one."""
     due_s: float | None = None
     said_s: float = 0.0
+    speaker: Id | None = None
 
 
 class GoalState(str, Enum):

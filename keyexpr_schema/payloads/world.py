@@ -5,6 +5,7 @@ Lengths are metres in the world frame (x east, y north, z up), angles radians.
 
 from __future__ import annotations
 
+from enum import Enum
 from math import cos, hypot, sin
 
 from keyexpr_schema.facts import FactKey, Literal, Value
@@ -132,7 +133,8 @@ class Place(Payload, frozen=True, kw_only=True):
     """A region of the floor with a name.
 
     `region_m` is a list of axis-aligned rectangles `(x_min, y_min, x_max, y_max)`.
-    `travel_m` gives the driven distance from here to other places.
+    `travel_m` gives the driven distance from here to other places. `part_of` is the place that it
+    lies in: a corner of a room, a room of a flat.
     """
 
     place: Id
@@ -141,18 +143,40 @@ class Place(Payload, frozen=True, kw_only=True):
     region_m: tuple[tuple[float, float, float, float], ...] = ()
     surfaces: tuple[Surface, ...] = ()
     travel_m: dict[str, float] = {}
+    part_of: Id | None = None
 
     def contains(self, x_m: float, y_m: float) -> bool:
         """Whether the point lies in the region, borders included."""
         return any(a <= x_m <= c and b <= y_m <= d for a, b, c, d in self.region_m)
 
 
+class Feature(str, Enum):
+    """What can be done with a thing. World files may use any other word besides these."""
+
+    MOVABLE = "movable"
+    """It can be taken up and carried."""
+    SUPPORTS = "supports"
+    """Things can be on it."""
+    CONTAINS = "contains"
+    """Things can be in it."""
+    OPENABLE = "openable"
+    """It opens and closes; what is in it can be seen and reached only while it is open."""
+    SWITCHABLE = "switchable"
+    """It is switched on and off."""
+    PERSON = "person"
+    """Somebody whom things can be given to; what is at a person is in that person's hand."""
+
+
 class Object(Payload, frozen=True, kw_only=True):
-    """A thing that can be spoken about. `ordinal` counts within a kind: cup 1 is the first cup.
+    """A thing that can be spoken about: cups, but also furniture, appliances, trays and people.
+    `ordinal` counts within a kind: cup 1 is the first cup.
 
     `categories` are nouns for more than its kind ("dish"), `uses` verbs for what it is good for
     ("drink": it is "something to drink"). `home` is the place where it belongs, for those who tidy
-    up.
+    up. `features` (`Feature`, or any other word) say what can be done with it. `part_of` is the
+    thing that it is a fixed part of, as a drawer is of its cabinet. `room` is how many things there
+    can be on it or in it at once (`None`: no limit). `properties` are numbers and words that skill
+    files may compare, e.g. `size_l`.
     """
 
     object: Id
@@ -165,6 +189,17 @@ class Object(Payload, frozen=True, kw_only=True):
     home: Id | None = None
     categories: tuple[str, ...] = ()
     uses: tuple[str, ...] = ()
+    features: tuple[str, ...] = ()
+    part_of: Id | None = None
+    room: float | None = None
+    properties: dict[str, Value] = {}
+
+    def is_a(self, word: str) -> bool:
+        """Whether a kind, category or feature is true of it. A person, or a fixed part of another
+        thing, is never `movable`."""
+        if word == Feature.MOVABLE:
+            return self.movable and self.part_of is None and not self.is_a(Feature.PERSON)
+        return word == self.kind or word in self.features or word in self.categories
 
 
 class ClaimAddress(Address, frozen=True):

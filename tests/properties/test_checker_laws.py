@@ -52,7 +52,7 @@ def works(plan: Plan, world: WorldModel, allocation: dict[str, str]) -> bool:
             ):
                 return False
             facts.update({literal.variable: literal.value for literal in action.after})
-        if not all(condition_holds(facts, condition) for condition in plan.conditions):
+        if not all(condition_holds(facts, condition, world) for condition in plan.conditions):
             return False
     return True
 

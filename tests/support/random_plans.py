@@ -201,5 +201,5 @@ def _goal(draw: st.DrawFn, facts: dict[FactKey, Value]) -> Condition:
         Condition(relation="at", subject="cup_1", value="hallway", any_of=("cup_1", "cup_2")),
         Condition(relation="at", subject="hsr", value="hallway"),
     ]
-    holding = [goal for goal in goals if condition_holds(facts, goal)]
+    holding = [goal for goal in goals if condition_holds(facts, goal, WORLD)]
     return draw(st.sampled_from(holding if draw(st.integers(0, 5)) else goals))

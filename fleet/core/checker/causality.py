@@ -50,7 +50,7 @@ class Causality:
                 self._check_space(task, carrier)
         final = self._final_facts()
         for condition in self._plan.conditions:
-            if not condition_holds(final, condition):
+            if not condition_holds(final, condition, self._world):
                 sentence = f"{condition} does not hold when the plan is done"
                 self._report("goal-unmet", sentence, condition=condition)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 
+from fleet.core.model.parameter_types import BASE_TYPES, ROBOT, ParameterType
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.ids import actor_arg, actor_in
@@ -66,8 +67,8 @@ class PlanForm:
                 f"`{parameter}` must be {actor_arg(task.actor)}, "
                 f"the actor that does the task, not {task.args[parameter]}",
             )
-        kinds = skill.parameters.items()
-        action = skill.ground({name: self._bound(task, name, kind) for name, kind in kinds})
+        types = skill.types.items()
+        action = skill.ground({name: self._bound(task, name, kind) for name, kind in types})
         if len(set(action.participants)) < len(action.participants):
             raise _Malformed(
                 "robot-in-two-places",
@@ -76,9 +77,9 @@ class PlanForm:
             )
         return action
 
-    def _bound(self, task: Task, parameter: str, kind: str) -> str:
+    def _bound(self, task: Task, parameter: str, kind: ParameterType) -> str:
         value = task.args[parameter]
-        if kind == "robot" and (actor := actor_in(value)) is not None:
+        if ROBOT in kind.bases and (actor := actor_in(value)) is not None:
             if actor not in self._actors:
                 raise _Malformed(
                     "unknown-name",
@@ -90,17 +91,16 @@ class PlanForm:
             if robot is None or robot not in self._world.robots:
                 raise _Malformed("unallocated", f"actor {actor} has no robot")
             return robot
-        found = self._world.kind_of(value)
-        if found != kind:
-            what = "which nobody knows" if found is None else f"which is a {found}"
-            choices = {
-                "robot": self._world.robots,
-                "object": self._world.objects,
-                "place": self._world.places,
-            }[kind]
+        if not self._world.is_of_type(value, kind):
+            found = self._world.kind_of(value)
+            what = "which nobody knows"
+            if found is not None:
+                what = f"which is a {found}" if found not in kind.bases else "which is not"
+            wanted = f"a {kind}" if str(kind) in BASE_TYPES else str(kind)
             raise _Malformed(
                 "unknown-name" if found is None else "wrong-type",
-                f"`{parameter}` must be a {kind} and is {value}, {what}{_among(choices)}",
+                f"`{parameter}` must be {wanted} and is {value}, {what}"
+                f"{_among(self._world.of_type(kind))}",
             )
         return value
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from fleet.core.model.derived import holds
 from fleet.core.model.skills import Action, Skills
 from fleet.core.model.world import WorldModel, known_value, room_left
 from keyexpr_schema.facts import FactKey, Literal, Value, render_value
@@ -22,8 +23,12 @@ def first_unmet(
     action: Action, facts: Mapping[FactKey, Value], world: WorldModel
 ) -> Literal | None:
     """The first precondition of the action that does not hold in `facts`; baskets aside."""
+
+    def value_of(variable: FactKey) -> Value:
+        return known_value(variable, facts, world)
+
     for literal in action.before:
-        if known_value(literal.variable, facts, world) != literal.value:
+        if not holds(literal, value_of, world):
             return literal
     return None
 
@@ -37,7 +42,7 @@ def applicable(action: Action, facts: Mapping[FactKey, Value], world: WorldModel
 
 def effects_hold(action: Action, world: WorldModel) -> bool:
     """Whether all that the action makes true is believed already."""
-    return all(world.value(*literal.variable) == literal.value for literal in action.after)
+    return all(holds(literal, world.facts.get, world) for literal in action.after)
 
 
 def unmet_before(action: Action, world: WorldModel) -> str | None:
@@ -48,5 +53,6 @@ def unmet_before(action: Action, world: WorldModel) -> str | None:
         return f"{literal.variable} should be {render_value(wanted)} and is {render_value(has)}"
     for carrier in action.space_in:
         if room_left(carrier, world.facts, world) < 1:
-            return f"there is no room in {carrier}'s basket"
+            where = f"in {carrier}'s basket" if carrier in world.robots else f"on or in {carrier}"
+            return f"there is no room {where}"
     return None

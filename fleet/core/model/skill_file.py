@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from fleet.core.model.skills import MEASURES, PARAMETER_TYPES, SPACE, Need, SkillModel
+from fleet.core.model.formulas.nodes import TRUE, ConditionalEffect, Formula, relations_of
+from fleet.core.model.formulas.text import KEYWORDS, BadFormula, parse_effect, parse_formula
+from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, BadType, parse_type
+from fleet.core.model.relation_types import (
+    RelationType,
+    check_literals,
+    narrowed_parameters,
+    relation_types,
+)
+from fleet.core.model.skills import MEASURES, SPACE, Need, SkillModel
 from fleet.errors import BadSkillFile
-from keyexpr_schema.facts import Literal, parse_literal
+from keyexpr_schema.facts import AT, IN, ON, FactKey, Literal, parse_literal
 
 _SPACE = re.compile(rf"^\s*{SPACE}\(\s*(\w+)\s*\)\s*$")
 _NEED = re.compile(r"^\s*(\w+)(?:\s*>=\s*(\w+)\(\s*(\w+)\s*\))?\s*$")
@@ -23,13 +32,14 @@ def skills_from_data(data: Any, where: str) -> dict[str, SkillModel]:
     """
     if not isinstance(data, dict) or not isinstance(data.get("skills"), dict):
         raise BadSkillFile(f"{where}: there must be a mapping `skills:` of skill names to models")
+    relations = relation_types(data.get("relations", {}), where)
     return {
-        str(name): _skill(str(name), model, f"{where}: skill {name}")
+        str(name): _skill(str(name), model, relations, f"{where}: skill {name}")
         for name, model in data["skills"].items()
     }
 
 
-def _skill(name: str, model: Any, where: str) -> SkillModel:
+def _skill(name: str, model: Any, relations: Mapping[str, RelationType], where: str) -> SkillModel:
     if not isinstance(model, dict):
         raise BadSkillFile(f"{where} must be a mapping with {', '.join(sorted(_FIELDS))}")
     if unknown := set(model) - _FIELDS:
@@ -37,42 +47,62 @@ def _skill(name: str, model: Any, where: str) -> SkillModel:
             f"{where} has no field {', '.join(sorted(map(str, unknown)))}; "
             f"its fields are {', '.join(sorted(_FIELDS))}"
         )
-    parameters = model.get("parameters")
-    if not isinstance(parameters, dict) or not all(
-        kind in PARAMETER_TYPES for kind in parameters.values()
-    ):
-        raise BadSkillFile(
-            f"{where}: `parameters` must map names to one of {', '.join(PARAMETER_TYPES)}"
-        )
-    if "robot" not in parameters.values():
+    parameters = _parameters(model.get("parameters"), where)
+    if ROBOT not in parameters.values():
         raise BadSkillFile(f"{where} needs a parameter of type robot: the one that does it")
     duration = model.get("duration_s", 10.0)
     if isinstance(duration, bool) or not isinstance(duration, int | float) or duration < 0:
         raise BadSkillFile(f"{where}: `duration_s` must be a number of seconds, not {duration!r}")
     travel_to = model.get("travel_to")
-    if travel_to is not None and parameters.get(travel_to) != "place":
+    if travel_to is not None and parameters.get(travel_to) != PLACE:
         raise BadSkillFile(f"{where}: `travel_to` must name a parameter of type place")
     before_text = _list_of_text(model.get("before", []), f"{where}: `before`")
     space_in = tuple(m[1] for text in before_text if (m := _SPACE.match(text)))
     for subject in space_in:
-        if parameters.get(subject) != "robot":
-            raise BadSkillFile(f"{where}: {SPACE}({subject}) must name a parameter of type robot")
+        if PLACE in parse_type(parameters.get(subject, PLACE)).bases:
+            raise BadSkillFile(
+                f"{where}: {SPACE}({subject}) must name a parameter of type robot, or of a thing"
+            )
+    before, conditions = _conditions(before_text, parameters, f"{where}: `before`")
     after_text = _list_of_text(model.get("after", []), f"{where}: `after`")
+    after, conditional = _effects(after_text, parameters, f"{where}: `after`")
+    always = (*before, *after)
+    check_literals(always, conditions, conditional, parameters, relations, where)
+    spoken_of = {
+        *(literal.variable.relation for literal in always),
+        *(effect.variable.relation for effect in conditional),
+        *(
+            name
+            for row in (*conditions, *(e.when for e in conditional))
+            for name in relations_of(row)
+        ),
+    }
     return SkillModel(
         name=name,
         about=str(model.get("about", "")),
-        parameters=parameters,
+        parameters=narrowed_parameters(parameters, always, relations, where),
         needs=_needs(model.get("needs", {}), parameters, where),
-        before=tuple(
-            _condition(text, parameters, f"{where}: `before`")
-            for text in before_text
-            if not _SPACE.match(text)
-        ),
-        after=tuple(_condition(text, parameters, f"{where}: `after`") for text in after_text),
+        before=before,
+        after=after,
         space_in=space_in,
         duration_s=float(duration),
         travel_to=travel_to,
+        conditions=conditions,
+        conditional=conditional,
+        relations={name: relations[name] for name in sorted(spoken_of & relations.keys())},
     )
+
+
+def _parameters(data: Any, where: str) -> dict[str, str]:
+    if not isinstance(data, dict) or not all(isinstance(kind, str) for kind in data.values()):
+        raise BadSkillFile(
+            f"{where}: `parameters` must map names to types: robot, place, object, or a feature, "
+            "kind or category of things"
+        )
+    try:
+        return {str(name): str(parse_type(kind)) for name, kind in data.items()}
+    except BadType as wrong:
+        raise BadSkillFile(f"{where}: `parameters`: {wrong}") from None
 
 
 def _list_of_text(value: Any, where: str) -> list[str]:
@@ -81,10 +111,15 @@ def _list_of_text(value: Any, where: str) -> list[str]:
     return value
 
 
-def _condition(text: str, parameters: Mapping[str, str], where: str) -> Literal:
+def _plain(text: str, parameters: Mapping[str, str], where: str) -> Literal | None:
+    """The literal, if the text is no more than that."""
     literal = parse_literal(text)
-    if literal is None:
-        raise BadSkillFile(f"{where}: {text!r} must look like `at(robot) = place`")
+    if (
+        literal is None
+        or literal.variable.relation in KEYWORDS
+        or (isinstance(literal.value, str) and not literal.value.isidentifier())
+    ):
+        return None
     if (subject := literal.variable.subject) not in parameters:
         raise BadSkillFile(
             f"{where}: {text!r} speaks of {subject!r}, which is not a parameter; "
@@ -93,19 +128,62 @@ def _condition(text: str, parameters: Mapping[str, str], where: str) -> Literal:
     return literal
 
 
+def _conditions(
+    texts: Iterable[str], parameters: Mapping[str, str], where: str
+) -> tuple[tuple[Literal, ...], tuple[Formula, ...]]:
+    literals, formulas = [], []
+    for text in texts:
+        if _SPACE.match(text):
+            continue
+        if (literal := _plain(text, parameters, where)) is not None:
+            literals.append(literal)
+            continue
+        try:
+            formulas.append(parse_formula(text, parameters))
+        except BadFormula as wrong:
+            raise BadSkillFile(f"{where}: {wrong}") from None
+    return tuple(literals), tuple(formulas)
+
+
+def _effects(
+    texts: Iterable[str], parameters: Mapping[str, str], where: str
+) -> tuple[tuple[Literal, ...], tuple[ConditionalEffect, ...]]:
+    literals, effects = [], []
+    for text in texts:
+        literal = _plain(text, parameters, where)
+        if literal is None:
+            try:
+                effect = parse_effect(text, parameters)
+            except BadFormula as wrong:
+                raise BadSkillFile(f"{where}: {wrong}") from None
+            if effect.each or effect.add is not None or effect.when != TRUE:
+                effects.append(effect)
+                continue
+            literal = Literal(effect.variable, effect.value)
+        literals.append(_written(literal, parameters))
+    return tuple(literals), tuple(effects)
+
+
+def _written(literal: Literal, parameters: Mapping[str, str]) -> Literal:
+    """What is on or in a thing is at it: one variable says where something is."""
+    (relation, subject), value = literal
+    carrier = parameters.get(value) if isinstance(value, str) else None
+    if relation in (ON, IN) and carrier is not None and OBJECT in parse_type(carrier).bases:
+        return Literal(FactKey(AT, subject), value)
+    return literal
+
+
 def _needs(data: Any, parameters: Mapping[str, str], where: str) -> dict[str, tuple[Need, ...]]:
     if not isinstance(data, dict):
         raise BadSkillFile(f"{where}: `needs` must map robot parameters to lists of capabilities")
     needs: dict[str, tuple[Need, ...]] = {}
     for parameter, rows in data.items():
-        if parameters.get(parameter) != "robot":
+        if parameters.get(parameter) != ROBOT:
             raise BadSkillFile(f"{where}: `needs` names {parameter!r}, which is no robot parameter")
         found = []
         for text in _list_of_text(rows, f"{where}: `needs`"):
             match = _NEED.match(text)
-            if match is None or (
-                match[2] and parameters.get(match[3], "nothing") != MEASURES.get(match[2])
-            ):
+            if match is None or (match[2] and not _measures(match[2], match[3], parameters)):
                 raise BadSkillFile(
                     f"{where}: {text!r} must look like `drive`, `grip >= mass(object)` or "
                     "`reach >= height(place)`"
@@ -113,3 +191,8 @@ def _needs(data: Any, parameters: Mapping[str, str], where: str) -> dict[str, tu
             found.append(Need(match[1], match[2], match[3]))
         needs[parameter] = tuple(found)
     return needs
+
+
+def _measures(measure: str, of: str, parameters: Mapping[str, str]) -> bool:
+    """Whether all that the parameter may stand for can be measured so."""
+    return of in parameters and parse_type(parameters[of]).bases == (MEASURES.get(measure),)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
+from fleet.core.model.formulas.nodes import ConditionalEffect, Formula, grounded, grounded_effect
+from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, ParameterType, parse_type
+from fleet.core.model.relation_types import RelationType
 from fleet.language.vocabulary import SkillPhrase
 from keyexpr_schema.facts import FactKey, Literal
 
@@ -22,11 +25,10 @@ class Need(NamedTuple):
     of: str | None = None
 
 
-MEASURES = {"mass": "object", "height": "place"}
+MEASURES = {"mass": OBJECT, "height": PLACE}
 """What can be measured, and of which type of parameter."""
 
 
-PARAMETER_TYPES = ("robot", "object", "place")
 SPACE = "space"
 """The one counted condition: `space(carrier)` holds while the carrier's basket has room."""
 
@@ -40,7 +42,11 @@ class Action:
     before: tuple[Literal, ...]
     after: tuple[Literal, ...]
     space_in: tuple[str, ...]
-    """Robots whose baskets must have room for one more object."""
+    """Robots and things that must have room for one more object."""
+    conditions: tuple[Formula, ...] = ()
+    """What must hold besides `before`."""
+    conditional: tuple[ConditionalEffect, ...] = ()
+    """What it makes true besides `after`."""
 
     @property
     def actor(self) -> str:
@@ -65,6 +71,7 @@ class SkillModel:
     name: str
     about: str
     parameters: Mapping[str, str]
+    """By name, the type as it is written: see `fleet.core.model.parameter_types`."""
     needs: Mapping[str, tuple[Need, ...]]
     before: tuple[Literal, ...]
     after: tuple[Literal, ...]
@@ -72,11 +79,22 @@ class SkillModel:
     space_in: tuple[str, ...]
     duration_s: float
     travel_to: str | None
+    conditions: tuple[Formula, ...] = ()
+    """Formulas that must hold besides `before`."""
+    conditional: tuple[ConditionalEffect, ...] = ()
+    """Effects that depend on what holds, or change numbers."""
+    relations: Mapping[str, RelationType] = field(default_factory=dict)
+    """Those of the relations it speaks of whose types are declared."""
 
     @cached_property
     def robot_parameters(self) -> tuple[str, ...]:
         """Parameters that stand for robots, the actor's first."""
-        return tuple(name for name, kind in self.parameters.items() if kind == "robot")
+        return tuple(name for name, kind in self.parameters.items() if kind == ROBOT)
+
+    @cached_property
+    def types(self) -> Mapping[str, ParameterType]:
+        """The types of its parameters."""
+        return {name: parse_type(kind) for name, kind in self.parameters.items()}
 
     @property
     def actor_parameter(self) -> str:
@@ -105,6 +123,8 @@ class SkillModel:
             fill(self.before),
             fill(self.after),
             tuple(args[name] for name in self.space_in),
+            tuple(grounded(formula, args) for formula in self.conditions),
+            tuple(grounded_effect(effect, args) for effect in self.conditional),
         )
 
 
@@ -122,11 +142,12 @@ def phrases_of(skills: Skills) -> tuple[SkillPhrase, ...]:
     phrases = []
     for name in sorted(skills):
         skill = skills[name]
-        rows = [row for row in skill.after if skill.parameters[row.variable.subject] != "robot"]
+        rows = [row for row in skill.after if skill.parameters[row.variable.subject] != ROBOT]
         about = {row.variable.subject for row in rows}
         plain = all(row.value not in skill.parameters for row in rows)
         if len(about) == 1 and plain:
-            kind = skill.parameters[about.pop()]
+            bases = skill.types[about.pop()].bases
+            kind = PLACE if bases == (PLACE,) else OBJECT
             wants = tuple((key.relation, value) for key, value in rows if value is not None)
             if wants:
                 phrases.append(SkillPhrase(verb=name.replace("_", " "), type=kind, wants=wants))

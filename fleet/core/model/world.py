@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import inf
 
 import msgspec
 
+from fleet.core.model.derived import Inventory, holds
 from fleet.core.model.durations import pace, work_s
+from fleet.core.model.parameter_types import ParameterType, names_of, parse_type
 from fleet.core.model.skills import Action, SkillModel
-from keyexpr_schema.facts import AT, HELD, HOLDING, LOCATED, NOTHING, FactKey, Value
+from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Literal, Value
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -94,6 +97,23 @@ class WorldModel:
             return "object"
         return "place" if name in self.places else None
 
+    def is_of_type(self, name: str, type_: ParameterType) -> bool:
+        """Whether a name may stand where that type is asked for; not if nothing has the name."""
+        return type_.admits(self.kind_of(name), self.objects.get(name))
+
+    def of_type(self, type_: ParameterType | str) -> tuple[str, ...]:
+        """Every name that may stand where that type is asked for, in a fixed order."""
+        text = str(type_)
+        if text not in self._of_type:
+            kind = parse_type(type_) if isinstance(type_, str) else type_
+            things = self.objects.values()
+            self._of_type[text] = names_of(kind, self.robots, self.places, things)
+        return self._of_type[text]
+
+    @cached_property
+    def _of_type(self) -> dict[str, tuple[str, ...]]:
+        return {}
+
     @cached_property
     def team(self) -> tuple[str, ...]:
         """The robots that can get work now, in a fixed order."""
@@ -176,7 +196,7 @@ class WorldModel:
 
     def holds(self, condition: Condition) -> bool:
         """Whether the facts say that the condition holds."""
-        return condition_holds(self.facts, condition)
+        return condition_holds(self.facts, condition, self)
 
     def plain(self) -> WorldModel:
         """The same world in dictionaries, for searches that look things up a million times."""
@@ -193,36 +213,19 @@ class WorldModel:
         return replace(self, facts={**self.facts, **facts})
 
 
-def condition_holds(facts: Mapping[FactKey, Value], condition: Condition) -> bool:
-    """Whether a condition holds in `facts`.
+def condition_holds(facts: Mapping[FactKey, Value], condition: Condition, world: Inventory) -> bool:
+    """Whether a goal's condition holds in `facts`; of several subjects one is enough.
 
-    `at(object) = place` also holds while the object lies in the basket of a robot that is there:
-    it is at a robot, and that robot's hand does not hold it. `located(object) = true` and
-    `held(object) = true` are read off `at` and `holding`. Of several subjects one is enough.
+    `fleet.core.model.derived` says what that means for where things are.
     """
     return any(
-        _holds_for(facts, condition.relation, subject, condition.value)
+        holds(
+            Literal(FactKey(condition.relation, subject), condition.value),
+            facts.get,
+            world,
+            aboard=True,
+        )
         for subject in condition.subjects
-    )
-
-
-def _holds_for(facts: Mapping[FactKey, Value], relation: str, subject: str, wanted: Value) -> bool:
-    where = facts.get(FactKey(AT, subject))
-    if relation == LOCATED:
-        return (where is not None) is wanted
-    if relation == HELD:
-        held = isinstance(where, str) and facts.get(FactKey(HOLDING, where)) == subject
-        return held is wanted
-    value = facts.get(FactKey(relation, subject))
-    if value is None:
-        return False
-    if value == wanted:
-        return True
-    return (
-        relation == AT
-        and isinstance(value, str)
-        and facts.get(FactKey(AT, value)) == wanted
-        and facts.get(FactKey(HOLDING, value), NOTHING) != subject
     )
 
 
@@ -234,13 +237,18 @@ def known_value(variable: FactKey, facts: Mapping[FactKey, Value], world: WorldM
     return value
 
 
-def room_left(robot: str, facts: Mapping[FactKey, Value], world: WorldModel) -> int:
-    """How many more objects go into a robot's basket, where all is that its hand does not hold."""
-    held = facts.get(FactKey(HOLDING, robot))
-    inside = (t for t in world.objects if facts.get(FactKey(AT, t)) == robot and held != t)
-    return capacity(robot, world) - sum(1 for _ in inside)
+def room_left(carrier: str, facts: Mapping[FactKey, Value], world: WorldModel) -> float:
+    """How many more objects go on or into a thing, or into a robot's basket, where all is that its
+    hand does not hold."""
+    if (room := capacity(carrier, world)) == inf:
+        return inf
+    held = facts.get(FactKey(HOLDING, carrier))
+    there = (t for t in world.objects if facts.get(FactKey(AT, t)) == carrier and held != t)
+    return room - sum(1 for _ in there)
 
 
-def capacity(robot: str, world: WorldModel) -> int:
-    """How many objects a robot's basket takes."""
-    return int(world.capability(robot, "basket") or 0)
+def capacity(carrier: str, world: WorldModel) -> float:
+    """How many objects a thing, or a robot's basket, takes; without a limit infinitely many."""
+    if (thing := world.objects.get(carrier)) is not None:
+        return inf if thing.room is None else thing.room
+    return int(world.capability(carrier, "basket") or 0)

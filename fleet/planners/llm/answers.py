@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import msgspec
 
+from fleet.core.model.parameter_types import ROBOT, ParameterType
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.llm.structured_output import StructuredAnswer, enumerated, schema_of
@@ -85,21 +86,19 @@ def plan_schema(
 
 
 def _groundable(skill: SkillModel, world: WorldModel) -> bool:
-    things: Mapping[str, Any] = {"object": world.objects, "place": world.places, "robot": True}
-    return all(things[kind] for kind in skill.parameters.values())
+    return all(map(world.of_type, skill.parameters.values()))
+
+
+def _argument(kind: ParameterType, world: WorldModel) -> Any:
+    return _ActorName if ROBOT in kind.bases else enumerated(world.of_type(kind))
 
 
 def _task_type(number: int, skill: SkillModel, world: WorldModel, goal: Any, flat: bool) -> Any:
-    kinds: dict[str, Any] = {
-        "robot": _ActorName,
-        "object": enumerated(world.objects),
-        "place": enumerated(world.places),
-    }
     # Parameters are free text to Python: `from` is a good name for one, and no field can have it.
     names = {f"p{n}": parameter for n, parameter in enumerate(skill.parameters)}
     args = msgspec.defstruct(
         f"Args{number}",
-        [(field, kinds[skill.parameters[name]]) for field, name in names.items()],
+        [(field, _argument(skill.types[name], world)) for field, name in names.items()],
         rename=names,
         forbid_unknown_fields=True,
     )

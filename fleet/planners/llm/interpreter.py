@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import product
 
 from fleet.core.model.skills import SkillModel
 from fleet.language import Vocabulary
@@ -172,15 +173,19 @@ def _signatures(skills: Mapping[str, SkillModel]) -> dict[str, _Signature]:
         for (relation, subject), value in skill.after:
             if isinstance(value, str):
                 # `holding = nothing` is a word; `at = to` a parameter of some type.
-                type_or_value: str | bool = skill.parameters.get(value, value)
+                values: tuple[str | bool, ...] = _bases(skill, value) or (value,)
             elif value is True:
-                type_or_value = True
+                values = (True,)
             else:
                 continue
-            types.setdefault(relation, set()).add((skill.parameters[subject], type_or_value))
+            types.setdefault(relation, set()).update(product(_bases(skill, subject), values))
     for relation in DERIVED:
         types[relation] = {("object", True)}
     return dict(sorted(types.items()))
+
+
+def _bases(skill: SkillModel, parameter: str) -> tuple[str, ...]:
+    return skill.types[parameter].bases if parameter in skill.types else ()
 
 
 _FORM = """{"stages": [[{"relation": "RELATION", "subject": "NAME", "value": "NAME", \

@@ -79,7 +79,7 @@ def subgoals_in_order(problem: PlanningProblem, facts: Mapping[FactKey, Value]) 
         Subgoal(goal.goal, condition)
         for goal in sorted(problem.goals, key=lambda g: (-g.priority, g.ordinal, g.goal))
         for condition in goal.conditions
-        if not condition_holds(facts, condition)
+        if not condition_holds(facts, condition, problem.world)
     ]
     return sorted(
         subgoals,

@@ -223,7 +223,7 @@ class FiniteDomainTask:
                 return known_value(key, self.start, self.world)
             return self.value_of[state[number]]
 
-        return holds(literal, value_of)
+        return holds(literal, value_of, self.world)
 
     def _initial(self, variable: FactKey) -> Value:
         if variable.relation == AT and variable.subject in self.position:
@@ -280,7 +280,7 @@ class FiniteDomainTask:
         (relation, subject), wanted = literal
         where = self._number.get(FactKey(AT, subject))
         if where is None:
-            if holds(literal, lambda key: known_value(key, self.start, self.world)):
+            if holds(literal, lambda key: known_value(key, self.start, self.world), self.world):
                 self.axioms.append(Axiom((), (), node))
             elif relation == AT:
                 carrier = self.start.get(FactKey(AT, subject))
@@ -335,7 +335,7 @@ class FiniteDomainTask:
             elif self.start.get(FactKey(AT, str(carrier))) == literal.value:
                 self.axioms.append(Axiom(needs, (), node))
 
-    def _room_beside(self, carrier: str) -> int:
+    def _room_beside(self, carrier: str) -> float:
         """Room in a basket, without the things that move in this task."""
         moving = {
             variable

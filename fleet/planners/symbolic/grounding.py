@@ -12,6 +12,7 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 
+from fleet.core.model.parameter_types import OBJECT, ROBOT, parse_type
 from fleet.core.model.skills import Action, SkillModel
 from fleet.core.model.world import WorldModel, known_value, room_left
 from fleet.planners.symbolic.readings import is_derived, variables_read
@@ -253,17 +254,19 @@ class Grounding:
         return why is None
 
     def _fits(self, kind: str, name: str) -> bool:
-        if kind == "robot":
+        if kind == ROBOT:
             return name in self.robots
-        return name in (self.world.places if kind == "place" else self.world.objects)
+        return name in self.world.of_type(kind)
 
     def _names_of(self, kind: str) -> tuple[str, ...]:
-        if kind == "robot":
+        if kind == ROBOT:
             return tuple(self.robots)
-        if kind == "place":
-            return tuple(self.world.places)
+        bases = parse_type(kind).bases
+        if OBJECT not in bases:
+            return self.world.of_type(kind)
         most = max(list(skill.parameters.values()).count(kind) for skill in self._skills)
-        return _few_of_each(self.world, self.start, self.goal, most)
+        few = _few_of_each(self.world, self.start, self.goal, most)
+        return tuple(n for n in self.world.of_type(kind) if n not in self.world.objects or n in few)
 
     def _writable(self, variable: FactKey) -> bool:
         """Whether a skill can change it, for all that is known of types."""

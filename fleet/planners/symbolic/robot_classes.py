@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 
+from fleet.core.model.parameter_types import OBJECT
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Value
@@ -51,7 +52,7 @@ def _needs_a_tool(condition: Condition, world: WorldModel) -> bool:
     """Whether a skill for it takes more objects than the one that the condition is about."""
     own = condition.subject in world.objects
     return any(
-        sum(kind not in ("robot", "place") for kind in skill.parameters.values()) > own
+        sum(kind.bases == (OBJECT,) for kind in skill.types.values()) > own
         for skill in world.skills.values()
         if any(row.variable.relation == condition.relation for row in skill.after)
     )

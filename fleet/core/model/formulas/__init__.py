@@ -1,0 +1,1 @@
+"""Formulas of skills: what they are, as text, and when they hold."""

@@ -35,7 +35,12 @@ class Solid:
 
 def solids(world: WorldFile) -> tuple[Solid, ...]:
     """Everything that stands in the way on the floor: outer walls, inner walls, furniture."""
-    return (*_outer_walls(world), *_inner_walls(world), *_furniture(world))
+    return (*walls(world), *_furniture(world))
+
+
+def walls(world: WorldFile) -> tuple[Solid, ...]:
+    """Outer and inner walls."""
+    return (*_outer_walls(world), *_inner_walls(world))
 
 
 def _outer_walls(world: WorldFile) -> list[Solid]:
@@ -100,7 +105,7 @@ def barriers(world: WorldFile) -> tuple[Solid, ...]:
 
     The doors of cupboards are not counted.
     """
-    found = [*_outer_walls(world), *_inner_walls(world)]
+    found = [*walls(world)]
     for solid in _furniture(world):
         fixture = world.fixtures.by_name[solid.name]
         if not any(carrier.roofed for carrier in fixture.all_carriers):

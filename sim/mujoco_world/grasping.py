@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 from keyexpr_schema.payloads.motions import PointM
+from keyexpr_schema.payloads.robots import PoseMRad
 from sim.mujoco_world.arm import Arm, Gripper
 from sim.mujoco_world.base_controllers import PERIOD_S
 from sim.mujoco_world.base_motions import distance_m
@@ -50,7 +51,7 @@ CLEARANCE_M = 0.005
 BASKET_OPENING_M = 0.012
 """In a basket the fingers open only this much, so as not to push against its walls."""
 
-STAND_BACK_M = 0.38
+ROOM_M = 0.38
 """So far from where it reaches in under a roof a robot unfolds its arm."""
 
 REACH_IN_M_S = 0.12
@@ -170,25 +171,41 @@ def reach_over(
 ) -> Step:
     """Bring the hand above a point: from above or, under a roof, from the front.
 
-    Under a roof the arm is unfolded some way back, and the robot drives up with it.
+    Raises:
+        MotionFailed: something is in the way.
+    """
+    if any(fixture.roofs(point) for fixture in context.world.fixtures.by_name.values()):
+        yield from reach_in(context, run, path, ROOM_M, slower)
+    else:
+        yield from move_arm(run, path.above, "moving the hand above the point", slower=slower)
+
+
+def reach_in(
+    context: MotionContext, run: MotionRun, path: Reach, back_m: float, slower: float = 1.0
+) -> Step:
+    """Unfold the arm `back_m` farther back, and drive up with it.
+
+    An arm that unfolds reaches out farther, and lower, than where it comes to in the end.
 
     Raises:
         MotionFailed: something is in the way.
     """
     robot = run.robot
-    if any(fixture.roofs(point) for fixture in context.world.fixtures.by_name.values()):
-        start = robot.pose()
-        x, y, yaw = start
-        back = (x - STAND_BACK_M * math.cos(yaw), y - STAND_BACK_M * math.sin(yaw), yaw)
-        run.phase = "waiting for room to stand back"
-        while not context.navigator.reserve(robot.name, [back[:2], start[:2]]):
-            yield
-        yield from drive_straight(run, back, "standing back")
-        robot.way_out = back
-        yield from move_arm(run, path.above, "reaching out", slower=slower)
-        yield from drive_straight(run, start, "reaching in", REACH_IN_M_S)
-    else:
-        yield from move_arm(run, path.above, "moving the hand above the point", slower=slower)
+    start = robot.pose()
+    back = behind(start, back_m)
+    run.phase = "waiting for room to stand back"
+    while not context.navigator.reserve(robot.name, [back[:2], start[:2]]):
+        yield
+    yield from drive_straight(run, back, "standing back")
+    robot.way_out = back
+    yield from move_arm(run, path.above, "reaching out", slower=slower)
+    yield from drive_straight(run, start, "reaching in", REACH_IN_M_S)
+
+
+def behind(pose: PoseMRad, back_m: float) -> PoseMRad:
+    """The pose so far behind another one."""
+    x, y, yaw = pose
+    return (x - back_m * math.cos(yaw), y - back_m * math.sin(yaw), yaw)
 
 
 def let_down(run: MotionRun, path: Reach, held: str, opening_m: float) -> Step:
@@ -279,15 +296,17 @@ def reach_down(arm: Arm, target: PointM, opening_rad: float | None) -> Reach:
         at = arm.solve(target, seed, opening_rad)
         if at is None:
             continue
-        touched = arm.obstacle(at) or touched
-        if touched is not None:
+        hit = arm.obstacle(at)
+        if hit is not None:
+            touched = hit
             continue
         for hover in HOVERS_M:
             above = arm.solve((x, y, z + hover), at, opening_rad)
             if above is not None:
-                touched = arm.obstacle(above)
-                if touched is None:
+                hit = arm.obstacle(above)
+                if hit is None:
                     return Reach(above=above, at=at)
+                touched = hit
     if touched is not None:
         raise MotionFailed(f"the arm would touch {touched}: approach the point from another side")
     raise MotionFailed(

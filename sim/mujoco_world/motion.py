@@ -134,7 +134,7 @@ def stow(run: MotionRun) -> Step:
     if radius > robot.description.clearance_m:
         for rise in (0.15, 0.10, 0.06, 0.03) if robot.way_out is None else (0.03, 0.015):
             above = arm.solve((x, y, z + rise), arm.setpoint)
-            if above is not None:
+            if above is not None and arm.obstacle(above) is None:
                 yield from move_arm(run, above, "raising the hand")
                 break
     if robot.way_out is not None:

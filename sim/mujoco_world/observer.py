@@ -238,7 +238,8 @@ class Observer:
         for other in others:
             if other not in above:
                 support = self._support(other, None, touching, above | {name})
-                if support is not None:
+                # What it has in it does not carry it.
+                if support is not None and support not in above | {name}:
                     return support
         return None
 

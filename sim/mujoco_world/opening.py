@@ -7,7 +7,15 @@ from itertools import pairwise
 
 from sim.mujoco_world.base_controllers import PERIOD_S, Planar
 from sim.mujoco_world.base_motions import navigate, reach_m
-from sim.mujoco_world.grasping import RELEASE_OPENING_M, Reach, close_on, hand_of, reach_down
+from sim.mujoco_world.grasping import (
+    RELEASE_OPENING_M,
+    Reach,
+    behind,
+    close_on,
+    hand_of,
+    reach_down,
+    reach_in,
+)
 from sim.mujoco_world.motion import (
     MotionContext,
     MotionFailed,
@@ -27,6 +35,8 @@ STUCK_S = 4.0
 """A handle that has not come to where it was pulled this long after is stuck."""
 NEAR_SHARE = 0.08
 SAMPLES = 8
+BACK_M = 0.22
+"""So far from a handle a robot unfolds its arm, and folds it again."""
 
 
 def open_thing(context: MotionContext, run: MotionRun) -> Steps:
@@ -72,13 +82,14 @@ def _swing(context: MotionContext, run: MotionRun, goal: float) -> Step:
     base = [(x + hx - point[0], y + hy - point[1]) for hx, hy in way]
     _check_room(context, run, fixture.name, base)
     run.phase = "waiting for room to move the door"
-    while not context.navigator.reserve(robot.name, base):
+    ends = [behind((*base[k], fixture.inward_rad), BACK_M)[:2] for k in (0, -1)]
+    while not context.navigator.reserve(robot.name, [ends[0], *base, ends[1]]):
         yield
     gripper.open()
     yield from wait(0.6)
     path = reach_down(arm, mechanisms.handle_m(thing), None)
     try:
-        yield from move_arm(run, path.above, "moving the hand above the handle")
+        yield from reach_in(context, run, path, BACK_M)
         yield from move_arm(run, path.at, "lowering the hand", slower=1.5)
         yield from close_on(run, gripper, f"the handle of {thing}")
         mechanisms.hold(robot.name, thing)
@@ -161,6 +172,8 @@ def _withdraw(context: MotionContext, run: MotionRun, path: Reach) -> Step:
     robot.let_go()
     gripper.open(gripper.opening_m() + RELEASE_OPENING_M)
     yield from wait(0.5)
-    yield from move_arm(run, path.above, "withdrawing the hand")
+    if robot.way_out is not None:
+        yield from move_arm(run, path.above, "withdrawing the hand")
+        robot.way_out = behind(robot.pose(), BACK_M)
     yield from stow(run)
     context.navigator.settle(robot.name)

@@ -19,6 +19,8 @@ from sim.mujoco_world.motion import MotionContext, MotionFailed, MotionRun, Step
 
 FINGERS_M = 0.03
 """Room for a finger beside an object that is let go."""
+BUTTON_M = 0.12
+"""And for a hand that comes to a button."""
 PITCH_M = 0.05
 MOST_SPOTS = 40
 FRONT_M = 0.16
@@ -131,6 +133,9 @@ def _spots(context: MotionContext, target: str, held: str) -> list[PointM]:
         ]
         if fixture.mover(target) is None and not carrier.roofed:
             points.sort(key=lambda point: _from_rim(fixture.local_m(point), half_x, half_y))
+        if fixture.button is not None:
+            button = fixture.point_m(fixture.button.top_m)
+            points = [at for at in points if math.dist(at[:2], button[:2]) >= BUTTON_M + gap]
     return [
         point
         for point in points

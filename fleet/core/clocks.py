@@ -12,7 +12,9 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.events import Event
 from fleet.core.state import State
-from fleet.core.state_updates import set_entry
+from fleet.core.state_updates import (
+    set_entry,
+)
 from fleet.core.table import Table
 from keyexpr_schema.payloads.tasks import TaskState
 

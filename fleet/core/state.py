@@ -23,7 +23,7 @@ from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
-LOGIC = 2
+LOGIC = 3
 """Counts up whenever the core comes to handle an event otherwise than before."""
 
 
@@ -159,5 +159,5 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             {plan: entry.indexed(None, self.skills) for plan, entry in self.plans.items()}
         )
         team = sorted(robot for robot in self.connected if self.ready(robot))
-        index = index_of(plans, self.goals, self.goal_states, self.facts, team)
+        index = index_of(plans, self.goals, self.goal_states, self.facts, self.objects, team)
         return replace(self, plans=plans, index=index)

@@ -10,12 +10,12 @@ from collections.abc import Iterable
 
 from msgspec.structs import replace
 
+from fleet.core.belief_updates import touched_carriers
 from fleet.core.indexes.fleet_index import (
     NO_ORDERS,
     UNPLANNED,
     FleetIndex,
     in_set,
-    place_of,
     priority_of,
     subjects_of,
 )
@@ -24,90 +24,10 @@ from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.state import State
 from fleet.core.table import Table
-from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.plans import Plan, PlanState, Violation
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
-from keyexpr_schema.payloads.world import Fact
-
-AHEAD_S = 60.0
-"""A fact from further ahead than this [s] was said in an earlier era, if there was one."""
-COMPARED_SINCE_LOGIC = 1
-"""Before this logic of the core, only facts in reports gave way to newer ones."""
-
-
-# --- facts ---------------------------------------------------------------------------------------
-
-
-def believe(state: State, fact: Fact) -> State:
-    """Believe a fact, unless a newer one is known: the newest word holds, on whatever way it came.
-
-    One that does not say when it was said (0) is said now.
-    """
-    known = state.facts.get(fact.key)
-    if known == fact:
-        return state
-    earlier = _said_in_earlier_era(state, fact)
-    if known is not None and fact.time_s != 0.0 and state.logic >= COMPARED_SINCE_LOGIC:
-        known_earlier = fact.key in state.older_facts
-        if earlier > known_earlier or (earlier == known_earlier and fact.time_s < known.time_s):
-            return state
-    older = state.older_facts.without(fact.key)
-    if earlier:
-        older = older.set(fact.key, None)
-    return replace(_fact_changed(state, fact.key, known, fact), older_facts=older)
-
-
-def _said_in_earlier_era(state: State, fact: Fact) -> bool:
-    return state.era > 0 and fact.time_s > state.time_s + AHEAD_S
-
-
-def conclude(state: State, fact: Fact) -> State:
-    """Believe what the planner concludes itself, and so publishes."""
-    believed = believe(state, fact)
-    if believed is state:
-        return state
-    return replace(believed, concluded=state.concluded.set(fact.key, fact))
-
-
-def forget_fact(state: State, key: FactKey) -> State:
-    """No longer believe anything of a variable."""
-    known = state.facts.get(key)
-    if known is None:
-        return state
-    state = replace(state, older_facts=state.older_facts.without(key))
-    return _fact_changed(state, key, known, None)
-
-
-def _fact_changed(state: State, key: FactKey, old: Fact | None, new: Fact | None) -> State:
-    index, touches = state.index, state.touches.and_(Touch(Part.FACT, key))
-    was, now = place_of(old), place_of(new)
-    if was != now:
-        things_at = index.things_at
-        if was is not None:
-            things_at = in_set(things_at, was, key.subject, False)
-            touches = touches.and_(Touch(Part.ROBOT, was))
-        if now is not None:
-            things_at = in_set(things_at, now, key.subject, True)
-            touches = touches.and_(Touch(Part.ROBOT, now))
-        index = replace(index, things_at=things_at)
-    facts = state.facts.without(key) if new is None else state.facts.set(key, new)
-    state = replace(state, facts=facts, index=index, touches=touches)
-    return robot_changed(state, key.subject) if key.relation == HOLDING else state
-
-
-def robot_changed(state: State, robot: str) -> State:
-    """Look again at whether a robot is there and can be planned with."""
-    state = touch(state, Touch(Part.ROBOT, robot))
-    ready, team = state.ready(robot), state.index.team
-    if ready == (robot in team):
-        return state
-    team = team.set(robot, None) if ready else team.delete(robot)
-    state = replace(state, index=replace(state.index, team=team))
-    if not ready:
-        return state
-    return touch(replace(state, team_number=state.team_number + 1), Touch(Part.TEAM))
 
 
 def touch(state: State, what: Touch) -> State:
@@ -160,8 +80,7 @@ def _goal_changed(state: State, goal: str, goal_states: Table[str, GoalStatus]) 
         index = replace(index, in_state=in_state)
     touches = state.touches.and_(Touch(Part.GOAL, goal))
     for subject in was ^ now:  # whoever carries it is reserved for this goal, or no longer
-        if (where := place_of(state.fact(AT, subject))) is not None:
-            touches = touches.and_(Touch(Part.ROBOT, where))
+        touches = touched_carriers(state, subject, touches)
     return replace(state, goal_states=goal_states, index=index, touches=touches)
 
 

@@ -29,7 +29,9 @@ from fleet.core.handlers import (
 from fleet.core.indexes.touches import UNTOUCHED, Part, Touch
 from fleet.core.over import SINCE_LOGIC, everything_perhaps_over, let_go
 from fleet.core.state import State
-from fleet.core.state_updates import touch
+from fleet.core.state_updates import (
+    touch,
+)
 
 
 def _planner_started(state: State, event: events.PlannerStarted) -> State:

@@ -6,9 +6,11 @@ from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from fleet.core.indexes.fleet_index import place_of, subjects_of
+from fleet.core.indexes.fact_views import FactValues
+from fleet.core.indexes.fleet_index import carried_by, subjects_of
 from fleet.core.indexes.plan_index import robots_of
 from fleet.core.indexes.touches import Part, Touch
+from fleet.core.model.derived import carriers
 from fleet.core.state import State
 from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -57,8 +59,8 @@ class Concerns:
             self.robots.update(entry.outcome.allocation.values())
             for goal in entry.plan.goals:
                 for subject in subjects_of(state.goal_states.get(goal)):
-                    if (where := place_of(state.fact(AT, subject))) is not None:
-                        self.robots.add(where)
+                    facts = FactValues(state.facts)
+                    self.robots.update(carriers(subject, facts.get, state, aboard=True))
         else:
             self.robots.update(entry.index.ready)
 
@@ -88,7 +90,8 @@ class Concerns:
 
     def _fact(self, state: State, key: FactKey) -> None:
         index, subject = state.index, key.subject
-        for about in (subject, *index.things_at.get(subject, ())):
+        concerned = (subject,) if subject in state.places else carried_by(index, subject)
+        for about in concerned:
             self._goals(state, index.goals_about.get(about, ()))
         if key.relation == AT:
             self.plans.update(p for p in index.active if subject in state.plans[p].plan.seeks)

@@ -10,7 +10,10 @@ from fleet.core.model.durations import late_at_s
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import set_entry, set_late_bound
+from fleet.core.state_updates import (
+    set_entry,
+    set_late_bound,
+)
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import TaskRecord
 

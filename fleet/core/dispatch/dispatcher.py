@@ -19,7 +19,12 @@ from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.revision.replanning import start_replanning
 from fleet.core.state import State
-from fleet.core.state_updates import give_up, mark_goals, set_entry, with_waiting_cancelled
+from fleet.core.state_updates import (
+    give_up,
+    mark_goals,
+    set_entry,
+    with_waiting_cancelled,
+)
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import PlanState
 

@@ -15,7 +15,10 @@ from fleet.core.indexes.plan_index import robots_of
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import set_entry, touch
+from fleet.core.state_updates import (
+    set_entry,
+    touch,
+)
 from keyexpr_schema.payloads.tasks import TaskState
 
 SINCE_LOGIC = 1

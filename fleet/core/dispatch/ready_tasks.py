@@ -11,12 +11,18 @@ from heapq import merge
 from msgspec.structs import replace
 
 from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
+from fleet.core.indexes.fleet_index import carried_by
 from fleet.core.model.preconditions import action_of, unmet_before
 from fleet.core.model.skills import Action
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import give_up, set_entry, set_given_out, set_record
+from fleet.core.state_updates import (
+    give_up,
+    set_entry,
+    set_given_out,
+    set_record,
+)
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.tasks import TaskState
@@ -149,8 +155,10 @@ def _is_free(state: State, robot: str, plan: str, reservations: bool) -> bool:
 def _carries_for(state: State, robot: str, plan: str) -> bool:
     """Whether a robot has something with it that an open goal of the plan is about."""
     index = state.index
+    if robot not in index.things_at:
+        return False
     return any(
         plan in index.plans_of.get(goal, ())
-        for subject in index.things_at.get(robot, ())
+        for subject in carried_by(index, robot)
         for goal in index.goals_about.get(subject, ())
     )

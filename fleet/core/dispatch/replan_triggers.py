@@ -9,15 +9,21 @@ and the shell runs that: `planners.plan_repair` first, a new plan otherwise.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
+from fleet.core.belief_updates import ONE_VARIABLE_SINCE_LOGIC
+from fleet.core.indexes.fleet_index import carried_by
 from fleet.core.indexes.plan_index import OUTSTANDING
+from fleet.core.model.derived import holds, read_by
 from fleet.core.model.preconditions import action_of
 from fleet.core.model.skills import Action
+from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
-from keyexpr_schema.facts import AT
+from keyexpr_schema.facts import AT, IN, ON, REACHABLE, FactKey, Literal
 from keyexpr_schema.payloads.goals import GoalState
-from keyexpr_schema.payloads.tasks import TaskRecord
+from keyexpr_schema.payloads.tasks import ENDED_TASKS, TaskRecord
 from keyexpr_schema.payloads.world import Fact
 
 
@@ -28,41 +34,75 @@ def contradicted(state: State, entry: PlanEntry, fact: Fact) -> PlanEntry | None
     What a robot says of the work it is doing is part of that work. So is what anybody says that
     the work is just making true, or that it found when it began and is heard of only now.
     """
-    known = fact.key
-    for task in entry.index.exposed.get(known, ()):
+    world = state.world()
+    for task, needed in _needs_about(state, entry, fact.key):
         record = entry.records[task]
-        action = action_of(record, state.skills)
-        needed = [row for row in action.before if row.variable == known] if action else []
-        if not needed or needed[0].value == fact.value:
+        if holds(needed, world.facts.get, world) or _is_still_to_be_made(entry, needed, world):
             continue
         if record.state in OUTSTANDING and fact.source == record.robot:
             continue
         if state.plans_while_acting and _is_being_made(state, entry, fact):
             return None
-        sentence = f"{record.task} needs {needed[0]}, and {fact.source} says otherwise"
+        sentence = f"{record.task} needs {needed}, and {fact.source} says otherwise"
         return entry.to_replan(
             ReplanScope.REPAIR,
             sentence,
             goals=(record.goal,),
             tasks=(record.task,),
-            variables=(known,),
+            variables=(fact.key,),
         )
     return None
+
+
+def _needs_about(state: State, entry: PlanEntry, known: FactKey) -> Iterator[tuple[str, Literal]]:
+    """What tasks need of the variable, or of what is where its subject is, as nothing before them
+    provides it."""
+    variables = [known]
+    if known.subject not in state.places and state.logic >= ONE_VARIABLE_SINCE_LOGIC:
+        for name in carried_by(state.index, known.subject):
+            variables.extend(FactKey(relation, name) for relation in (AT, ON, IN, REACHABLE))
+    for variable in dict.fromkeys(variables):
+        for task in entry.index.exposed.get(variable, ()):
+            action = action_of(entry.records[task], state.skills)
+            if action is not None:
+                yield task, next(row for row in action.before if row.variable == variable)
+
+
+def _is_still_to_be_made(entry: PlanEntry, needed: Literal, world: WorldModel) -> bool:
+    """Whether what the need is read off, other than its own variable, is yet to change."""
+    read = read_by(needed, lambda key: (world.facts.get(key),), world) - {needed.variable}
+    setters = entry.index.graph.setters
+    return any(
+        entry.records[task].state not in ENDED_TASKS
+        for variable in read
+        for task in setters.get(variable, ())
+    )
 
 
 def _is_being_made(state: State, entry: PlanEntry, fact: Fact) -> bool:
     under_way = (r for r in entry.outstanding() if r.task in entry.index.graph.position)
     actions = ((record, action_of(record, state.skills)) for record in under_way)
-    return any(action and _is_of_its_making(record, action, fact) for record, action in actions)
+    world = state.world()
+    return any(
+        action and _is_of_its_making(record, action, fact, world) for record, action in actions
+    )
 
 
-def _is_of_its_making(record: TaskRecord, action: Action, fact: Fact) -> bool:
-    """Whether a fact says what a task under way makes true, or what it found when it began."""
-    said = (fact.key, fact.value)
-    if said in action.after:
+def _is_of_its_making(record: TaskRecord, action: Action, fact: Fact, world: WorldModel) -> bool:
+    """Whether a fact that is believed says what a task under way makes true, perhaps more finely,
+    or what it found when it began."""
+
+    def is_said(rows: Iterable[Literal]) -> bool:
+        return any(
+            row.variable == fact.key
+            and (row.value == fact.value or holds(row, world.facts.get, world))
+            for row in rows
+        )
+
+    if is_said(action.after):
         return True
     begun_s = record.ordered_s if record.started_s is None else record.started_s
-    return said in action.before and begun_s is not None and 0.0 < fact.time_s < begun_s
+    return is_said(action.before) and begun_s is not None and 0.0 < fact.time_s < begun_s
 
 
 def unforeseen(state: State, entry: PlanEntry) -> PlanEntry | None:

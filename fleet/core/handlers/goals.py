@@ -5,6 +5,7 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.belief_updates import conclude
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.over import goal_taken_back
@@ -13,7 +14,6 @@ from fleet.core.replan_reasons import GoalsAdded, ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import (
     cancel,
-    conclude,
     set_entry,
     set_goal,
     set_spec,

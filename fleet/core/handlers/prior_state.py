@@ -9,7 +9,10 @@ from fleet.core.effects import all_touches
 from fleet.core.handlers.requests import plan_number
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.state import State
-from fleet.core.state_updates import set_entry, touch
+from fleet.core.state_updates import (
+    set_entry,
+    touch,
+)
 from fleet.core.table import Table
 from keyexpr_schema.payloads.goals import ENDED_GOALS
 from keyexpr_schema.payloads.plans import Plan, PlanState

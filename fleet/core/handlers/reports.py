@@ -5,6 +5,7 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.belief_updates import as_written, believe, conclude, known_finer
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.indexes.touches import Part, Touch
@@ -16,8 +17,6 @@ from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
 from fleet.core.state_updates import (
-    believe,
-    conclude,
     give_up,
     mark_goals,
     open_goals,
@@ -93,13 +92,14 @@ def _again(record: TaskRecord, report: Report) -> TaskRecord:
 
 
 def _succeeded(state: State, entry: PlanEntry, record: TaskRecord, report: Report) -> State:
-    reported = {fact.key for fact in report.facts}
+    reported = {as_written(state, fact).key for fact in report.facts}
     action = action_of(record, state.skills)
     state = _learned(state, record, report, action)
     for literal in action.after if action is not None else ():
-        if literal.variable not in reported:
-            time_s = report.ended_s or state.time_s
-            state = conclude(state, Fact.of(literal, PLANNER_SOURCE, time_s))
+        fact = Fact.of(literal, PLANNER_SOURCE, report.ended_s or state.time_s)
+        fact = as_written(state, fact)
+        if fact.key not in reported:
+            state = conclude(state, replace(fact, value=known_finer(state, fact.literal)))
     state = set_record(state, entry, _ended(record, report, TaskState.SUCCEEDED))
     if record.task in entry.unwanted:
         entry = state.plans[entry.plan.plan]

@@ -5,10 +5,13 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.belief_updates import robot_changed
 from fleet.core.handlers.world import vocabulary_changed
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.state import State
-from fleet.core.state_updates import robot_changed, touch
+from fleet.core.state_updates import (
+    touch,
+)
 
 
 def robot_registered(state: State, event: events.RobotRegistered) -> State:

@@ -5,10 +5,13 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.belief_updates import as_written, conclude, known_finer
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.state import State
-from fleet.core.state_updates import conclude, touch
+from fleet.core.state_updates import (
+    touch,
+)
 from fleet.errors import NotUnderstood
 from fleet.language import statement_facts
 from keyexpr_schema.payloads.world import Fact, Statement, StatementStatus
@@ -60,9 +63,11 @@ def _read_statement(state: State, statement: Statement) -> State:
         status = StatementStatus(statement=name, reason=str(error), said_s=said_s)
         return _set_status(state, status)
     source = f"{PLANNER_SOURCE}:{name}"
-    facts = tuple(Fact.of(literal, source, said_s or state.time_s) for literal in read)
+    facts = tuple(
+        as_written(state, Fact.of(literal, source, said_s or state.time_s)) for literal in read
+    )
     for fact in facts:
-        state = conclude(state, fact)
+        state = conclude(state, replace(fact, value=known_finer(state, fact.literal)))
     return _set_status(state, StatementStatus(statement=name, facts=facts, said_s=said_s))
 
 

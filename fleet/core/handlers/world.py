@@ -5,18 +5,28 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core import events
+from fleet.core.belief_updates import (
+    as_written,
+    believe,
+    forget_fact,
+    forget_object,
+    set_object,
+)
 from fleet.core.dispatch.replan_triggers import contradicted
 from fleet.core.dispatch.while_replanning import stands_still
 from fleet.core.handlers import goals, statements
 from fleet.core.state import State
-from fleet.core.state_updates import believe, forget_fact, set_entry
+from fleet.core.state_updates import (
+    set_entry,
+)
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.payloads.plans import PlanState
 
 
 def fact_put(state: State, event: events.FactPut) -> State:
     """Believe the fact: its key holds the latest word. A plan that it contradicts is repaired."""
-    fact, known = event.fact, state.facts.get(event.fact.key)
+    fact = as_written(state, event.fact)
+    known = state.facts.get(fact.key)
     changed = believe(state, fact)
     if changed is state:
         return state
@@ -56,14 +66,12 @@ def object_put(state: State, event: events.ObjectPut) -> State:
     """A new object may make sentences understood."""
     if state.objects.get(event.object.object) == event.object:
         return state
-    return vocabulary_changed(
-        replace(state, objects=state.objects.set(event.object.object, event.object))
-    )
+    return vocabulary_changed(set_object(state, event.object))
 
 
 def object_deleted(state: State, event: events.ObjectDeleted) -> State:
     """Sentences once understood stay so."""
-    return replace(state, objects=state.objects.without(event.object))
+    return forget_object(state, event.object)
 
 
 def vocabulary_changed(state: State) -> State:

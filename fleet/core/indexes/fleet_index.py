@@ -6,7 +6,7 @@ a test.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeVar
 
 import immutables
@@ -15,15 +15,17 @@ import msgspec
 from fleet.core.indexes.plan_index import robots_of
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.table import Table
-from keyexpr_schema.facts import AT, FactKey
+from keyexpr_schema.facts import AT, IN, ON, FactKey
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState, GoalStatus
-from keyexpr_schema.payloads.world import Fact
+from keyexpr_schema.payloads.world import Fact, Object
 
 Names = immutables.Map[str, None]
 """A set of names. It has no order: nothing may depend on how it is walked through."""
 EMPTY: Names = immutables.Map()
 Sets = immutables.Map[str, Names]
+Variables = immutables.Map[FactKey, None]
 S = TypeVar("S")
+M = TypeVar("M")
 Order = tuple[str, str]
 """A plan and one of its tasks."""
 Orders = immutables.Map[Order, None]
@@ -35,7 +37,8 @@ class FleetIndex(msgspec.Struct, frozen=True, eq=False):
 
     `active` has the plans that have not ended, with the priority in which their tasks get robots.
     `work` has, by robot, the orders that may be carried out with it, `things_at` the subjects of
-    `at` facts by value, `goals_about` the goals that have not ended by the subjects of their
+    `at` facts by value, `said_on` the variables of facts that say `on` or `in`, `parts` things by
+    what they are parts of, `goals_about` the goals that have not ended by the subjects of their
     conditions, `plans_of` the active plans by goal. `in_state` has the goals that wait, or were
     rejected. `team` are the robots that can be planned with.
     """
@@ -43,6 +46,8 @@ class FleetIndex(msgspec.Struct, frozen=True, eq=False):
     active: Table[str, int] = Table()
     work: immutables.Map[str, Orders] = immutables.Map()
     things_at: Sets = immutables.Map()
+    said_on: immutables.Map[str, Variables] = immutables.Map()
+    parts: Sets = immutables.Map()
     goals_about: Sets = immutables.Map()
     plans_of: immutables.Map[str, tuple[str, ...]] = immutables.Map()
     in_state: immutables.Map[GoalState, Names] = immutables.Map()
@@ -56,10 +61,10 @@ class FleetIndex(msgspec.Struct, frozen=True, eq=False):
 
 
 def in_set(
-    sets: immutables.Map[S, Names], name: S, member: str, there: bool
-) -> immutables.Map[S, Names]:
+    sets: immutables.Map[S, immutables.Map[M, None]], name: S, member: M, there: bool
+) -> immutables.Map[S, immutables.Map[M, None]]:
     """The sets, with `member` in that of `name` or not."""
-    known = sets.get(name, EMPTY)
+    known = sets.get(name) or immutables.Map()
     if (member in known) == there:
         return sets
     if there:
@@ -68,11 +73,30 @@ def in_set(
     return sets.set(name, rest) if rest else sets.delete(name)
 
 
-def place_of(fact: Fact | None) -> str | None:
-    """Where a fact says that its subject is, in a place or at a robot."""
+def carrier_in(fact: Fact | None) -> str | None:
+    """What carries its subject directly, as a fact says: a place, a thing, a robot."""
     if fact is None or fact.relation != AT or not isinstance(fact.value, str):
         return None
     return fact.value
+
+
+def rest_in(fact: Fact | None) -> str | None:
+    """What its subject is on or in, as a fact says that is none of `at`."""
+    if fact is None or fact.relation not in (ON, IN) or not isinstance(fact.value, str):
+        return None
+    return fact.value
+
+
+def carried_by(index: FleetIndex, name: str) -> Iterator[str]:
+    """`name`, its parts, and what is there, on or in them, however indirectly."""
+    seen, open_ = {name}, [name]
+    while open_:
+        carrier = open_.pop()
+        yield carrier
+        for found in (index.things_at, index.parts):
+            more = [name for name in found.get(carrier, EMPTY) if name not in seen]
+            seen.update(more)
+            open_.extend(more)
 
 
 def subjects_of(status: GoalStatus | None) -> frozenset[str]:
@@ -96,6 +120,7 @@ def index_of(
     goals: Mapping[str, Goal],
     goal_states: Mapping[str, GoalStatus],
     facts: Mapping[FactKey, Fact],
+    objects: Mapping[str, Object],
     team: Iterable[str],
 ) -> FleetIndex:
     """The index of these plans, goals and facts, derived anew."""
@@ -109,9 +134,16 @@ def index_of(
             for goal in entry.wanted_goals:
                 plans_of.setdefault(goal, []).append(plan)
     things_at: Sets = immutables.Map()
+    said_on: immutables.Map[str, Variables] = immutables.Map()
+    parts: Sets = immutables.Map()
+    for thing in objects.values():
+        if thing.part_of is not None:
+            parts = in_set(parts, thing.part_of, thing.object, True)
     for fact in facts.values():
-        if (place := place_of(fact)) is not None:
-            things_at = in_set(things_at, place, fact.subject, True)
+        if (carrier := carrier_in(fact)) is not None:
+            things_at = in_set(things_at, carrier, fact.subject, True)
+        if (rest := rest_in(fact)) is not None:
+            said_on = in_set(said_on, rest, fact.key, True)
     goals_about: Sets = immutables.Map()
     in_state: immutables.Map[GoalState, Names] = immutables.Map()
     for goal, status in goal_states.items():
@@ -123,6 +155,8 @@ def index_of(
         active=Table({p: priority_of(e, goals) for p, e in plans.items() if not e.ended}),
         work=immutables.Map({robot: Orders(orders) for robot, orders in work.items()}),
         things_at=things_at,
+        said_on=said_on,
+        parts=parts,
         goals_about=goals_about,
         plans_of=immutables.Map({goal: tuple(names) for goal, names in plans_of.items()}),
         in_state=in_state,

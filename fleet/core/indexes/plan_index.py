@@ -44,6 +44,7 @@ class PlanGraph:
     `position` is each task's place in the plan, `successors` the tasks that wait for it. `needs`
     are the values that a task needs of variables; `suppliers` the last tasks before it that set
     such a variable, `consumers` the tasks and variables that a task is such a supplier of.
+    `setters` are all tasks that set a variable.
     """
 
     def __init__(
@@ -66,16 +67,16 @@ class PlanGraph:
                 successors[before].append(name)
         self.successors = {name: tuple(later) for name, later in successors.items()}
         self.needs: dict[str, tuple[FactKey, ...]] = {}
-        setters: dict[FactKey, list[str]] = defaultdict(list)
+        self.setters: dict[FactKey, list[str]] = defaultdict(list)
         for name, record in current.items():
             action = action_of(record, skills)
             if action is not None:
                 self.needs[name] = tuple(dict.fromkeys(row.variable for row in action.before))
                 for literal in action.after:
-                    setters[literal.variable].append(name)
+                    self.setters[literal.variable].append(name)
         self.suppliers: dict[tuple[str, FactKey], tuple[str, ...]] = {}
         self.consumers: dict[str, list[tuple[str, FactKey]]] = defaultdict(list)
-        masks = {variable: graph.mask(names) for variable, names in setters.items()}
+        masks = {variable: graph.mask(names) for variable, names in self.setters.items()}
         for name, variables in self.needs.items():
             for variable in variables:
                 if variable in masks and (last := graph.last_before(name, masks[variable])):

@@ -8,7 +8,12 @@ from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.replan_reasons import ReplanReason, ReplanScope, TaskAdded
 from fleet.core.revision.residual_plan import actors_in_order, begun_actors, residual_plan
 from fleet.core.state import State
-from fleet.core.state_updates import answer, give_up, open_goals, set_entry
+from fleet.core.state_updates import (
+    answer,
+    give_up,
+    open_goals,
+    set_entry,
+)
 from fleet.core.table import Table
 from keyexpr_schema.payloads.tasks import TaskState
 

@@ -1,0 +1,161 @@
+"""What is believed, and how it changes: facts, things, and robots that can be planned with.
+
+These keep the indexes up, and note what they touched, as `fleet.core.state_updates` does.
+"""
+
+from __future__ import annotations
+
+import immutables
+from msgspec.structs import replace
+
+from fleet.core.indexes.fact_views import FactValues
+from fleet.core.indexes.fleet_index import M, carrier_in, in_set, rest_in
+from fleet.core.indexes.touches import Part, Touch, Touches
+from fleet.core.model.derived import carriers, holds, written
+from fleet.core.state import State
+from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
+from keyexpr_schema.payloads.world import Fact, Object
+
+AHEAD_S = 60.0
+"""A fact from further ahead than this [s] was said in an earlier era, if there was one."""
+COMPARED_SINCE_LOGIC = 1
+"""Before this logic of the core, only facts in reports gave way to newer ones."""
+ONE_VARIABLE_SINCE_LOGIC = 3
+"""Before this logic of the core, what something is on or in was no word about where it is."""
+
+
+def believe(state: State, fact: Fact) -> State:
+    """Believe a fact, unless a newer one is known: the newest word holds, on whatever way it came.
+
+    One that does not say when it was said (0) is said now. Of two that one party says of the same
+    moment the finer one holds: in the kitchen, on the table there.
+    """
+    fact = as_written(state, fact)
+    known = state.facts.get(fact.key)
+    if known == fact:
+        return state
+    earlier = _said_in_earlier_era(state, fact)
+    if known is not None and fact.time_s != 0.0 and state.logic >= COMPARED_SINCE_LOGIC:
+        known_earlier = fact.key in state.older_facts
+        if earlier > known_earlier or (earlier == known_earlier and fact.time_s < known.time_s):
+            return state
+        same_word = (known.source, known.time_s) == (fact.source, fact.time_s)
+        if same_word and known_finer(state, fact.literal) != fact.value:
+            return state
+    older = state.older_facts.without(fact.key)
+    if earlier:
+        older = older.set(fact.key, None)
+    return replace(_fact_changed(state, fact.key, known, fact), older_facts=older)
+
+
+def as_written(state: State, fact: Fact) -> Fact:
+    """The fact of the one variable that says where a thing is, if it says what that is on or in."""
+    if state.logic < ONE_VARIABLE_SINCE_LOGIC or rest_in(fact) is None:
+        return fact
+    literal = written(fact.literal, state)
+    return replace(fact, relation=literal.variable.relation)
+
+
+def known_finer(state: State, literal: Literal) -> Value:
+    """Its value, or the one believed where that says the same more finely: on a table in the
+    kitchen, of what is said to be in the kitchen."""
+    variable, value = literal
+    if variable.relation != AT or value is None or state.logic < ONE_VARIABLE_SINCE_LOGIC:
+        return value
+    facts = FactValues(state.facts)
+    return facts.get(variable) if holds(literal, facts.get, state) else value
+
+
+def _said_in_earlier_era(state: State, fact: Fact) -> bool:
+    return state.era > 0 and fact.time_s > state.time_s + AHEAD_S
+
+
+def conclude(state: State, fact: Fact) -> State:
+    """Believe what the planner concludes itself, and so publishes."""
+    fact = as_written(state, fact)
+    believed = believe(state, fact)
+    if believed is state:
+        return state
+    return replace(believed, concluded=state.concluded.set(fact.key, fact))
+
+
+def forget_fact(state: State, key: FactKey) -> State:
+    """No longer believe anything of a variable."""
+    known = state.facts.get(key)
+    if known is None:
+        return state
+    state = replace(state, older_facts=state.older_facts.without(key))
+    return _fact_changed(state, key, known, None)
+
+
+def _fact_changed(state: State, key: FactKey, old: Fact | None, new: Fact | None) -> State:
+    index, touches = state.index, state.touches.and_(Touch(Part.FACT, key))
+    was, now = carrier_in(old), carrier_in(new)
+    if was != now:
+        touches = touched_carriers(state, key.subject, touches)
+        index = replace(index, things_at=_moved(index.things_at, key.subject, was, now))
+    before, after = rest_in(old), rest_in(new)
+    if before != after:
+        index = replace(index, said_on=_moved(index.said_on, key, before, after))
+    facts = state.facts.without(key) if new is None else state.facts.set(key, new)
+    state = replace(state, facts=facts, index=index, touches=touches)
+    if was != now:
+        state = replace(state, touches=touched_carriers(state, key.subject, touches))
+    return robot_changed(state, key.subject) if key.relation == HOLDING else state
+
+
+def _moved(
+    sets: immutables.Map[str, immutables.Map[M, None]], member: M, was: str | None, now: str | None
+) -> immutables.Map[str, immutables.Map[M, None]]:
+    if was is not None:
+        sets = in_set(sets, was, member, False)
+    return sets if now is None else in_set(sets, now, member, True)
+
+
+def touched_carriers(state: State, subject: str, touches: Touches) -> Touches:
+    """Whoever carries it, directly or with what it is on or in, may be reserved or free now."""
+    for carrier in carriers(subject, FactValues(state.facts).get, state, aboard=True):
+        touches = touches.and_(Touch(Part.ROBOT, carrier))
+    return touches
+
+
+def set_object(state: State, thing: Object) -> State:
+    """Keep a thing; what was said to be on or in it was said of where that is."""
+    name = thing.object
+    state = _part_changed(state, name, thing.part_of)
+    return _said_on_known(replace(state, objects=state.objects.set(name, thing)), name)
+
+
+def forget_object(state: State, name: str) -> State:
+    """Drop a thing."""
+    state = _part_changed(state, name, None)
+    return replace(state, objects=state.objects.without(name))
+
+
+def _part_changed(state: State, name: str, whole: str | None) -> State:
+    known = state.objects.get(name)
+    parts = _moved(state.index.parts, name, None if known is None else known.part_of, whole)
+    return replace(state, index=replace(state.index, parts=parts))
+
+
+def _said_on_known(state: State, name: str) -> State:
+    """A name stands for something now: facts that say `on` or `in` it are of where things are."""
+    for key in sorted(state.index.said_on.get(name, ())):
+        fact = state.facts[key]
+        if as_written(state, fact) != fact:
+            state = believe(forget_fact(state, key), fact)
+    return state
+
+
+def robot_changed(state: State, robot: str) -> State:
+    """Look again at whether a robot is there and can be planned with."""
+    state = replace(state, touches=state.touches.and_(Touch(Part.ROBOT, robot)))
+    ready, team = state.ready(robot), state.index.team
+    if ready == (robot in team):
+        return state
+    team = team.set(robot, None) if ready else team.delete(robot)
+    state = replace(state, index=replace(state.index, team=team))
+    if not ready:
+        return state
+    touches = state.touches.and_(Touch(Part.TEAM))
+    return replace(state, team_number=state.team_number + 1, touches=touches)

@@ -141,14 +141,14 @@ class Causality:
             and holds(literal, lambda v: value if v == literal.variable else None, self._world)
         )
 
-    def _check_formula(self, task: str, formula: Formula) -> None:
+    def _check_formula(self, task: str, formula: Formula, what: str | None = None) -> None:
         try:
             failure = self._states.failure(formula, task)
         except Undecided:
             return
         if failure is None:
             return
-        needs = f"{task} needs {formula_text(failure.part)}"
+        needs = f"{task} needs {what or formula_text(failure.part)}"
         names = ", ".join(failure.after)
         if failure.open:
             code, why = (
@@ -229,7 +229,7 @@ class Causality:
     def _check_space(self, task: str, carrier: str) -> None:
         if carrier in self._world.objects or self._moved_by_chance:
             if actor_in(carrier) is None:
-                self._check_formula(task, self._has_room(carrier))
+                self._check_formula(task, self._has_room(carrier), f"room on or in {carrier}")
             return
         at_start, planned = self._baskets.before(task, self._actions[task], carrier)
         if actor_in(carrier) is not None:

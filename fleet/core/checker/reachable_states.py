@@ -16,7 +16,8 @@ from itertools import islice
 
 from fleet.core.checker.writers import Writers
 from fleet.core.model.formulas.abstraction import outcomes, reads
-from fleet.core.model.formulas.evaluation import conjuncts, evaluate, expanded, number
+from fleet.core.model.formulas.effects import carried_out
+from fleet.core.model.formulas.evaluation import conjuncts, evaluate, expanded
 from fleet.core.model.formulas.nodes import Formula
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
@@ -216,11 +217,9 @@ class ReachableStates:
                 if variable in index:
                     values[index[variable]] = value
             known = dict(zip(variables, state, strict=True))
-            for row in self._writers.guarded.get(name, ()):
-                if row.variable in index and evaluate(row.when, known.get, self._world):
-                    values[index[row.variable]] = (
-                        row.value if row.to is None else number(row.to, known.get, self._world)
-                    )
+            rows = [row for row in self._writers.guarded.get(name, ()) if row.variable in index]
+            for variable, value in carried_out(rows, known.get, self._world):
+                values[index[variable]] = value
             return tuple(values)
 
         return after

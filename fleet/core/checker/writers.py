@@ -3,34 +3,13 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
-from itertools import product
-from typing import NamedTuple
+from collections.abc import Mapping
 
-from fleet.core.model.derived import written
-from fleet.core.model.formulas.evaluation import expanded, expanded_term
-from fleet.core.model.formulas.nodes import (
-    FALSE,
-    ConditionalEffect,
-    Formula,
-    Sum,
-    Term,
-    Variable,
-    grounded_effect,
-)
+from fleet.core.model.formulas.effects import Guarded, instances
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import FactKey, Literal, Value
-
-
-class Guarded(NamedTuple):
-    """What a task makes of a variable `when` a formula holds: the value of `to`."""
-
-    variable: FactKey
-    to: Term | None
-    value: Value
-    when: Formula
 
 
 class Writers:
@@ -102,18 +81,3 @@ class Writers:
         for last in graph.last(sure):
             here &= ~graph.before(last)
         return here, sure == 0
-
-
-def instances(effect: ConditionalEffect, world: WorldModel) -> Iterator[Guarded]:
-    """The effect for each of the names it is for, with its condition written out."""
-    names = [name for name, _ in effect.each]
-    for values in product(*(world.of_type(kind) for _, kind in effect.each)):
-        row = grounded_effect(effect, dict(zip(names, values, strict=True)))
-        when = expanded(row.when, world)
-        if when == FALSE:
-            continue
-        variable, value = written(Literal(row.variable, row.value), world)
-        to = None
-        if row.add is not None:
-            to = Sum((Variable(variable), expanded_term(row.add, world)))
-        yield Guarded(variable, to, value, when)

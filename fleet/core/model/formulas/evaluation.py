@@ -191,6 +191,8 @@ def expanded_term(node: Term, world: TypedInventory) -> Term:
                 tuple(expanded_term(term, world) for term in plus),
                 tuple(expanded_term(term, world) for term in minus),
             )
+        case Total("", "", where, of):
+            return Total("", "", expanded(where, world), expanded_term(of, world))
         case Total(name, kind, where, of):
             # A sum of totals over one name each: `$x` stands in none of them any more.
             rows = []

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from math import inf
 
 from msgspec.structs import replace
 
-from fleet.core.model.parameter_types import OBJECT
 from fleet.core.model.world import WorldModel, condition_holds
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import ActionSequence
-from fleet.planners.symbolic.search import (
-    Facts,
-    Solution,
-    ground_actions,
-    relaxed_reachable,
-    uniform_cost_search,
-)
-from keyexpr_schema.facts import AT, HELD, HOLDING, NOTHING, SEARCHED, FactKey, Value
+from fleet.planners.symbolic.finite_domain import FiniteDomainTask
+from fleet.planners.symbolic.grounding import Facts, Grounding
+from fleet.planners.symbolic.impossibility import what_is_missing
+from fleet.planners.symbolic.robot_classes import representatives
+from fleet.planners.symbolic.search import Solution, Solver, Unfinished
+from fleet.planners.symbolic.travel import Travel
+from keyexpr_schema.facts import AT, HELD, HOLDING, SEARCHED, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 
 ALTERNATIVES = 4
@@ -29,10 +26,8 @@ ALTERNATIVES = 4
 UNLOADING_S = 30.0
 """What it counts for, in seconds, that an object ends in a basket and not on a table: somebody
 still has to take it out, which is about one more task for a hand."""
-MAX_FULL_HANDS = 2
-"""Robots of a kind looked at that would have to put something down first."""
-MAX_OBJECTS = 8
-"""Objects looked at as possible tools where a subgoal cannot be reached without one."""
+NEAREST_STEPS = 4
+"""Steps named of those that a search still lacked when it gave up."""
 REUSE_CHARGE_S = 200.0
 """What an action costs more for each sequence that already uses it; more than any task takes."""
 
@@ -50,6 +45,20 @@ class Subgoal:
             replace(self.condition, subject=subject, any_of=())
             for subject in self.condition.subjects
         ]
+
+
+@dataclass(frozen=True)
+class Impossible:
+    """There is no sequence for a subgoal; what is missing first, as a sentence."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class GaveUp:
+    """No sequence was found in time; how near it came, as a sentence."""
+
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -87,20 +96,33 @@ def alternatives_for(
     world: WorldModel,
     budget: TimeBudget,
     settled: frozenset[str] = frozenset(),
-) -> tuple[tuple[ActionSequence, ...], Facts] | None:
-    """Different sequences for a subgoal, the cheapest first, and the facts after that one; `None`
-    where there is none, or none was found within the `budget`.
+) -> tuple[tuple[ActionSequence, ...], Facts] | Impossible | GaveUp:
+    """Different sequences for a subgoal, the cheapest first, and the facts after that one; or why
+    there is none, or none was found within the `budget`.
 
     Where a robot stands is left open at the start, so that every actor begins with the way to its
     work, whatever its robot does before; `settled` robots are taken to be where `facts` say.
     """
-    found = [
-        (result, condition)
-        for condition in subgoal.subjects()
-        for result in _different_solutions(condition, facts, world, settled, budget)
-    ]
+    found: list[tuple[Solution, Condition]] = []
+    failure: Impossible | GaveUp | None = None
+    sought: list[_Sought] = []
+    for condition in subgoal.subjects():
+        made = _sought(condition, facts, world, settled)
+        if isinstance(made, _Sought):
+            sought.append(made)
+        else:
+            failure = failure or made
+    sought.sort(key=lambda one: one.least_s)
+    for one in sought:
+        if len(found) >= ALTERNATIVES and one.least_s >= _dearest_s(found):
+            break
+        results = _different_solutions(one, budget)
+        if isinstance(results, Unfinished):
+            failure = GaveUp(_gave_up(subgoal, results, budget))
+            break
+        found += [(result, one.condition) for result in results]
     if not found:
-        return None
+        return failure or Impossible(_exhausted(subgoal))
     found.sort(key=lambda pair: pair[0].cost_s + _unloading_s(pair[0], pair[1], world))
     sequences: dict[object, ActionSequence] = {}
     for result, condition in found:
@@ -113,6 +135,26 @@ def alternatives_for(
     return tuple(sequences.values())[:ALTERNATIVES], found[0][0].facts
 
 
+def _dearest_s(found: Sequence[tuple[Solution, Condition]]) -> float:
+    return sorted(solution.cost_s for solution, _ in found)[ALTERNATIVES - 1]
+
+
+def _gave_up(subgoal: Subgoal, search: Unfinished, budget: TimeBudget) -> str:
+    """How near a search came that ran out of time, or of states."""
+    after = f"{budget.seconds:g} s" if budget.over else f"{search.states} states"
+    steps = [f"{a.skill.name}({', '.join(a.args.values())})" for a in search.nearest]
+    rest = f"still lacked {', '.join(steps[:NEAREST_STEPS])}" if steps else "lacked no single step"
+    more = f" and {len(steps) - NEAREST_STEPS} more" if len(steps) > NEAREST_STEPS else ""
+    return f"gave up after {after}; the nearest it came to {subgoal.condition} {rest}{more}"
+
+
+def _exhausted(subgoal: Subgoal) -> str:
+    return (
+        f"every way to {subgoal.condition} undoes something that it needs: all states that the "
+        "connected robots can reach were looked at"
+    )
+
+
 def _unloading_s(found: Solution, condition: Condition, world: WorldModel) -> float:
     """The charge for an object that ends in a basket."""
     where = found.facts.get(FactKey(AT, condition.subject))
@@ -120,108 +162,57 @@ def _unloading_s(found: Solution, condition: Condition, world: WorldModel) -> fl
     return 0.0 if wanted or where not in world.robots else UNLOADING_S
 
 
-def _different_solutions(
-    condition: Condition,
-    facts: Facts,
-    world: WorldModel,
-    settled: frozenset[str],
-    budget: TimeBudget,
-) -> list[Solution]:
+@dataclass(frozen=True)
+class _Sought:
+    """A condition of one subject, as a task, and at least what it costs [s]."""
+
+    condition: Condition
+    task: FiniteDomainTask
+    solver: Solver
+    least_s: float
+
+
+def _different_solutions(sought: _Sought, budget: TimeBudget) -> list[Solution] | Unfinished:
     """The cheapest sequence, and others made different by charging for what was used before."""
-    subject = condition.subject
-    robots = _representatives(condition, facts, world)
-    start: Facts = dict(facts)
-    for robot in world.robots.keys() - settled:
-        start[FactKey(AT, robot)] = None
-    objects = sorted(_held(robots, facts) | ({subject} & world.objects.keys()))
-    results = _cheapest_few(condition, robots, objects, start, facts, world, budget)
-    if results or not _needs_a_tool(condition, world):
-        return results
-    # Something else may be needed for it, such as a tool.
-    known = [thing for thing in world.objects if facts.get(FactKey(AT, thing)) is not None]
-    robots = _representatives(condition, facts, world, tools=True)
-    wider = sorted({*objects, *_held(robots, facts), *known[:MAX_OBJECTS]})
-    return _cheapest_few(condition, robots, wider, start, facts, world, budget)
-
-
-def _needs_a_tool(condition: Condition, world: WorldModel) -> bool:
-    """Whether a skill for it takes more objects than the one that the condition is about."""
-    own = condition.subject in world.objects
-    return any(
-        sum(kind.bases == (OBJECT,) for kind in skill.types.values()) > own
-        for skill in world.skills.values()
-        if any(row.variable.relation == condition.relation for row in skill.after)
-    )
-
-
-def _cheapest_few(
-    condition: Condition,
-    robots: Sequence[str],
-    objects: Sequence[str],
-    start: Facts,
-    facts: Facts,
-    world: WorldModel,
-    budget: TimeBudget,
-) -> list[Solution]:
-    grounded = ground_actions(world, robots, objects, condition)
-    actions = relaxed_reachable(grounded, start, condition, world)
-    if not actions:
-        return []  # nothing that these objects are good for makes it true
-    stands = [FactKey(AT, action.actor) for action in actions]
-    numbers = {id(action): number for number, action in enumerate(actions)}
-    charge_s = [0.0] * len(actions)
-
-    @cache
-    def duration_s(number: int, origin: Value) -> float:
-        return world.duration_s(actions[number], origin, actions[number].actor)
-
-    def cost_s(number: int, now: Mapping[FactKey, Value]) -> float:
-        origin = now.get(stands[number]) or facts.get(stands[number])
-        return duration_s(number, origin) + charge_s[number]
-
+    task, travel = sought.task, sought.task.travel
+    charge_s = [0.0] * len(task.operators)
+    numbers = {id(operator.action): number for number, operator in enumerate(task.operators)}
     solutions: list[Solution] = []
     for _ in range(ALTERNATIVES):
-        found = uniform_cost_search(actions, start, condition, world, cost_s, budget)
-        if found is None:
+        found = sought.solver.solve(charge_s, budget, thorough=not solutions)
+        if isinstance(found, Unfinished) and not solutions:
+            return found
+        if not isinstance(found, Solution):
             break
-        used = [numbers[id(action)] for action in found.actions]
-        true_cost_s = found.cost_s - sum(charge_s[number] for number in used)
-        solutions.append(Solution(found.actions, round(true_cost_s, 6), found.facts))
-        for number in used:
-            charge_s[number] += REUSE_CHARGE_S
+        solutions.append(found)
+        for action in found.actions:
+            number = numbers.get(id(action))
+            if number is not None:
+                charge_s[number] += REUSE_CHARGE_S
+            else:
+                way = action.actor, str(action.after[0].value)
+                travel.charge_s[way] = travel.charge_s.get(way, 0.0) + REUSE_CHARGE_S
     return solutions
 
 
-def _representatives(
-    condition: Condition, facts: Facts, world: WorldModel, tools: bool = False
-) -> list[str]:
-    """One robot of each kind that is interchangeable now, and those that are spoken of.
-
-    What a hand holds, if not the subject, only has to be put down, and each thing more would
-    multiply the states to be looked at: a few such robots stand for all. With `tools` what they
-    hold may be of use.
-    """
-    subject = condition.subject
-    kinds: dict[object, str] = {}
-    full: Counter[object] = Counter()
-    for robot in world.team:
-        spec = world.robots[robot]
-        holds = facts.get(FactKey(HOLDING, robot))
-        named = robot in (subject, condition.value) or facts.get(FactKey(AT, subject)) == robot
-        able = spec.skills, tuple(sorted(spec.capabilities.items()))
-        if not (named or tools or holds in (None, NOTHING, subject)):
-            full[able] += 1
-            if full[able] > MAX_FULL_HANDS:
-                continue
-        alone = named or robot in world.marked
-        kinds.setdefault((able, holds, robot if alone else None), robot)
-    return sorted(kinds.values())
-
-
-def _held(robots: Sequence[str], facts: Facts) -> set[str]:
-    """What these robots have in their hands."""
-    values = (facts.get(FactKey(HOLDING, robot)) for robot in robots)
-    return {value for value in values if isinstance(value, str) and value != NOTHING}
+def _sought(
+    condition: Condition, facts: Facts, world: WorldModel, settled: frozenset[str]
+) -> _Sought | Impossible:
+    """The condition as a task, or why it is out of reach."""
+    goal = [Literal(FactKey(condition.relation, condition.subject), condition.value)]
+    robots = representatives(condition, facts, world)
+    travel = Travel(world, facts)
+    free = travel.free(robots)
+    start: Facts = dict(facts)
+    for robot in free - settled:
+        start[FactKey(AT, robot)] = None
+    grounding = Grounding(world, start, goal, robots, free)
+    task = FiniteDomainTask(world, start, goal, grounding.actions, robots, travel, free)
+    solver = Solver(task)
+    least_s = inf if task.impossible else solver.least_s()
+    if least_s == inf:
+        return Impossible(what_is_missing(grounding, task))
+    return _Sought(condition, task, solver, least_s)
 
 
 def exploration_for(
@@ -252,7 +243,7 @@ def exploration_for(
         facts[FactKey(SEARCHED, place)] = False
         condition = Condition(relation=SEARCHED, subject=place, value=True)
         found = alternatives_for(Subgoal(subgoals[0].goal, condition), facts, world, budget)
-        if found is not None:
+        if isinstance(found, tuple):
             sequences.append(found[0][0])
             conditions.append(condition)
     return Exploration(tuple(sequences), tuple(conditions), seeks) if sequences else None

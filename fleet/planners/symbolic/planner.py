@@ -32,7 +32,7 @@ from fleet.planners.symbolic.action_sequences import (
     exploration_for,
     subgoals_in_order,
 )
-from fleet.planners.symbolic.search import Facts
+from fleet.planners.symbolic.grounding import Facts
 from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
 from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.plans import Plan
@@ -109,7 +109,7 @@ class _Reached:
         """Find sequences that reach one more subgoal; whether there are any."""
         settled = frozenset(self.settled)
         found = alternatives_for(subgoal, self.facts, self.problem.world, self.budget, settled)
-        if found is None:
+        if not isinstance(found, tuple):
             return False
         sequences, self.facts = found
         self.options.append(sequences)

@@ -1,28 +1,32 @@
-"""The cheapest sequence of ground actions to a condition, by uniform-cost search (Dijkstra 1959).
+"""The cheapest sequence of actions for a task: A* (Hart, Nilsson and Raphael 1968), anytime.
 
-State variables that no relevant action writes keep their value and are left out of the state.
+First A* with h_max: what it finds is the cheapest. Where that takes long, a greedy search with
+h_add looks for any sequence, and A* goes on, within limits, for a cheaper one. States are estimated
+when it is their turn, not when they are made; what a relaxed plan begins with has its turn first.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from heapq import heappop, heappush
-from itertools import count, product
+from math import inf
 
-from fleet.core.model.preconditions import applicable
 from fleet.core.model.skills import Action
-from fleet.core.model.world import WorldModel, condition_holds, known_value
 from fleet.jobshop.time_budget import TimeBudget
-from keyexpr_schema.facts import AT, HELD, HOLDING, LOCATED, FactKey, Literal, Value
-from keyexpr_schema.payloads.goals import Condition
+from fleet.planners.symbolic.finite_domain import FiniteDomainTask, State
+from fleet.planners.symbolic.grounding import Facts
+from fleet.planners.symbolic.relaxation import Estimate, Relaxation
+from fleet.planners.symbolic.travel import Moves
 
-DERIVED_FROM = {LOCATED: {AT}, HELD: {AT, HOLDING}}
-"""Relations that a derived one is read off."""
-MAX_EXPANSIONS = 30_000
-"""States looked at before the search gives up."""
-
-Facts = dict[FactKey, Value]
+FIRST_STATES = 400
+"""States that A* looks at before a greedy search is tried."""
+IMPROVING_STATES = 2_000
+"""States that A* looks at in all where there is a sequence already."""
+MAX_STATES = 1_000_000
+"""States looked at before a search gives up even with time left: about a gigabyte of them."""
+GREED = 5.0
+"""How much more a greedy search trusts its estimate than what it has spent."""
 
 
 @dataclass(frozen=True)
@@ -34,222 +38,185 @@ class Solution:
     facts: Facts
 
 
-def ground_actions(
-    world: WorldModel, robots: Sequence[str], objects: Sequence[str], goal: Condition
-) -> list[Action]:
-    """Every action of these robots on these objects that can help with the goal.
+@dataclass(frozen=True)
+class Unreachable:
+    """Every state that can be reached was looked at, or the goal is out of reach from the first."""
 
-    An action helps if it makes something true that the goal, or an action that helps, wants. What
-    only undoes, or makes true what nobody asks for (that another place was searched), is left out:
-    it would never be on a cheapest way, and would multiply the states to be looked at.
-    """
-    there = (*robots, *objects, *world.places)
-    possible: list[Action] = []
-    for name in sorted(_related(world, goal)):
-        skill = world.skills[name]
-        names = (
-            [name for name in there if world.is_of_type(name, kind)]
-            for kind in skill.types.values()
-        )
-        for values in product(*names):
-            action = skill.ground(dict(zip(skill.parameters, values, strict=True)))
-            if len(set(action.participants)) == len(action.participants) and not any(
-                world.lacks(action.args[parameter], action, parameter)
-                for parameter in skill.robot_parameters
-            ):
-                possible.append(action)
-    makers: dict[Literal, list[int]] = {}
-    for number, action in enumerate(possible):
-        for literal in action.after:
-            makers.setdefault(literal, []).append(number)
-    wanted = [literal for literal in makers if _serves(literal, goal, world)]
-    helpful: set[int] = set()
-    seen = set(wanted)
-    while wanted:
-        for number in makers.get(wanted.pop(), ()):
-            if number in helpful:
+
+@dataclass(frozen=True)
+class Unfinished:
+    """The search was ended before it knew; what would still be missing where it came nearest."""
+
+    nearest: tuple[Action, ...]
+    """A relaxed plan for the rest."""
+    states: int
+
+
+@dataclass(slots=True)
+class _Node:
+    state: State
+    spent_s: float
+    parent: _Node | None
+    operator: int
+    """-1 for the moves to the goal."""
+    moves: Moves
+
+
+class Search:
+    """One best-first search that can be gone on with."""
+
+    def __init__(
+        self, task: FiniteDomainTask, relaxation: Relaxation, charge_s: list[float], greed: float
+    ) -> None:
+        self._task = task
+        self._relaxation = relaxation
+        self._charge_s = charge_s
+        self._greed = greed
+        self._ticket = 0
+        self._queue: list[tuple[float, bool, float, int, float, _Node, Estimate | None]] = []
+        self._best: dict[State, float] = {task.initial: 0.0}
+        self._closed: set[State] = set()
+        self._estimates: dict[State, Estimate] = {}
+        self.nearest: tuple[float, Estimate] = (inf, Estimate(inf, frozenset(), ()))
+        self._push(_Node(task.initial, 0.0, None, -1, {}), 0.0, True, None)
+
+    @property
+    def states(self) -> int:
+        """How many were looked at."""
+        return len(self._closed)
+
+    def run(self, budget: TimeBudget, states: int, below_s: float = inf) -> Solution | bool:
+        """A solution cheaper than `below_s`; true if there is none, false if it is not known yet,
+        as `states` were looked at or the time is over.
+        """
+        task = self._task
+        while self._queue:
+            if len(self._closed) >= states or budget.over:
+                return False
+            _, _, guess_s, _, least_s, node, estimate = heappop(self._queue)
+            if node.operator < 0 and node.parent is not None:
+                return self._solution(node)
+            if node.state in self._closed or node.spent_s > self._best[node.state]:
                 continue
-            helpful.add(number)
-            action = possible[number]
-            needed = [*action.before, *_making_room(action, makers)]
-            wanted.extend(literal for literal in needed if literal not in seen)
-            seen.update(needed)
-    return [possible[number] for number in sorted(helpful)]
-
-
-def _related(world: WorldModel, goal: Condition) -> set[str]:
-    """Skills that write a relation which the goal, or such a skill, reads."""
-    wanted = set(DERIVED_FROM.get(goal.relation, {goal.relation}))
-    related: set[str] = set()
-    while True:
-        more = {
-            name
-            for name, skill in world.skills.items()
-            if name not in related and wanted & {row.variable.relation for row in skill.after}
-        }
-        if not more:
-            return related
-        related |= more
-        wanted |= {row.variable.relation for name in more for row in world.skills[name].before}
-
-
-def _serves(literal: Literal, goal: Condition, world: WorldModel) -> bool:
-    """Whether a literal can be part of what makes the goal hold.
-
-    `at(object) = place` is also reached in the basket of a robot that is there and whose hand holds
-    something else; derived relations are read off several variables.
-    """
-    if goal.relation in DERIVED_FROM:
-        return literal.variable.relation in DERIVED_FROM[goal.relation]
-    subjects = set(goal.subjects)
-    if literal.variable.relation == goal.relation and literal.variable.subject in subjects:
-        return literal.value == goal.value or literal.value in world.robots
-    return (
-        goal.relation == AT
-        and not subjects.isdisjoint(world.objects)
-        and (
-            (
-                literal.variable.relation == AT
-                and literal.variable.subject in world.robots
-                and literal.value == goal.value
-            )
-            or (literal.variable.relation == HOLDING and literal.value not in subjects)
-        )
-    )
-
-
-def _making_room(action: Action, makers: Mapping[Literal, list[int]]) -> list[Literal]:
-    """What takes an object out of a basket that must have room."""
-    if not action.space_in:
-        return []
-    return [
-        literal
-        for literal in makers
-        if literal.variable.relation == AT
-        and literal.value not in action.space_in
-        and literal.variable.subject not in action.args.values()
-    ]
-
-
-def relaxed_reachable(
-    actions: Iterable[Action], start: Facts, goal: Condition, world: WorldModel
-) -> tuple[Action, ...]:
-    """Those actions that can ever be done from `start`; none if the goal is out of reach for them.
-
-    As if nothing that is true ever ceased to be so (the delete relaxation, Bonet and Geffner 2001):
-    what is out of reach then is so indeed, and a search would only find that out by looking at
-    every state there is.
-    """
-    true: dict[FactKey, set[Value]] = {}
-
-    def may_hold(literal: Literal) -> bool:
-        if literal.variable not in true:
-            true[literal.variable] = {known_value(literal.variable, start, world)}
-        return literal.value in true[literal.variable]
-
-    left, possible = list(actions), list[Action]()
-    grown = True
-    while grown:
-        grown, waiting = False, left
-        left = []
-        for action in waiting:
-            if not all(may_hold(literal) for literal in action.before):
-                left.append(action)
+            if least_s >= below_s:
                 continue
-            possible.append(action)
-            grown = True
-            for literal in action.after:
-                may_hold(literal)
-                true[literal.variable].add(literal.value)
-    if goal.relation not in DERIVED_FROM and not any(
-        _may_hold_for(subject, goal, may_hold, world) for subject in goal.subjects
-    ):
-        return ()
-    return tuple(possible)
-
-
-def _may_hold_for(
-    subject: str, goal: Condition, may_hold: Callable[[Literal], bool], world: WorldModel
-) -> bool:
-    if may_hold(Literal(FactKey(goal.relation, subject), goal.value)):
+            if estimate is None:
+                estimate = self._estimate(node.state)
+                if estimate.cost_s == inf:
+                    continue
+                if estimate.cost_s > guess_s:
+                    self._push(node, estimate.cost_s, True, estimate)
+                    continue
+            self._closed.add(node.state)
+            moves = task.moves_to_goal(node.state)
+            if moves is not None:
+                cost_s = node.spent_s + task.moves_s(node.state, moves)
+                if cost_s < below_s:
+                    there = task.moved(node.state, moves)
+                    self._push(_Node(there, cost_s, node, -1, moves), 0.0, True, None)
+            self._expand(node, estimate)
         return True
-    return goal.relation == AT and any(
-        may_hold(Literal(FactKey(AT, subject), robot))
-        and may_hold(Literal(FactKey(AT, robot), goal.value))
-        for robot in world.robots
-    )
 
-
-def uniform_cost_search(
-    actions: Sequence[Action],
-    start: Facts,
-    goal: Condition,
-    world: WorldModel,
-    cost_s: Callable[[int, Mapping[FactKey, Value]], float],
-    budget: TimeBudget,
-) -> Solution | None:
-    """The cheapest sequence of `actions` from `start` to a state in which `goal` holds; `None`
-    where there is none, or none was found before the `budget` was over.
-
-    `cost_s` is of an action, by its number, in a state.
-    """
-    variables = tuple(
-        dict.fromkeys(literal.variable for action in actions for literal in action.after)
-    )
-    index = {variable: number for number, variable in enumerate(variables)}
-    first = tuple(start.get(variable) for variable in variables)
-    # What no action writes is looked up once; the rest is compared as the numbers that it is.
-    moves = [
-        (
-            number,
-            action,
-            [index[row.variable] for row in action.before if row.variable in index],
-            [row.value for row in action.before if row.variable in index],
-            [(index[row.variable], row.value) for row in action.after],
-        )
-        for number, action in enumerate(actions)
-        if all(
-            known_value(row.variable, start, world) == row.value
-            for row in action.before
-            if row.variable not in index
-        )
-    ]
-    ticket = count()
-    queue: list[tuple[float, int, tuple[Value, ...]]] = [(0.0, next(ticket), first)]
-    best: dict[tuple[Value, ...], float] = {first: 0.0}
-    came: dict[tuple[Value, ...], tuple[tuple[Value, ...], Action]] = {}
-    closed: set[tuple[Value, ...]] = set()
-    while queue and len(closed) < MAX_EXPANSIONS and not budget.over:
-        spent, _, state = heappop(queue)
-        if state in closed:
-            continue
-        closed.add(state)
-        facts = {**start, **dict(zip(variables, state, strict=True))}
-        if condition_holds(facts, goal, world):
-            return Solution(_path(state, came), spent, facts)
-        for number, action, reads, needed, writes in moves:
-            if [state[i] for i in reads] != needed:
+    def _expand(self, node: _Node, estimate: Estimate) -> None:
+        task = self._task
+        for number, moves, state in task.successors(node.state):
+            step_s = task.operators[number].cost_s + self._charge_s[number]
+            if moves:
+                step_s += task.moves_s(node.state, moves)
+            spent_s = node.spent_s + step_s
+            if state in self._closed or spent_s >= self._best.get(state, inf):
                 continue
-            if action.space_in and not applicable(action, facts, world):
-                continue
-            values = list(state)
-            for i, value in writes:
-                values[i] = value
-            reached = tuple(values)
-            total = spent + cost_s(number, facts)
-            if total < best.get(reached, float("inf")):
-                best[reached] = total
-                came[reached] = state, action
-                heappush(queue, (total, next(ticket), reached))
-    return None
+            self._best[state] = spent_s
+            guess_s = max(0.0, estimate.cost_s - step_s)
+            self._push(
+                _Node(state, spent_s, node, number, moves), guess_s, number in estimate.first, None
+            )
+
+    def _push(self, node: _Node, guess_s: float, first: bool, estimate: Estimate | None) -> None:
+        self._ticket += 1
+        least_s = round(node.spent_s + self._greed * guess_s, 6)
+        row = (least_s, not first, guess_s, -self._ticket, node.spent_s + guess_s, node, estimate)
+        heappush(self._queue, row)
+
+    def _estimate(self, state: State) -> Estimate:
+        found = self._relaxation.estimate(state, self._charge_s)
+        if found.cost_s < self.nearest[0]:
+            self.nearest = found.cost_s, found
+        return found
+
+    def _solution(self, last: _Node) -> Solution:
+        task = self._task
+        cost_s = 0.0
+        actions: list[Action] = []
+        for node in reversed(list(_way_to(last))):
+            assert node.parent is not None
+            for robot, place in node.moves.items():
+                drive = task.travel.action(robot, place)
+                assert drive is not None
+                actions.append(drive)
+                origin = task.where(node.parent.state, robot)
+                cost_s += task.travel.time_s(robot, origin, place)
+            if node.operator >= 0:
+                actions.append(task.operators[node.operator].action)
+                cost_s += task.operators[node.operator].cost_s
+        return Solution(tuple(actions), round(cost_s, 6), task.facts(last.state))
 
 
-def _path(
-    state: tuple[Value, ...],
-    came: Mapping[tuple[Value, ...], tuple[tuple[Value, ...], Action]],
-) -> tuple[Action, ...]:
-    actions: list[Action] = []
-    while state in came:
-        state, action = came[state]
-        actions.append(action)
-    return tuple(reversed(actions))
+def _way_to(node: _Node) -> Iterator[_Node]:
+    """The nodes on the way to one, the last first, without the beginning."""
+    while node.parent is not None:
+        yield node
+        node = node.parent
+
+
+class Solver:
+    """Solves one task, again and again with other charges on its operators."""
+
+    def __init__(self, task: FiniteDomainTask) -> None:
+        self.task = task
+        self._careful = Relaxation(task, additive=False)
+        self._greedy: Relaxation | None = None
+
+    def least_s(self) -> float:
+        """At least what a sequence costs [s]; infinite where the goal is out of reach."""
+        nothing = [0.0] * len(self.task.operators)
+        return self._careful.estimate(self.task.initial, nothing).cost_s
+
+    def solve(
+        self, charge_s: list[float], budget: TimeBudget, thorough: bool = True
+    ) -> Solution | Unreachable | Unfinished:
+        """The cheapest sequence, or with little time a cheap one; not `thorough`: without a long
+        search for any.
+        """
+        careful = Search(self.task, self._careful, charge_s, 1.0)
+        found = careful.run(budget, FIRST_STATES)
+        if found is True:
+            return Unreachable()
+        if found:
+            return found
+        if not thorough:
+            return _unfinished(careful, self.task)
+        self._greedy = self._greedy or Relaxation(self.task, additive=True)
+        greedy = Search(self.task, self._greedy, charge_s, GREED)
+        any_found = greedy.run(budget, MAX_STATES)
+        if any_found is True:
+            return Unreachable()
+        if any_found is False:
+            return _unfinished(greedy, self.task)
+        spent_s = any_found.cost_s + sum(self._charges(any_found, charge_s))
+        better = careful.run(budget, IMPROVING_STATES, spent_s)
+        return better if isinstance(better, Solution) else any_found
+
+    def _charges(self, found: Solution, charge_s: list[float]) -> Iterator[float]:
+        numbers = {id(operator.action): n for n, operator in enumerate(self.task.operators)}
+        for action in found.actions:
+            if (number := numbers.get(id(action))) is not None:
+                yield charge_s[number]
+            else:
+                key = action.actor, str(action.after[0].value)
+                yield self.task.travel.charge_s.get(key, 0.0)
+
+
+def _unfinished(search: Search, task: FiniteDomainTask) -> Unfinished:
+    steps = search.nearest[1].steps
+    return Unfinished(tuple(task.operators[number].action for number in steps), search.states)

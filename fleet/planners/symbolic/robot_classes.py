@@ -1,0 +1,67 @@
+"""Robots that are interchangeable now: of each class, as many as one skill takes are looked at."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+
+from fleet.core.model.parameter_types import OBJECT
+from fleet.core.model.skills import SkillModel
+from fleet.core.model.world import WorldModel
+from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Value
+from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.robots import RobotSpec
+
+MAX_FULL_HANDS = 2
+"""Robots of a kind looked at that would have to put something down first."""
+
+
+def representatives(
+    condition: Condition, facts: Mapping[FactKey, Value], world: WorldModel
+) -> list[str]:
+    """One robot of each kind that is interchangeable now, as many where a skill takes several of
+    the kind, and those that are spoken of.
+
+    What a hand holds, if not the subject, only has to be put down, and each thing more would
+    multiply the states to be looked at: a few such robots stand for all, unless it may be a tool.
+    """
+    subject = condition.subject
+    tools = _needs_a_tool(condition, world)
+    kinds: dict[object, list[str]] = {}
+    full: Counter[object] = Counter()
+    together: dict[object, int] = {}
+    for robot in world.team:
+        spec = world.robots[robot]
+        holds = facts.get(FactKey(HOLDING, robot))
+        named = robot in (subject, condition.value) or facts.get(FactKey(AT, subject)) == robot
+        able = spec.skills, tuple(sorted(spec.capabilities.items()))
+        if not (named or tools or holds in (None, NOTHING, subject)):
+            full[able] += 1
+            if full[able] > MAX_FULL_HANDS:
+                continue
+        alone = named or robot in world.marked
+        same = kinds.setdefault((able, holds, robot if alone else None), [])
+        if able not in together:
+            together[able] = max(1, *(_places_for(skill, spec) for skill in world.skills.values()))
+        if len(same) < together[able]:
+            same.append(robot)
+    return sorted(robot for same in kinds.values() for robot in same)
+
+
+def _needs_a_tool(condition: Condition, world: WorldModel) -> bool:
+    """Whether a skill for it takes more objects than the one that the condition is about."""
+    own = condition.subject in world.objects
+    return any(
+        sum(kind.bases == (OBJECT,) for kind in skill.types.values()) > own
+        for skill in world.skills.values()
+        if any(row.variable.relation == condition.relation for row in skill.after)
+    )
+
+
+def _places_for(skill: SkillModel, spec: RobotSpec) -> int:
+    """How many of a skill's robots could be like this one."""
+    return sum(
+        all(need.capability in spec.capabilities for need in skill.needs.get(parameter, ()))
+        and (parameter != skill.actor_parameter or skill.name in spec.skills)
+        for parameter in skill.robot_parameters
+    )

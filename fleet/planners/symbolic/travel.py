@@ -1,0 +1,82 @@
+"""Navigation folded into costs: a robot that can drive is wherever an action needs it.
+
+A skill that does nothing but change where its robot is, and asks for nothing, can be put off until
+the robot must be somewhere. So the search has no drives as steps of their own: each step comes with
+those that it needs, and what they cost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from functools import cache
+from math import inf
+
+from fleet.core.model.skills import Action, SkillModel
+from fleet.core.model.world import WorldModel
+from keyexpr_schema.facts import AT, FactKey, Value
+
+Moves = dict[str, str]
+"""Robots, and the places that they have to be in."""
+
+
+def only_drives(skill: SkillModel) -> bool:
+    """Whether a skill only changes where its robot is, and can be done at any time."""
+    if skill.before or skill.space_in or len(skill.after) != 1 or len(skill.parameters) != 2:
+        return False
+    ((relation, subject), value) = skill.after[0]
+    return (
+        relation == AT
+        and subject == skill.actor_parameter
+        and isinstance(value, str)
+        and skill.parameters.get(value) == "place"
+    )
+
+
+class Travel:
+    """What it takes each robot to get from one place to another, by the best skill for it.
+
+    `charge_s` are extra costs of a robot's way to a place.
+    """
+
+    def __init__(self, world: WorldModel, facts: dict[FactKey, Value]) -> None:
+        self._world = world
+        self._facts = facts
+        self._skills = [skill for skill in world.skills.values() if only_drives(skill)]
+        self.charge_s: dict[tuple[str, str], float] = {}
+        self.action = cache(self._action)
+        self.time_s = cache(self._time_s)
+
+    def free(self, robots: Collection[str]) -> frozenset[str]:
+        """Those robots that can drive."""
+        return frozenset(
+            robot
+            for robot in robots
+            if any(self.action(robot, place) is not None for place in self._world.places)
+        )
+
+    def cost_s(self, robot: str, origin: Value, target: str) -> float:
+        """Seconds from `origin` to `target`, charges included; nothing where it is there already.
+
+        With no `origin` it is open where the robot begins: it has to be sent, from where it stands.
+        """
+        if origin == target:
+            return 0.0
+        charge_s = self.charge_s.get((robot, target), 0.0) if self.charge_s else 0.0
+        return self.time_s(robot, origin, target) + charge_s
+
+    def _time_s(self, robot: str, origin: Value, target: str) -> float:
+        action = self.action(robot, target)
+        if action is None:
+            return inf
+        stands = origin or self._facts.get(FactKey(AT, robot))
+        return self._world.duration_s(action, stands, robot)
+
+    def _action(self, robot: str, target: str) -> Action | None:
+        """The quickest skill of a robot that leads to a place; `None` if none does."""
+        found: list[tuple[float, str, Action]] = []
+        for skill in self._skills:
+            to = next(name for name, kind in skill.parameters.items() if kind == "place")
+            action = skill.ground({skill.actor_parameter: robot, to: target})
+            if self._world.lacks(robot, action, skill.actor_parameter) is None:
+                found.append((self._world.work_s(robot, skill), skill.name, action))
+        return min(found, key=lambda row: row[:2])[2] if found else None

@@ -6,6 +6,8 @@ from abc import ABC, abstractmethod
 
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
+from keyexpr_schema.payloads.world import Feature
+from sim.files.world_payloads import all_things
 from sim.files.world_schema import WorldFile
 
 NEEDS: dict[MotionKind, tuple[str, ...]] = {
@@ -16,8 +18,25 @@ NEEDS: dict[MotionKind, tuple[str, ...]] = {
     MotionKind.RELEASE: ("point_m",),
     MotionKind.RELEASE_IN_BASKET: ("robot",),
     MotionKind.STOW: (),
+    MotionKind.PLACE_AT: ("object",),
+    MotionKind.HAND_OVER: ("object",),
+    MotionKind.OPEN: ("object",),
+    MotionKind.CLOSE: ("object",),
+    MotionKind.SWITCH_ON: ("object",),
+    MotionKind.SWITCH_OFF: ("object",),
 }
 """The fields of a motion that its kind cannot do without."""
+
+FEATURES: dict[MotionKind, tuple[Feature, ...]] = {
+    MotionKind.GRASP: (Feature.MOVABLE,),
+    MotionKind.PLACE_AT: (Feature.SUPPORTS, Feature.CONTAINS),
+    MotionKind.HAND_OVER: (Feature.PERSON,),
+    MotionKind.OPEN: (Feature.OPENABLE,),
+    MotionKind.CLOSE: (Feature.OPENABLE,),
+    MotionKind.SWITCH_ON: (Feature.SWITCHABLE,),
+    MotionKind.SWITCH_OFF: (Feature.SWITCHABLE,),
+}
+"""Of which the thing that a motion names must have one."""
 
 
 class Backend(ABC):
@@ -36,6 +55,8 @@ class Backend(ABC):
     def __init__(self, world: WorldFile, robots: tuple[str, ...]) -> None:
         self.world = world
         self.robots = robots
+        self.things = {thing.object: thing for thing in all_things(world)}
+        """Movable ones first, each kind in the order of the world file."""
         self.time_s = 0.0
         self._refused: dict[str, str] = {}
 
@@ -80,7 +101,7 @@ class Backend(ABC):
 
     @abstractmethod
     def truths(self) -> tuple[Truth, ...]:
-        """Where every object really is, in the order of the world file."""
+        """Where every object really is, and how everything is that has states, as in `things`."""
 
     @abstractmethod
     def contacts(self) -> ContactCount:
@@ -121,11 +142,20 @@ class Backend(ABC):
         for field in NEEDS[motion.kind]:
             if getattr(motion, field) is None:
                 return f"{kind} needs `{field}`, which says {_ABOUT[field]}"
-        places, objects = self.world.place_entries, self.world.object_entries
+        places, objects = self.world.place_entries, self.things
         if motion.place is not None and motion.place not in places:
             return f"there is no place {motion.place!r}; there are {', '.join(places)}"
         if motion.object is not None and motion.object not in objects:
             return f"there is no object {motion.object!r}; there are {', '.join(objects)}"
+        wanted = FEATURES.get(motion.kind, ())
+        if motion.object is not None and wanted:
+            thing = objects[motion.object]
+            if not any(thing.is_a(feature) for feature in wanted):
+                able = [n for n, t in objects.items() if any(t.is_a(f) for f in wanted)]
+                return (
+                    f"{motion.object} is not something to {_DOES[motion.kind]}; "
+                    f"there are {', '.join(able) or 'none'}"
+                )
         if motion.robot is not None and motion.robot not in self.robots:
             return f"there is no robot {motion.robot!r}; there are {', '.join(self.robots)}"
         if motion.kind is MotionKind.RELEASE_IN_BASKET and motion.robot == robot:
@@ -136,6 +166,15 @@ class Backend(ABC):
 _ABOUT = {
     "place": "where to drive",
     "point_m": "where, as [x, y, z] in metres",
-    "object": "which object",
+    "object": "which thing",
     "robot": "into whose basket",
+}
+_DOES = {
+    MotionKind.GRASP: "take up",
+    MotionKind.PLACE_AT: "put things on or in",
+    MotionKind.HAND_OVER: "give things to",
+    MotionKind.OPEN: "open",
+    MotionKind.CLOSE: "close",
+    MotionKind.SWITCH_ON: "switch on",
+    MotionKind.SWITCH_OFF: "switch off",
 }

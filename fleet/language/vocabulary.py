@@ -15,13 +15,21 @@ from keyexpr_schema.payloads.world import Object, Place
 class SkillPhrase(msgspec.Struct, frozen=True, kw_only=True):
     """A skill that can be asked for by name: "vacuum the hallway".
 
-    `type`, `object` or `place`, is that of what it is done to; `wants` are the relations and values
-    that hold of it then.
+    `type` is that of what it is done to: `place`, `object`, or kinds, categories and features of
+    things, as skill files write them (`openable`, `cup & clean | glass`); `wants` are the relations
+    and values that hold of it then.
     """
 
     verb: str
     type: str = msgspec.field(name="sort")
     wants: tuple[tuple[str, Value], ...]
+
+    def fits(self, thing: Object) -> bool:
+        """Whether it can be done to a thing."""
+        return any(
+            all(word.strip() == "object" or thing.is_a(word.strip()) for word in words.split("&"))
+            for words in self.type.split("|")
+        )
 
 
 @dataclass(frozen=True)

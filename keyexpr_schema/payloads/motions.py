@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from enum import Enum
 
+from keyexpr_schema.facts import Value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Payload
 from keyexpr_schema.payloads.robots import PoseMRad
@@ -26,6 +27,11 @@ class MotionKind(str, Enum):
     release           set the held object down at `point_m` (the point its base shall touch)
     release_in_basket let the held object down into the basket of `robot`
     stow              fold the arm into its carrying pose
+    place_at          drive up to the thing `object` and set what is held down on it or in it
+    hand_over         drive up to the person `object` and give what is held into that one's hand
+    open, close       drive up to the thing `object` and open or close it by its handle
+    switch_on, switch_off
+                      drive up to the thing `object` and touch its switch, unless it is so already
     """
 
     GO_TO = "go_to"
@@ -35,6 +41,12 @@ class MotionKind(str, Enum):
     RELEASE = "release"
     RELEASE_IN_BASKET = "release_in_basket"
     STOW = "stow"
+    PLACE_AT = "place_at"
+    HAND_OVER = "hand_over"
+    OPEN = "open"
+    CLOSE = "close"
+    SWITCH_ON = "switch_on"
+    SWITCH_OFF = "switch_off"
 
 
 class Motion(Payload, frozen=True, kw_only=True):
@@ -54,10 +66,12 @@ class Detection(Payload, frozen=True, kw_only=True):
     object: Id
     kind: Id
     point_m: PointM
-    """Centre of the object's base."""
+    """Centre of the object's base; of furniture, of its footprint."""
     place: Id | None = None
     support: str = "floor"
-    """What it lies on: `floor`, a surface, or a robot (in its basket)."""
+    """What it lies on or in directly: `floor`, a surface, a thing, or a robot (in its basket)."""
+    states: dict[Id, Value] = {}
+    """What can be seen of its states: `is_open`, `is_on`, and those that processes change."""
 
 
 class Senses(Payload, frozen=True, kw_only=True):

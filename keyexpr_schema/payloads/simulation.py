@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from enum import Enum
 
+from keyexpr_schema.facts import Value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
 from keyexpr_schema.payloads.motions import Motion, PointM
@@ -60,7 +61,9 @@ class SimClock(Payload, frozen=True, kw_only=True):
 class Truth(Payload, frozen=True, kw_only=True):
     """Where an object really is: for judging and recording, never for planning.
 
-    `support` is `floor`, a surface, a robot (in its basket), or `None` in mid-air.
+    `support` is what carries it directly: `floor`, a surface, a thing that it is on or in, a person
+    who has it, a robot (in its basket), or `None` in mid-air. `states` are how it is: `is_open` and
+    `is_on` of what opens and what is switched, and what processes have made of it.
     """
 
     object: Id
@@ -71,6 +74,7 @@ class Truth(Payload, frozen=True, kw_only=True):
     support: str | None
     held_by: Id | None
     settled: bool
+    states: dict[Id, Value] = {}
 
 
 class ShapeKind(str, Enum):

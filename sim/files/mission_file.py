@@ -8,12 +8,14 @@ from typing import Annotated
 
 import msgspec
 
+from keyexpr_schema.facts import Value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from sim.errors import BadFile
+from sim.files.furniture_schema import PointXY
 from sim.files.solids import solids
 from sim.files.world_file import check_objects, load_world
-from sim.files.world_schema import LARGEST_RADIUS_M, PointXY, WorldFile
+from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.files.yaml_file import FileEntry, find_file, read_yaml
 
 
@@ -57,8 +59,9 @@ class _RobotEntry(FileEntry, frozen=True):
 
 
 class _Placement(FileEntry, frozen=True):
-    on: str
-    at_m: tuple[float, float]
+    on: str = ""
+    inside: str = msgspec.field(name="in", default="")
+    at_m: tuple[float, float] = (0.0, 0.0)
     yaw_deg: float = 0.0
 
 
@@ -68,6 +71,8 @@ class _MissionEntry(FileEntry, frozen=True):
     robots: Annotated[tuple[_RobotEntry, ...], msgspec.Meta(min_length=1)]
     objects: dict[Id, _Placement | None] = {}
     """Where things lie in this mission and not where the world file says; `null`: not there."""
+    states: dict[Id, dict[Id, Value]] = {}
+    """How things are at the start in this mission, besides what the world file says."""
     statements: tuple[str, ...] = ()
     goals: tuple[str, ...] = ()
     plan: PlanOptions = PlanOptions()
@@ -91,7 +96,7 @@ def load_mission(name: str | Path) -> Mission:
     """The mission given by path or name (see `config_file`), with its world and robots."""
     path = find_file("missions", name)
     entry = read_yaml(path, _MissionEntry, "mission file")
-    world = _rearranged(path, load_world(find_file("worlds", entry.world, path)), entry.objects)
+    world = _rearranged(path, load_world(find_file("worlds", entry.world, path)), entry)
     robots: list[MissionRobot] = []
     for number, item in enumerate(entry.robots):
         file = find_file("robots", item.spec, path)
@@ -112,12 +117,10 @@ def load_mission(name: str | Path) -> Mission:
     )
 
 
-def _rearranged(
-    path: Path, world: WorldFile, placements: dict[str, _Placement | None]
-) -> WorldFile:
-    """The world with a mission's objects put elsewhere or taken away."""
+def _rearranged(path: Path, world: WorldFile, mission: _MissionEntry) -> WorldFile:
+    """The world with a mission's objects put elsewhere or taken away, and in its states."""
     entries = dict(world.object_entries)
-    for name, placement in placements.items():
+    for name, placement in mission.objects.items():
         if name not in entries:
             raise BadFile(
                 f"{path}: objects.{name}: the world has no such object; "
@@ -127,9 +130,18 @@ def _rearranged(
             del entries[name]
         else:
             entries[name] = msgspec.structs.replace(
-                entries[name], on=placement.on, at_m=placement.at_m, yaw_deg=placement.yaw_deg
+                entries[name],
+                on=placement.on,
+                inside=placement.inside,
+                at_m=placement.at_m,
+                yaw_deg=placement.yaw_deg,
             )
-    rearranged = msgspec.structs.replace(world, object_entries=entries)
+    states = {
+        name: {**world.states.get(name, {}), **mission.states.get(name, {})}
+        for name in dict.fromkeys([*world.states, *mission.states])
+        if name in entries or name not in world.object_entries
+    }
+    rearranged = msgspec.structs.replace(world, object_entries=entries, states=states)
     check_objects(path, rearranged)
     return rearranged
 
@@ -138,8 +150,8 @@ def _check_start(
     where: str, world: WorldFile, robot: str, start: PoseMRad, others: list[MissionRobot]
 ) -> None:
     x, y, _ = start
-    if robot in world.place_entries or robot in world.object_entries:
-        raise BadFile(f"{where}: a place or an object has the name {robot!r}; use another")
+    if robot in {*world.place_entries, *world.object_entries, *world.fixture_of}:
+        raise BadFile(f"{where}: a place or a thing has the name {robot!r}; use another")
     if not (0 <= x <= world.size_m[0] and 0 <= y <= world.size_m[1]):
         raise BadFile(
             f"{where}: start.at_m: [{x}, {y}] is outside the building "

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
-from sim.files.world_schema import PointXY, WorldFile
+from sim.files.fixtures import PANEL_M
+from sim.files.furniture_schema import PointXY
+from sim.files.world_schema import WorldFile
 
 
 @dataclass(frozen=True)
@@ -16,7 +17,7 @@ class Solid:
     `center_m` and `half_m` (half-extents along its own axes) are (x, y); `yaw_rad` turns it.
     """
 
-    kind: Literal["wall", "table", "block"]
+    kind: str
     name: str
     center_m: PointXY
     half_m: PointXY
@@ -82,12 +83,46 @@ def _inner_walls(world: WorldFile) -> list[Solid]:
 def _furniture(world: WorldFile) -> list[Solid]:
     return [
         Solid(
-            entry.kind,
+            fixture.kind,
             name,
-            entry.center_m,
-            (entry.size_m[0] / 2, entry.size_m[1] / 2),
-            math.radians(entry.yaw_deg),
-            entry.size_m[2],
+            fixture.center_m,
+            fixture.half_m,
+            fixture.yaw_rad,
+            fixture.height_m,
         )
-        for name, entry in world.furniture.items()
+        for name, fixture in world.fixtures.by_name.items()
     ]
+
+
+def barriers(world: WorldFile) -> tuple[Solid, ...]:
+    """What a hand does not reach through on the level: of furniture that is open at its front,
+    its back and its sides, and all else as in `solids`.
+
+    The doors of cupboards are not counted.
+    """
+    found = [*_outer_walls(world), *_inner_walls(world)]
+    for solid in _furniture(world):
+        fixture = world.fixtures.by_name[solid.name]
+        if not any(carrier.roofed for carrier in fixture.all_carriers):
+            found.append(solid)
+            continue
+        for number, panel in enumerate(fixture.panels):
+            if min(panel.half_m[:2]) < PANEL_M and panel.half_m[2] > PANEL_M:
+                x, y, _ = fixture.point_m(panel.center_m)
+                half = (panel.half_m[0], panel.half_m[1])
+                name = f"{solid.name}_{number}"
+                found.append(Solid(solid.kind, name, (x, y), half, solid.yaw_rad, solid.height_m))
+    return tuple(found)
+
+
+def reserves(world: WorldFile) -> tuple[Solid, ...]:
+    """The floor that open doors and drawers take up: nobody waits or passes there."""
+    found = []
+    for name, fixture in world.fixtures.by_name.items():
+        if fixture.front_m <= 0.0:
+            continue
+        half_y = (fixture.half_m[1] * 2 + fixture.front_m) / 2
+        x, y, _ = fixture.point_m((0.0, fixture.half_m[1] - half_y, 0.0))
+        half = (fixture.half_m[0], half_y)
+        found.append(Solid("reserve", name, (x, y), half, fixture.yaw_rad, 0.0))
+    return tuple(found)

@@ -10,6 +10,7 @@ import math
 from pathlib import Path
 
 from keyexpr_schema.errors import InvalidId
+from keyexpr_schema.facts import IS_ON, IS_OPEN
 from keyexpr_schema.ids import check_id
 from sim.errors import BadFile
 from sim.files.world_schema import FLOOR, WorldFile
@@ -20,6 +21,9 @@ def load_world(file: str | Path) -> WorldFile:
     """The world file given by path or name (see `config_file`), checked."""
     path = find_file("worlds", file)
     world = read_yaml(path, WorldFile, "world file")
+    for field, entries in (("furniture", world.furniture), ("people", world.people)):
+        for name in entries:
+            _check_name(path, f"{field}.{name}", name)
     _check_world(path, world)
     return world
 
@@ -60,11 +64,61 @@ def _check_world(path: Path, world: WorldFile) -> None:
                 f"furniture.{name}.center_m", f"{list(item.center_m)} is not in {item.place!r}"
             )
     for name, kind in world.object_kinds.items():
-        needed = {"cylinder": ("radius_m", "height_m"), "sphere": ("radius_m",), "box": ("size_m",)}
+        needed = {
+            "cylinder": ("radius_m", "height_m"),
+            "bowl": ("radius_m", "height_m"),
+            "sphere": ("radius_m",),
+            "box": ("size_m",),
+            "open_box": ("size_m",),
+        }
         for field in needed[kind.shape]:
             if getattr(kind, field) is None:
                 raise wrong(f"object_kinds.{name}", f"a {kind.shape} needs `{field}`")
+    _check_fixtures(path, world)
     check_objects(path, world)
+
+
+def _check_fixtures(path: Path, world: WorldFile) -> None:
+    """Furniture that has room for what its kind is made of, and people who stand somewhere."""
+    for name, item in world.furniture.items():
+        where = f"{path}: furniture.{name}"
+        least = LEAST_M.get(item.kind, (0.0, 0.0, 0.0))
+        if any(size < small for size, small in zip(item.size_m, least, strict=True)):
+            raise BadFile(
+                f"{where}.size_m: {list(item.size_m)} is too small for a {item.kind}; "
+                f"it needs {list(least)} at least"
+            )
+        if item.kind in ("cupboard", "fridge") and item.size_m[2] - item.plinth_m < 0.35:
+            raise BadFile(
+                f"{where}.plinth_m: {item.plinth_m} leaves {item.size_m[2] - item.plinth_m:.2f} m "
+                "inside; a hand needs 0.35 m"
+            )
+        if item.process is not None and not (item.switch or item.kind in ("lamp", "switch")):
+            raise BadFile(f"{where}.process: nothing starts it; add `switch: true`")
+    for name, person in world.people.items():
+        where = f"{path}: people.{name}"
+        if world.place_at(*person.at_m) is None:
+            raise BadFile(f"{where}.at_m: {list(person.at_m)} is in none of the places")
+    taken = [*world.place_entries]
+    for name in dict.fromkeys([*world.furniture, *world.people, *world.fixture_of]):
+        if name in taken or (name in world.people and name in world.furniture):
+            raise BadFile(
+                f"{path}: furniture.{name}: a place or a person has this name already; "
+                "give it another"
+            )
+
+
+LEAST_M: dict[str, tuple[float, float, float]] = {
+    "cupboard": (0.4, 0.3, 0.4),
+    "fridge": (0.4, 0.3, 0.4),
+    "drawers": (0.3, 0.3, 0.3),
+    "shelf": (0.3, 0.2, 0.2),
+    "sink": (0.5, 0.4, 0.5),
+    "sofa": (0.6, 0.5, 0.3),
+    "bed": (0.6, 1.0, 0.2),
+    "lamp": (0.1, 0.2, 0.9),
+}
+"""Length, width and height that a kind of furniture needs at least."""
 
 
 def check_objects(path: Path, world: WorldFile) -> None:
@@ -73,7 +127,6 @@ def check_objects(path: Path, world: WorldFile) -> None:
     Raises:
         BadFile: one lies where it cannot.
     """
-    tables = [name for name, item in world.furniture.items() if item.kind == "table"]
     for name, entry in world.object_entries.items():
         _check_name(path, f"objects.{name}", name)
         where = f"{path}: objects.{name}"
@@ -89,30 +142,77 @@ def check_objects(path: Path, world: WorldFile) -> None:
                 f"{where}.home: there is no place {entry.home!r}; "
                 f"there are {', '.join(world.place_entries)}"
             )
-        if entry.on == FLOOR:
+        if bool(entry.on) == bool(entry.inside):
+            raise BadFile(f"{where}: say either `on` or `in`: what it is on, or in")
+        carrier = entry.carrier
+        if carrier == FLOOR:
             if world.place_at(*entry.at_m) is None:
                 raise BadFile(f"{where}.at_m: {list(entry.at_m)} is in none of the places")
             continue
-        if entry.on not in tables:
+        field = "on" if entry.on else "in"
+        half = _half_m(world, name, carrier)
+        if half is None:
             raise BadFile(
-                f"{where}.on: there is no table {entry.on!r}; "
-                f"there are {', '.join([*tables, FLOOR])}"
+                f"{where}.{field}: there is no table {carrier!r}; "
+                f"there are {', '.join(_carriers(world, name))}"
             )
-        top = world.surface(entry.on)
-        if abs(entry.at_m[0]) > top.length_m / 2 or abs(entry.at_m[1]) > top.width_m / 2:
+        if any(abs(at) > most for at, most in zip(entry.at_m, half, strict=True)):
             raise BadFile(
-                f"{where}.at_m: {list(entry.at_m)} is not on {entry.on}, which reaches "
-                f"{top.length_m / 2} m in x and {top.width_m / 2} m in y from its centre"
+                f"{where}.at_m: {list(entry.at_m)} is not {field} {carrier}, which reaches "
+                f"{round(half[0], 3)} m in x and {round(half[1], 3)} m in y from its centre"
             )
         for other, placed in world.object_entries.items():
             if other == name:
                 break
             sizes = (world.object_kinds[kind].extent_m for kind in (entry.kind, placed.kind))
             needed = sum(max(size[:2]) for size in sizes) / 2
-            if placed.on == entry.on and math.dist(placed.at_m, entry.at_m) < needed:
+            if placed.carrier == carrier and math.dist(placed.at_m, entry.at_m) < needed:
                 raise BadFile(
                     f"{where}.at_m: it overlaps {other}; keep {needed:.2f} m between their centres"
                 )
+
+    _check_states(path, world)
+
+
+def _check_states(path: Path, world: WorldFile) -> None:
+    known = {*world.object_entries, *world.fixture_of}
+    for name, states in world.states.items():
+        if name not in known:
+            raise BadFile(f"{path}: states.{name}: there is no such thing in this world")
+        for state, thing in ((IS_OPEN, world.fixtures.movers), (IS_ON, world.fixtures.buttons)):
+            if state in states and name not in thing:
+                raise BadFile(
+                    f"{path}: states.{name}.{state}: it does not {_DOES[state]}; "
+                    f"there are {', '.join(thing) or 'none'}"
+                )
+            if not isinstance(states.get(state, True), bool):
+                raise BadFile(f"{path}: states.{name}.{state}: say true or false")
+
+
+_DOES = {IS_OPEN: "open", IS_ON: "have a switch"}
+
+
+def _half_m(world: WorldFile, name: str, carrier: str) -> tuple[float, float] | None:
+    """Half of the room that there is on or in a carrier, (x, y); `None` if it carries nothing."""
+    if carrier in world.fixtures.carriers:
+        x, y, _ = world.fixtures.carriers[carrier][1].size_m
+        return (x / 2, y / 2)
+    if carrier in _carriers(world, name):
+        x, y, _ = world.kind_of(carrier).extent_m
+        return (x / 2, y / 2)
+    return None
+
+
+def _carriers(world: WorldFile, name: str) -> list[str]:
+    """Everything that an object could be on or in: furniture, and the objects before it."""
+    found = list(world.fixtures.carriers)
+    for other, entry in world.object_entries.items():
+        if other == name:
+            break
+        kind = world.object_kinds.get(entry.kind)
+        if kind is not None and kind.carries:
+            found.append(other)
+    return [*found, FLOOR]
 
 
 def _check_name(path: Path, where: str, name: str) -> None:

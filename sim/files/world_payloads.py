@@ -1,10 +1,17 @@
-"""A world as it is registered on keys. Where objects are is not registered."""
+"""A world as it is registered on keys. Where movable things are is not registered."""
 
 from __future__ import annotations
 
-from keyexpr_schema.payloads.world import Object, Place
+import msgspec
+
+from keyexpr_schema.payloads.world import Feature, Object, Place
+from sim.files.fixtures import Fixture
 from sim.files.world_schema import WorldFile
 from sim.navigation.travel import travel_m
+
+_KINDS = {"drawers": "dresser"}
+"""What a piece of furniture is called that has another name in files."""
+_NUMERALS = ("first", "second", "third", "fourth", "fifth", "sixth")
 
 
 def place_payloads(world: WorldFile) -> tuple[Place, ...]:
@@ -24,23 +31,125 @@ def place_payloads(world: WorldFile) -> tuple[Place, ...]:
 
 
 def object_payloads(world: WorldFile) -> tuple[Object, ...]:
-    """The objects: what they are, and not where."""
+    """The things as they are registered: all but plain furniture (`PLAIN`)."""
+    plain = {name for name, item in world.furniture.items() if item.kind in PLAIN}
+    return tuple(thing for thing in all_things(world) if thing.object not in plain)
+
+
+def all_things(world: WorldFile) -> tuple[Object, ...]:
+    """The things: what they are, and not where. Movable ones first, then furniture and people."""
     counts: dict[str, int] = {}
+
+    def ordinal(kind: str) -> int:
+        counts[kind] = counts.get(kind, 0) + 1
+        return counts[kind]
+
     found = []
     for name, entry in world.object_entries.items():
         kind = world.kind_of(name)
-        counts[entry.kind] = counts.get(entry.kind, 0) + 1
+        features = (Feature.CONTAINS.value,) if kind.hollow else ()
         found.append(
             Object(
                 object=name,
                 kind=entry.kind,
                 label=entry.label or name.replace("_", " "),
-                ordinal=counts[entry.kind],
+                ordinal=ordinal(entry.kind),
                 aliases=entry.aliases,
                 mass_kg=kind.mass_kg,
                 home=entry.home,
-                categories=kind.categories,
+                categories=_categories(world, entry.kind),
                 uses=kind.uses,
+                features=tuple(dict.fromkeys((*features, *kind.features))),
+                room=kind.room,
+                properties={**kind.properties, **entry.properties},
             )
         )
+    for fixture in world.fixtures.by_name.values():
+        for thing in (_fixture(world, fixture), *_parts(world, fixture)):
+            found.append(msgspec.structs.replace(thing, ordinal=ordinal(thing.kind)))
+    return tuple(found)
+
+
+PLAIN = ("table", "block")
+"""Furniture that is only a surface of its place, or in the way: no thing of its own."""
+
+
+def _fixture(world: WorldFile, fixture: Fixture) -> Object:
+    name = fixture.name
+    if name in world.people:
+        person = world.people[name]
+        return Object(
+            object=name,
+            kind="person",
+            label=person.label or name.replace("_", " "),
+            aliases=person.aliases,
+            movable=False,
+            home=world.place_at(*person.at_m),
+            features=(Feature.PERSON.value,),
+            room=1,
+        )
+    entry = world.furniture[name]
+    kind = entry.called or _KINDS.get(entry.kind, entry.kind)
+    return Object(
+        object=name,
+        kind=kind,
+        label=entry.label or name.replace("_", " "),
+        aliases=entry.aliases,
+        movable=False,
+        home=entry.place,
+        categories=tuple(dict.fromkeys((*entry.categories, "furniture"))),
+        features=(*features_of(fixture, name), *entry.features),
+        room=entry.room,
+        properties=entry.properties,
+    )
+
+
+def _parts(world: WorldFile, fixture: Fixture) -> list[Object]:
+    names = dict.fromkeys(carrier.thing for carrier in fixture.all_carriers)
+    names.pop(fixture.name, None)
+    entry = world.furniture.get(fixture.name)
+    found = []
+    for number, name in enumerate(names):
+        assert entry is not None  # people have no parts
+        whole = entry.label or fixture.name.replace("_", " ")
+        kind = "drawer" if fixture.mover(name) is not None else "board"
+        found.append(
+            Object(
+                object=name,
+                kind=kind,
+                label=f"{_NUMERALS[number]} {kind} of the {whole}",
+                movable=False,
+                home=entry.place,
+                features=features_of(fixture, name),
+                part_of=fixture.name,
+            )
+        )
+    return found
+
+
+def features_of(fixture: Fixture, thing: str) -> tuple[str, ...]:
+    """What a fixture, or a part of it, is good for."""
+    features = [
+        Feature.CONTAINS if carrier.inside else Feature.SUPPORTS
+        for carrier in fixture.all_carriers
+        if carrier.thing == thing
+    ]
+    if fixture.mover(thing) is not None:
+        features.append(Feature.OPENABLE)
+    if fixture.button is not None and fixture.button.thing == thing:
+        features.append(Feature.SWITCHABLE)
+    return tuple(feature.value for feature in features)
+
+
+def _categories(world: WorldFile, kind: str) -> tuple[str, ...]:
+    """Its own, and the kinds that it is a case of, with theirs."""
+    found: dict[str, None] = {}
+    ahead = [kind]
+    while ahead:
+        entry = world.object_kinds.get(ahead.pop(0))
+        if entry is None:
+            continue
+        found.update(dict.fromkeys(entry.categories))
+        ahead += [parent for parent in entry.parents if parent not in found]
+        found.update(dict.fromkeys(entry.parents))
     return tuple(found)

@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Annotated, Literal
 
 import msgspec
 
+from keyexpr_schema.facts import IS_OPEN, Value
 from keyexpr_schema.ids import Id
-from keyexpr_schema.payloads.world import Surface
+from keyexpr_schema.payloads.world import Feature, Surface
+from sim.files.catalogue import build
+from sim.files.fixtures import Fixture, Fixtures
+from sim.files.furniture_schema import FurnitureEntry, PersonEntry, PointXY, Positive, Rgba
 from sim.files.yaml_file import FileEntry
 
 FLOOR = "floor"
 """Where an object lies that lies on no surface."""
 
+FLOOR_M = 0.006
+"""How thick the floor of a box or bowl is."""
+
 LARGEST_RADIUS_M = 0.25
 """No robot model may be larger on the floor: corridors and parking spots are laid out for it."""
 
-Positive = Annotated[float, msgspec.Meta(gt=0.0)]
-PointXY = tuple[float, float]
 Rectangle = tuple[float, float, float, float]
-Rgba = tuple[float, float, float, float]
 
 
 class PlaceEntry(FileEntry, frozen=True):
@@ -46,26 +51,16 @@ class DoorEntry(FileEntry, frozen=True):
     width_m: Positive
 
 
-class FurnitureEntry(FileEntry, frozen=True):
-    """A `table` (its top is a surface with the name of the table) or a `block` (in the way only).
-
-    `size_m` is (length along its own x, width along its own y, height).
-    """
-
-    kind: Literal["table", "block"]
-    place: Id
-    center_m: PointXY
-    size_m: tuple[Positive, Positive, Positive]
-    yaw_deg: float = 0.0
-
-
 class ObjectKind(FileEntry, frozen=True):
     """What objects of one kind look like; a box has `size_m`, the others a radius.
 
-    `categories` and `uses` are words for them: a bottle is a `drink`, and something to `drink`.
+    An `open_box` and a `bowl` are open at the top: others can be in them. `is` names the kinds that
+    it is a case of. `categories` and `uses` are words for them: a bottle is a `drink`, and
+    something to `drink`. `features` are what else it is good for (a plate `supports`), `room` is
+    how many things there can be on or in it.
     """
 
-    shape: Literal["cylinder", "box", "sphere"]
+    shape: Literal["cylinder", "box", "sphere", "open_box", "bowl"]
     mass_kg: Positive
     radius_m: Positive | None = None
     height_m: Positive | None = None
@@ -73,6 +68,20 @@ class ObjectKind(FileEntry, frozen=True):
     rgba: Rgba = (0.6, 0.6, 0.6, 1.0)
     categories: tuple[str, ...] = ()
     uses: tuple[str, ...] = ()
+    parents: tuple[Id, ...] = msgspec.field(name="is", default=())
+    features: tuple[str, ...] = ()
+    properties: dict[str, Value] = {}
+    room: Positive | None = None
+
+    @property
+    def hollow(self) -> bool:
+        """Whether it is open at the top, and things can be in it."""
+        return self.shape in ("open_box", "bowl")
+
+    @property
+    def carries(self) -> bool:
+        """Whether things can be on it or in it."""
+        return self.hollow or Feature.SUPPORTS in self.features
 
     @property
     def extent_m(self) -> tuple[float, float, float]:
@@ -86,22 +95,29 @@ class ObjectKind(FileEntry, frozen=True):
 class ObjectEntry(FileEntry, frozen=True):
     """A thing, and where it lies at the start.
 
-    `on` is a table or `floor`; `at_m` counts from the table's centre, in the table's own axes
-    (from the world's origin for the floor).
+    `on` (or `in`, which means the same) is anything that things can be on or in, or `floor`; `at_m`
+    counts from its middle, in its own axes (from the world's origin for the floor).
     """
 
     kind: Id
-    on: str
-    at_m: PointXY
+    on: str = ""
+    inside: str = msgspec.field(name="in", default="")
+    at_m: PointXY = (0.0, 0.0)
     label: str = ""
     aliases: tuple[str, ...] = ()
     rgba: Rgba | None = None
     yaw_deg: float = 0.0
     home: Id | None = None
     """The place where it belongs, for those who tidy up."""
+    properties: dict[str, Value] = {}
+
+    @property
+    def carrier(self) -> str:
+        """What it is on or in."""
+        return self.on or self.inside
 
 
-class WorldFile(FileEntry, frozen=True):
+class WorldFile(FileEntry, frozen=True, dict=True):
     """A building, its furniture and the things in it. The outer walls run along its border."""
 
     world: Id
@@ -112,8 +128,11 @@ class WorldFile(FileEntry, frozen=True):
     walls: tuple[WallEntry, ...] = ()
     doors: dict[Id, DoorEntry] = {}
     furniture: dict[Id, FurnitureEntry] = {}
+    people: dict[Id, PersonEntry] = {}
     object_kinds: dict[Id, ObjectKind] = {}
     object_entries: dict[Id, ObjectEntry] = msgspec.field(name="objects", default_factory=dict)
+    states: dict[Id, dict[Id, Value]] = {}
+    """How things are at the start: `fridge: {is_open: true}`, `plate_1: {clean: false}`."""
 
     def place_at(self, x_m: float, y_m: float) -> str | None:
         """The place that contains the point; the first in the file where several do."""
@@ -127,30 +146,67 @@ class WorldFile(FileEntry, frozen=True):
         """What an object looks like."""
         return self.object_kinds[self.object_entries[object].kind]
 
+    @cached_property
+    def fixtures(self) -> Fixtures:
+        """What furniture and people are made of, and where they stand."""
+        return build(self.furniture, self.people)
+
+    @cached_property
+    def fixture_of(self) -> dict[str, Fixture]:
+        """The fixture by its name, and by the names of its parts."""
+        found = dict(self.fixtures.by_name)
+        found |= {thing: fixture for thing, (fixture, _) in self.fixtures.carriers.items()}
+        return found | {thing: fixture for thing, (fixture, _) in self.fixtures.movers.items()}
+
     def surface(self, name: str) -> Surface:
-        """The top of a table."""
-        table = self.furniture[name]
+        """What things stand on, on a piece of furniture that is no container."""
+        fixture, carrier = self.fixtures.carriers[name]
+        x, y, z = fixture.point_m(carrier.center_m)
         return Surface(
             surface=name,
-            x_m=table.center_m[0],
-            y_m=table.center_m[1],
-            z_m=table.size_m[2],
-            yaw_rad=math.radians(table.yaw_deg),
-            length_m=table.size_m[0],
-            width_m=table.size_m[1],
+            x_m=x,
+            y_m=y,
+            z_m=z,
+            yaw_rad=fixture.yaw_rad,
+            length_m=carrier.size_m[0],
+            width_m=carrier.size_m[1],
         )
+
+    def surfaces(self, place: str | None = None) -> tuple[Surface, ...]:
+        """The open tops of furniture (in one place), in the order of the file."""
+        return tuple(
+            self.surface(name)
+            for name, (fixture, carrier) in self.fixtures.carriers.items()
+            if not (carrier.inside or carrier.roofed)
+            and fixture.name in self.furniture
+            and place in (None, self.furniture[fixture.name].place)
+        )
+
+    def starts_open(self, thing: str) -> bool:
+        """Whether what opens is open at the start."""
+        return self.states.get(thing, {}).get(IS_OPEN) is True
 
     def start_point_m(self, object: str) -> tuple[float, float, float]:
         """Where the centre of an object's base is at the start."""
         entry = self.object_entries[object]
-        if entry.on == FLOOR:
-            return (entry.at_m[0], entry.at_m[1], 0.0)
-        return self.surface(entry.on).point_m(*entry.at_m)
+        x, y = entry.at_m
+        if entry.carrier == FLOOR:
+            return (x, y, 0.0)
+        if entry.carrier in self.object_entries:
+            below = self.kind_of(entry.carrier)
+            level = FLOOR_M if below.hollow else below.extent_m[2]
+            a, b, c = self.start_point_m(entry.carrier)
+            yaw = self.start_yaw_rad(entry.carrier)
+            turned = (math.cos(yaw) * x - math.sin(yaw) * y, math.sin(yaw) * x + math.cos(yaw) * y)
+            return (a + turned[0], b + turned[1], c + level)
+        opening = 1.0 if self.starts_open(entry.carrier) else 0.0
+        return self.fixtures.carrier_point_m(entry.carrier, x, y, opening)
 
-    def surfaces(self, place: str | None = None) -> tuple[Surface, ...]:
-        """The table tops (of one place), in the order of the file."""
-        return tuple(
-            self.surface(name)
-            for name, entry in self.furniture.items()
-            if entry.kind == "table" and place in (None, entry.place)
-        )
+    def start_yaw_rad(self, object: str) -> float:
+        """How an object is turned at the start."""
+        entry = self.object_entries[object]
+        yaw = math.radians(entry.yaw_deg)
+        if entry.carrier in self.object_entries:
+            return yaw + self.start_yaw_rad(entry.carrier)
+        fixture = self.fixture_of.get(entry.carrier)
+        return yaw if fixture is None else yaw + fixture.yaw_rad

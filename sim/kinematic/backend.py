@@ -24,8 +24,21 @@ from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from sim.backend import Backend
 from sim.files.world_schema import WorldFile
 from sim.kinematic.scene import draw_frame, draw_scene
-from sim.kinematic.state import REACH_M, KinematicObject, KinematicRobot, KinematicState
+from sim.kinematic.state import STATE_OF, KinematicState
+from sim.kinematic.whereabouts import KinematicObject, KinematicRobot
 from sim.navigation.routes import Route, Routes
+from sim.states import ThingStates
+
+DRIVES = frozenset(
+    {
+        MotionKind.GO_TO,
+        MotionKind.APPROACH,
+        MotionKind.PLACE_AT,
+        MotionKind.HAND_OVER,
+        *STATE_OF,
+    }
+)
+"""Motions that drive up to where they are done."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +56,8 @@ class MotionModel:
     grasp_s: float = 6.0
     release_s: float = 5.0
     stow_s: float = 2.0
+    open_s: float = 12.0
+    switch_s: float = 4.0
     settle_s: float = 0.5
     """Added to every drive, for turning and braking."""
     spread: float = 0.0
@@ -55,6 +70,10 @@ class MotionModel:
             MotionKind.LOOK: self.look_s,
             MotionKind.GRASP: self.grasp_s,
             MotionKind.STOW: self.stow_s,
+            MotionKind.OPEN: self.open_s,
+            MotionKind.CLOSE: self.open_s,
+            MotionKind.SWITCH_ON: self.switch_s,
+            MotionKind.SWITCH_OFF: self.switch_s,
         }.get(kind, self.release_s)
 
 
@@ -88,11 +107,15 @@ class KinematicBackend(Backend):
         }
         objects = {}
         for name, entry in world.object_entries.items():
-            mass_kg, point = world.kind_of(name).mass_kg, world.start_point_m(name)
-            objects[name] = KinematicObject(name, entry.kind, mass_kg, point, entry.on)
-        self._state = KinematicState(world, states, objects)
+            mass_kg = world.kind_of(name).mass_kg
+            objects[name] = KinematicObject(name, entry.kind, mass_kg, entry.at_m, entry.carrier)
+        self._state = KinematicState(world, self.things, states, objects, ThingStates(world))
 
     def advance(self) -> None:
+        self._advance()
+        self._state.states.advance(self.time_s, self._state.contents)
+
+    def _advance(self) -> None:
         while self._events and self._stale(self._events[0]):
             heapq.heappop(self._events)
         horizon = self.time_s + (self._step_s or 0.05)
@@ -107,6 +130,7 @@ class KinematicBackend(Backend):
         while self._events and self._events[0][0] <= self.time_s:
             event = heapq.heappop(self._events)
             if not self._stale(event):
+                self._state.states.advance(self.time_s, self._state.contents)
                 self._finish(self._state.robots[event[2]])
 
     def _stale(self, event: tuple[float, int, str]) -> bool:
@@ -125,13 +149,16 @@ class KinematicBackend(Backend):
         unlucky = me.chance.random() < self._motion_model.failure_chance.get(kind, 0.0)
         factor = math.exp(me.chance.gauss(0.0, self._motion_model.spread))
         takes_s = self._motion_model.handling_s(motion.kind)
-        if motion.kind in (MotionKind.GO_TO, MotionKind.APPROACH):
+        if motion.kind in DRIVES:
             me.route = self._route(me, motion)
             if me.route is None:
-                self._end(me, f"there is no way to {motion.place or motion.point_m} from here")
+                to = motion.place or motion.point_m or motion.object
+                self._end(me, f"there is no way to {to} from here")
                 return
             me.node = me.route.node
             takes_s = me.route.length_m / me.capabilities["drive"] + self._motion_model.settle_s
+            if motion.kind not in (MotionKind.GO_TO, MotionKind.APPROACH):
+                takes_s += self._motion_model.handling_s(motion.kind)
         if nth in scripted or unlucky:
             me.failure = _MISHAPS.get(motion.kind, "something was in the way")
         takes_s *= factor
@@ -164,8 +191,12 @@ class KinematicBackend(Backend):
         if motion.place is not None and motion.kind is MotionKind.GO_TO:
             taken = {other.node for other in self._state.robots.values() if other is not me}
             return self._routes.to_place(me.pose, motion.place, taken)
-        assert motion.point_m is not None
-        return self._routes.to_point(me.pose, motion.point_m, REACH_M)
+        point = motion.point_m
+        if motion.kind is not MotionKind.APPROACH:
+            assert motion.object is not None
+            point = self._state.thing_point(motion.object, self.time_s)
+        assert point is not None
+        return self._routes.to_point(me.pose, point, self._state.reach_m(point))
 
     def _runs_still(self, robot: str) -> bool:
         return self._state.robots[robot].state is MotionState.RUNNING
@@ -215,4 +246,10 @@ _MISHAPS = {
     MotionKind.RELEASE_IN_BASKET: "the basket was not where it should be",
     MotionKind.LOOK: "the camera gave no picture",
     MotionKind.STOW: "the arm got stuck",
+    MotionKind.PLACE_AT: "the hand could not get there",
+    MotionKind.HAND_OVER: "it was not taken",
+    MotionKind.OPEN: "the handle slipped out of the hand",
+    MotionKind.CLOSE: "the handle slipped out of the hand",
+    MotionKind.SWITCH_ON: "the finger missed the switch",
+    MotionKind.SWITCH_OFF: "the finger missed the switch",
 }

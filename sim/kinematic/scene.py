@@ -27,18 +27,21 @@ def draw_scene(world: WorldFile, robots: tuple[str, ...]) -> Scene:
     fixed: dict[str, tuple[PointM, QuaternionWxyz]] = {}
     for solid in solids(world):
         size = (solid.half_m[0], solid.half_m[1], solid.height_m / 2)
-        bodies.append(_body(solid.name, None, ShapeKind.BOX, size, _COLOURS[solid.kind]))
+        colour = _COLOURS.get(solid.kind, _COLOURS["block"])
+        bodies.append(_body(solid.name, None, ShapeKind.BOX, size, colour))
         fixed[solid.name] = ((*solid.center_m, 0.0), _turned(solid.yaw_rad))
     bodies += [_body(name, name, ShapeKind.CYLINDER, _ROBOT_SIZE_M, _ROBOT) for name in robots]
     for name, entry in world.object_entries.items():
         kind = world.kind_of(name)
         length, width, height = (side / 2 for side in kind.extent_m)
-        size = {
-            "box": (length, width, height),
-            "cylinder": (length, height, 0.0),
-            "sphere": (length, 0.0, 0.0),
+        shape, size = {
+            "box": (ShapeKind.BOX, (length, width, height)),
+            "open_box": (ShapeKind.BOX, (length, width, height)),
+            "cylinder": (ShapeKind.CYLINDER, (length, height, 0.0)),
+            "bowl": (ShapeKind.CYLINDER, (length, height, 0.0)),
+            "sphere": (ShapeKind.SPHERE, (length, 0.0, 0.0)),
         }[kind.shape]
-        bodies.append(_body(name, name, ShapeKind(kind.shape), size, entry.rgba or kind.rgba))
+        bodies.append(_body(name, name, shape, size, entry.rgba or kind.rgba))
     return Scene(world=world.world, bodies=tuple(bodies), fixed=fixed)
 
 

@@ -3,155 +3,154 @@
 from __future__ import annotations
 
 import math
-import random
-from dataclasses import dataclass, field
 
+from keyexpr_schema.facts import IS_ON, IS_OPEN
 from keyexpr_schema.payloads.motions import (
     Detection,
     Motion,
     MotionKind,
-    MotionState,
     PointM,
 )
-from keyexpr_schema.payloads.robots import PoseMRad
 from keyexpr_schema.payloads.simulation import Truth
-from sim.files.world_schema import FLOOR, WorldFile
-from sim.navigation.routes import Route
-
-REACH_M = 1.2
-"""How far from a robot's centre its hand gets, sideways; generous, as stances here are coarse."""
+from sim.files.world_schema import FLOOR
+from sim.kinematic.whereabouts import REACH_M, KinematicRobot, Whereabouts
 
 MISS_M = 0.15
 """A hand that closes further than this from the object closes on nothing."""
 
 
-@dataclass
-class KinematicRobot:
-    """A robot, its latest motion, and the route it drives on while that runs."""
-
-    name: str
-    capabilities: dict[str, float]
-    pose: PoseMRad
-    chance: random.Random
-    node: int
-    """Of the lattice: where it stands or is going."""
-    holding: str | None = None
-    basket: list[str] = field(default_factory=list)
-    counts: dict[MotionKind, int] = field(default_factory=dict)
-    motion: Motion | None = None
-    number: int = 0
-    begun_s: float = 0.0
-    ends_s: float = 0.0
-    route: Route | None = None
-    failure: str | None = None
-    state: MotionState | None = None
-    reason: str | None = None
-    seen: tuple[Detection, ...] = ()
-
-
-@dataclass
-class KinematicObject:
-    """An object. `support` is a surface, `floor`, a robot (its basket), or nothing: in a hand."""
-
-    name: str
-    kind: str
-    mass_kg: float
-    point_m: PointM
-    support: str
-
-
-@dataclass
-class KinematicState:
-    """Robots and objects, by name. Times are simulated seconds."""
-
-    world: WorldFile
-    robots: dict[str, KinematicRobot]
-    objects: dict[str, KinematicObject]
-
-    def pose(self, me: KinematicRobot, time_s: float) -> PoseMRad:
-        """Where a robot is, on its route or at its end."""
-        if me.route is None or me.state is not MotionState.RUNNING:
-            return me.pose
-        whole = me.ends_s - me.begun_s
-        return me.route.at(min(1.0, (time_s - me.begun_s) / whole) if whole > 0 else 1.0)
-
-    def _held_by(self, thing: KinematicObject) -> str | None:
-        return next((r.name for r in self.robots.values() if r.holding == thing.name), None)
-
-    def point(self, thing: KinematicObject, time_s: float) -> PointM:
-        """Where an object is: its own place, or where who carries it is."""
-        carrier = self._held_by(thing) or (thing.support if thing.support in self.robots else None)
-        if carrier is None:
-            return thing.point_m
-        x, y, _ = self.pose(self.robots[carrier], time_s)
-        return (x, y, 0.8 if thing.support == "" else 0.3)
+class KinematicState(Whereabouts):
+    """Robots, objects and states, and what the ends of motions do to them."""
 
     def effect(self, me: KinematicRobot, motion: Motion, time_s: float) -> str | None:
         """Carry out the end of `motion`; why not, if it cannot be."""
-        if motion.kind is MotionKind.LOOK:
+        kind = motion.kind
+        if kind is MotionKind.LOOK:
             me.seen = self._look(me, time_s)
-        elif motion.kind is MotionKind.GRASP:
+        elif kind is MotionKind.GRASP:
             return self._grasp(me, motion, time_s)
-        elif motion.kind is MotionKind.RELEASE:
-            return self._release(me, motion)
-        elif motion.kind is MotionKind.RELEASE_IN_BASKET:
-            return self._hand_over(me, motion)
+        elif kind is MotionKind.RELEASE:
+            return self._release(me, motion, time_s)
+        elif kind is MotionKind.RELEASE_IN_BASKET:
+            return self._into_basket(me, motion)
+        elif kind in (MotionKind.PLACE_AT, MotionKind.HAND_OVER):
+            return self._place_at(me, motion, time_s)
+        elif kind in STATE_OF:
+            return self._change(me, motion, time_s)
         return None
+
+    def _change(self, me: KinematicRobot, motion: Motion, time_s: float) -> str | None:
+        """Open, close or switch something."""
+        assert motion.object is not None
+        state, value = STATE_OF[motion.kind]
+        if self.states.get(motion.object, state) == value:
+            return None
+        if me.capabilities.get("grip") is None:
+            return f"{me.name} has no hand"
+        if me.holding is not None:
+            return f"the hand is not empty: it holds {me.holding}"
+        point = self.thing_point(motion.object, time_s)
+        if math.dist(point[:2], me.pose[:2]) > self.reach_m(point):
+            return f"{motion.object} is out of reach: drive up to it first"
+        self.states.set(motion.object, state, value)
+        return None
+
+    def _place_at(self, me: KinematicRobot, motion: Motion, time_s: float) -> str | None:
+        """Set what is held down on or in a thing, or give it to a person."""
+        target = motion.object
+        assert target is not None
+        if me.holding is None:
+            return "the hand is empty"
+        if target == me.holding or self._root_name(target) == me.holding:
+            return f"{me.holding} cannot be put on or in itself"
+        if self.states.get(target, IS_OPEN) is False:
+            return f"{target} is closed: open it first"
+        shut = self.shut_in(target)
+        if shut is not None:
+            return f"{target} is in {shut}, which is closed: open it first"
+        there = self.contents(target)
+        room = self.things[target].room
+        if room is not None and len(there) >= room:
+            return f"there is no room at {target}: {', '.join(there)} is there"
+        point = self.thing_point(target, time_s)
+        if math.dist(point[:2], me.pose[:2]) > self.reach_m(point):
+            return f"{target} is out of reach: drive up to it first"
+        thing = self.objects[me.holding]
+        thing.offset_m, thing.support, me.holding = self.slot(target, there), target, None
+        return None
+
+    def _root_name(self, thing: str) -> str:
+        return self.root(self.objects[thing]).name if thing in self.objects else thing
 
     def _look(self, me: KinematicRobot, time_s: float) -> tuple[Detection, ...]:
         place = self.world.place_at(*me.pose[:2])
-        found = []
-        for thing in self.objects.values():
-            point = self.point(thing, time_s)
-            near = math.dist(point[:2], me.pose[:2]) <= me.capabilities.get("see", 0.0)
-            here = self.world.place_at(*point[:2]) == place
-            if near and here and self._held_by(thing) is None:
-                found.append(
-                    Detection(
-                        object=thing.name,
-                        kind=thing.kind,
-                        point_m=point,
-                        place=place,
-                        support=thing.support,
-                    )
+
+        def seen(name: str, kind: str, point: PointM, support: str) -> bool:
+            if (
+                math.dist(point[:2], me.pose[:2]) > me.capabilities.get("see", 0.0)
+                or self.world.place_at(*point[:2]) != place
+            ):
+                return False
+            found.append(
+                Detection(
+                    object=name,
+                    kind=kind,
+                    point_m=point,
+                    place=place,
+                    support=support,
+                    states=self.states.of(name),
                 )
+            )
+            return True
+
+        found: list[Detection] = []
+        for thing in self.objects.values():
+            if self.held_by(self.root(thing)) is None and self.shut_in(thing.name) is None:
+                seen(thing.name, thing.kind, self.point(thing, time_s), thing.support)
+        for name in self.noticed:
+            x, y = self.world.fixture_of[name].center_m
+            seen(name, self.things[name].kind, (x, y, 0.0), FLOOR)
         return tuple(found)
 
     def _grasp(self, me: KinematicRobot, motion: Motion, time_s: float) -> str | None:
         assert motion.object is not None and motion.point_m is not None
         thing = self.objects[motion.object]
         payload_kg = me.capabilities.get("grip")
-        holder = self._held_by(thing)
+        holder = self.held_by(thing)
         if payload_kg is None:
             return f"{me.name} has no hand"
         if me.holding is not None:
             return f"the hand already holds {me.holding}"
         if thing.mass_kg > payload_kg:
             return f"{thing.name} is too heavy: {thing.mass_kg:g} kg of at most {payload_kg:g} kg"
+        shut = self.shut_in(thing.name)
+        if shut is not None:
+            return f"{thing.name} is in {shut}, which is closed: open it first"
         point = self.point(thing, time_s)
         if holder is not None or math.dist(point, motion.point_m) > MISS_M:
             return f"{thing.name} is not there; the hand closed on nothing"
-        if math.dist(point[:2], me.pose[:2]) > REACH_M:
+        if math.dist(point[:2], me.pose[:2]) > self.reach_m(point):
             return f"{thing.name} is out of reach: drive up to it first"
         if thing.support in self.robots:
             self.robots[thing.support].basket.remove(thing.name)
         me.holding, thing.support = thing.name, ""
         return None
 
-    def _release(self, me: KinematicRobot, motion: Motion) -> str | None:
+    def _release(self, me: KinematicRobot, motion: Motion, time_s: float) -> str | None:
         assert motion.point_m is not None
         if me.holding is None:
             return "the hand is empty"
-        if math.dist(motion.point_m[:2], me.pose[:2]) > REACH_M:
+        if math.dist(motion.point_m[:2], me.pose[:2]) > self.reach_m(motion.point_m):
             return "the point is out of reach: drive up to it first"
-        support = self._support_at(motion.point_m)
+        support = self.support_at(motion.point_m, me.holding, time_s)
         if support is None:
             return "there is nothing at that point to put it on"
         thing = self.objects[me.holding]
-        thing.point_m, thing.support, me.holding = motion.point_m, support, None
+        thing.support, thing.offset_m = support
+        me.holding = None
         return None
 
-    def _hand_over(self, me: KinematicRobot, motion: Motion) -> str | None:
+    def _into_basket(self, me: KinematicRobot, motion: Motion) -> str | None:
         assert motion.robot is not None
         other = self.robots[motion.robot]
         room = other.capabilities.get("basket", 0.0)
@@ -168,19 +167,13 @@ class KinematicState:
         me.holding = None
         return None
 
-    def _support_at(self, point_m: PointM) -> str | None:
-        x, y, z = point_m
-        for top in self.world.surfaces():
-            if top.distance_m(x, y) == 0.0:
-                return top.surface if abs(z - top.z_m) <= 0.1 else None
-        return FLOOR if abs(z) <= 0.1 and self.world.place_at(x, y) is not None else None
-
     def truths(self, time_s: float) -> tuple[Truth, ...]:
-        """Where every object really is, in the order of the world file."""
+        """Where every object really is, and how everything is that has states."""
         found = []
         for thing in self.objects.values():
-            point, holder = self.point(thing, time_s), self._held_by(thing)
-            carrier = self.robots.get(holder or thing.support)
+            point, root = self.point(thing, time_s), self.root(thing)
+            holder = self.held_by(root)
+            carrier = self.robots.get(holder or root.support)
             found.append(
                 Truth(
                     object=thing.name,
@@ -189,8 +182,33 @@ class KinematicState:
                     point_m=point,
                     place=self.world.place_at(*point[:2]),
                     support=thing.support or None,
-                    held_by=holder,
+                    held_by=holder if root is thing else None,
                     settled=holder is None and (carrier is None or carrier.route is None),
+                    states=self.states.of(thing.name),
+                )
+            )
+        for name in self.noticed:
+            x, y = self.world.fixture_of[name].center_m
+            found.append(
+                Truth(
+                    object=name,
+                    kind=self.things[name].kind,
+                    time_s=time_s,
+                    point_m=(x, y, 0.0),
+                    place=self.world.place_at(x, y),
+                    support=FLOOR,
+                    held_by=None,
+                    settled=True,
+                    states=self.states.of(name),
                 )
             )
         return tuple(found)
+
+
+STATE_OF: dict[MotionKind, tuple[str, bool]] = {
+    MotionKind.OPEN: (IS_OPEN, True),
+    MotionKind.CLOSE: (IS_OPEN, False),
+    MotionKind.SWITCH_ON: (IS_ON, True),
+    MotionKind.SWITCH_OFF: (IS_ON, False),
+}
+"""The state that a motion brings about."""

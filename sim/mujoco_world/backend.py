@@ -48,6 +48,12 @@ MOTIONS: dict[MotionKind, Callable[[MotionContext, MotionRun], Steps]] = {
 }
 
 
+def _not_yet(context: MotionContext, run: MotionRun) -> Steps:
+    """A motion that this world does not have."""
+    yield from ()
+    raise MotionFailed(f"no robot of the physical world can {run.motion.kind.value} things")
+
+
 class MujocoBackend(Backend):
     """Robots, objects and a building in one MuJoCo model.
 
@@ -119,7 +125,7 @@ class MujocoBackend(Backend):
 
     def _begin(self, robot: str, motion: Motion) -> None:
         run = self._runs[robot] = MotionRun(self._bodies[robot], motion, self.time_s)
-        run.steps = MOTIONS[motion.kind](self._context, run)
+        run.steps = MOTIONS.get(motion.kind, _not_yet)(self._context, run)
 
     def _stop(self, robot: str) -> None:
         run = self._runs.get(robot)

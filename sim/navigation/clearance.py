@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.files.solids import solids
+from sim.files.solids import Solid, solids
 from sim.files.world_schema import WorldFile
 
 Floats = NDArray[np.float64]
@@ -21,8 +23,9 @@ class Clearance:
     the exact answer costs no more, and a stance in front of a table needs the centimetres.
     """
 
-    def __init__(self, world: WorldFile) -> None:
-        boxes = solids(world)
+    def __init__(self, world: WorldFile, boxes: Sequence[Solid] | None = None) -> None:
+        """`boxes` are those that count, if not all that stands on the floor."""
+        boxes = solids(world) if boxes is None else boxes
         self._size = np.asarray(world.size_m)
         self._centre = np.array([s.center_m for s in boxes])  # (n, 2) m
         self._half = np.array([s.half_m for s in boxes])  # (n, 2) m

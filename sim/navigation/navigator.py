@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.errors import NoPath, NoStance
+from sim.files.solids import Solid
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
+from sim.navigation import own_ways
 from sim.navigation.clearance import segment_gap
 from sim.navigation.distance_field import DistanceField
 from sim.navigation.lattice import TRACKING_M
@@ -109,10 +112,30 @@ class Navigator:
             raise NoPath(f"there is no way to {place} from where {robot} stands")
         self._tasks[robot] = _Task(place, place=place)
 
+    def look_out_for(self, obstacles: Callable[[], Sequence[Solid]]) -> None:
+        """Keep stances, and the ways to them, clear of what stands there for the time being."""
+        self._spots.obstacles = obstacles
+
+    def reserve(self, robot: str, points_m: Sequence[tuple[float, float]]) -> bool:
+        """Keep others away from the line through `points_m`, which `robot` will drive by itself.
+
+        Only for a robot at a stance. False, and nothing is kept, while others are there.
+        """
+        return own_ways.reserve(self._robots, robot, self._lattice, points_m)
+
+    def settle(self, robot: str) -> None:
+        """Note that `robot` has driven by itself to where it stands now: that is its stance."""
+        own_ways.settle(self._robots, robot, self._spots, self._poses[robot])
+
     def approach(
-        self, robot: str, point_m: tuple[float, float, float], reach_m: tuple[float, float]
+        self,
+        robot: str,
+        point_m: tuple[float, float, float],
+        reach_m: tuple[float, float],
+        heading_rad: float | None = None,
     ) -> None:
-        """Let `robot` stand facing `point_m`, its centre between `reach_m` (min, max) away from it.
+        """Let `robot` stand facing `point_m`, its centre between `reach_m` (min, max) away from it,
+        and itself turned to `heading_rad` if that is given.
 
         If all such stances are taken, it waits for one for `PATIENCE_S`, then its leg has failed.
 
@@ -123,7 +146,7 @@ class Navigator:
         self.cancel(robot)
         traveller = self._robots[robot]
         what = f"({point_m[0]:.2f}, {point_m[1]:.2f})"
-        docks = self._spots.stances(point_m, traveller.radius_m, reach_m)
+        docks = self._spots.stances(point_m, traveller.radius_m, reach_m, heading_rad)
         if not docks:
             why = self._spots.why_not(point_m, traveller.radius_m, reach_m)
             raise NoStance(f"{robot} does not get to {what}: {why}")

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from sim.files.solids import Solid, barriers, reserves, solids
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation.clearance import Clearance
 from sim.navigation.distance_field import DistanceField
@@ -23,6 +25,9 @@ TABLE_FRONT_M = 0.9
 
 FAR_M = 3.0
 """How far around a point that nobody can reach it is looked for the nearest free floor."""
+
+ROOF_M = 0.05
+"""What is not deeper than this below the top of a piece of furniture lies on it."""
 
 DOCK_M = 1.3
 """Longest straight way from the lattice to a stance."""
@@ -46,8 +51,13 @@ class Spots:
     """The places to stop at in one world."""
 
     def __init__(self, world: WorldFile) -> None:
+        self._fixtures = world.fixtures
         self._clearance = Clearance(world)
-        self.lattice = lattice = Lattice(world, self._clearance)
+        self._reach = Clearance(world, barriers(world))
+        driven = (*solids(world), *reserves(world))
+        self.lattice = lattice = Lattice(world, Clearance(world, driven))
+        self.obstacles: Callable[[], Sequence[Solid]] = tuple
+        """What stands on the floor for the time being: open doors and drawers."""
         points = lattice.points_m
         self.by_door = np.zeros(len(points), dtype=bool)  # (n,)
         self.forecourt = np.zeros(len(points), dtype=bool)
@@ -128,26 +138,47 @@ class Spots:
         ordered = near[clear][np.argsort(gaps[near[clear]], kind="stable")]
         return [int(node) for node in ordered]
 
+    def ways_out(self, point_m: tuple[float, float], radius_m: float) -> list[int]:
+        """As `ways_in`, and clear of what stands there for the time being."""
+        opened = self.obstacles()
+        return [
+            node
+            for node in self.ways_in(point_m, radius_m)
+            if not opened or _clear(point_m, self.lattice.points_m[node], opened, radius_m)
+        ]
+
     def stances(
-        self, point_m: tuple[float, float, float], radius_m: float, reach_m: tuple[float, float]
+        self,
+        point_m: tuple[float, float, float],
+        radius_m: float,
+        reach_m: tuple[float, float],
+        heading_rad: float | None = None,
     ) -> list[Dock]:
         """Where a robot can stand facing a point with it within reach, ahead of any traffic.
 
         The reach counts from the robot's centre. There is no wall between stance and point.
+        `heading_rad`: it has to face that way; in furniture that is open at its front only, it
+        faces the back.
         """
         low, high = reach_m
         x, y, z = point_m
         middle = (low + high) / 2
         distances = np.linspace(low, high, max(2, round((high - low) / 0.05) + 1))
-        angles = np.radians(np.arange(0, 360, 10))
+        if heading_rad is None:
+            heading_rad = self._heading_into(point_m)
+        if heading_rad is None:
+            angles = np.radians(np.arange(0, 360, 10))
+        else:
+            angles = np.array([heading_rad + math.pi])
+            distances = np.linspace(low, high, max(2, round((high - low) / 0.02) + 1))
         d, angle = (a.ravel() for a in np.meshgrid(distances, angles, indexing="ij"))
         points = np.stack([x + d * np.cos(angle), y + d * np.sin(angle)], axis=1)
         good = self._clearance.at(points) >= radius_m + 0.03
-        good &= self._clearance.along((x, y), points, above_m=z + 0.02) > 0.0
+        good &= self._reach.along((x, y), points, above_m=z + 0.02) > 0.0
         found: list[Dock] = []
         for k in np.flatnonzero(good):
             stance = (float(points[k, 0]), float(points[k, 1]))
-            ways = self.ways_in(stance, radius_m + 0.03)
+            ways = self.ways_out(stance, radius_m + 0.03)
             if ways:
                 dock = self.dock(
                     stance, ways[0], radius_m, math.atan2(y - stance[1], x - stance[0])
@@ -155,6 +186,19 @@ class Spots:
                 off = 2.0 * abs(float(d[k]) - middle) + 0.2 * len(dock.owned)
                 found.append(Dock(dock.node, stance, dock.yaw_rad, dock.owned, dock.cost_m + off))
         return found
+
+    def _heading_into(self, point_m: tuple[float, float, float]) -> float | None:
+        """How to face a point in furniture under whose roof one gets from the front only."""
+        for fixture in self._fixtures.by_name.values():
+            x, y, z = fixture.local_m(point_m)
+            if (
+                any(carrier.roofed for carrier in fixture.all_carriers)
+                and abs(x) < fixture.half_m[0]
+                and abs(y) < fixture.half_m[1]
+                and z < fixture.height_m - ROOF_M
+            ):
+                return fixture.inward_rad
+        return None
 
     def why_not(
         self, point_m: tuple[float, float, float], radius_m: float, reach_m: tuple[float, float]
@@ -166,3 +210,15 @@ class Spots:
             return f"{needed}, and there is no room to stand near it"
         nearest_m = min(math.dist(dock.point_m, point_m[:2]) for dock in further)
         return f"{needed}, and there is room only {nearest_m:.2f} m away"
+
+
+def _clear(
+    start_m: Sequence[float], end_m: Sequence[float], solids: Sequence[Solid], gap_m: float
+) -> bool:
+    """Whether a straight way keeps so far from solids, looked at every tenth of it."""
+    for share in np.linspace(0.0, 1.0, 11):
+        x = float(start_m[0] + share * (end_m[0] - start_m[0]))
+        y = float(start_m[1] + share * (end_m[1] - start_m[1]))
+        if any(solid.distance_m(x, y) < gap_m for solid in solids):
+            return False
+    return True

@@ -146,8 +146,7 @@ def phrases_of(skills: Skills) -> tuple[SkillPhrase, ...]:
         about = {row.variable.subject for row in rows}
         plain = all(row.value not in skill.parameters for row in rows)
         if len(about) == 1 and plain:
-            bases = skill.types[about.pop()].bases
-            kind = PLACE if bases == (PLACE,) else OBJECT
+            kind = str(skill.types[about.pop()])
             wants = tuple((key.relation, value) for key, value in rows if value is not None)
             if wants:
                 phrases.append(SkillPhrase(verb=name.replace("_", " "), type=kind, wants=wants))

@@ -206,7 +206,12 @@ class _GoalParser(Sentences):
             mentions = [Mention((name,), "place", self.cursor.at) for name in names]
         else:
             found = self.subjects.read("an object", ("object",))
-            mentions = [self.subjects.resolve(subject) for subject in found]
+            things = self.vocabulary.objects.values()
+            able = {thing.object for thing in things if phrase.fits(thing)}
+            mentions = [
+                self.subjects.resolve(self.subjects.fit(subject, able, phrase.verb))
+                for subject in found
+            ]
             self.subjects.remember(mentions)
         for mention in mentions:
             for relation, value in phrase.wants:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
@@ -12,8 +12,10 @@ from fleet.language.phrases.noun_phrases import NounPhrases
 from fleet.language.refusals import one_of
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.lexicon import EntityType
+from fleet.language.words.morphology import participles
 from fleet.language.words.wordlists import PLURAL_PRONOUNS, PREPOSITIONS, SINGULAR_PRONOUNS
 from keyexpr_schema.facts import AT, FactKey, Literal
+from keyexpr_schema.payloads.world import Feature
 
 THINGS: tuple[EntityType, ...] = ("object", "robot")
 Subject = NounPhrase | Mention
@@ -97,13 +99,25 @@ class Subjects:
         """
         if isinstance(subject, Mention) or subject.type != "object":
             return subject
-        fixed = [n for n in subject.names if not self.vocabulary.objects[n].movable]
-        if not fixed:
+        things = self.vocabulary.objects.values()
+        return self.fit(subject, {o.object for o in things if o.is_a(Feature.MOVABLE)}, "move")
+
+    def fit(self, subject: Subject, able: Collection[str], verb: str) -> Subject:
+        """The same, without those that the verb cannot be done to where the words leave that open.
+
+        Raises:
+            NotUnderstood: it cannot be done to what is named.
+        """
+        names = subject.names if isinstance(subject, NounPhrase) else subject.subjects
+        if subject.type != "object" or not (others := [n for n in names if n not in able]):
             return subject
-        left = subject.among(set(subject.names) - set(fixed))
-        if left.found and (subject.generic or subject.quantity is Quantity.ANY):
-            return left
-        raise NotUnderstood(f"{subject.text!r}: {one_of(fixed)} cannot be moved")
+        if isinstance(subject, NounPhrase):
+            left = subject.among(able)
+            if left.found and (subject.generic or subject.quantity is Quantity.ANY):
+                return left
+        text = subject.text if isinstance(subject, NounPhrase) else self.cursor.line
+        done = " ".join([participles(verb.split()[0])[0], *verb.split()[1:]])
+        raise NotUnderstood(f"{text!r}: {one_of(others)} cannot be {done}")
 
     def drivers(self, subject: Subject) -> Subject:
         """The same, with only robots that can drive where the words leave open which robot.

@@ -28,6 +28,9 @@ _IRREGULAR_PARTICIPLES = {
     "go": ("gone",),
     "come": ("come",),
     "see": ("seen",),
+    "cut": ("cut",),
+    "shut": ("shut",),
+    "hide": ("hidden",),
 }
 _DOUBLED = frozenset({"get", "put", "set", "drop", "grab", "scan", "spot", "transfer"})
 _VOWELS = frozenset("aeiou")

@@ -58,7 +58,7 @@ def test_a_sentence_becomes_stages(model_client: ModelClient) -> None:
     assert "Everyone has tea, then go and look" in prompt
     assert '"at": "kitchen"' in prompt
     assert "- located(object) = true: it is known where the object is" in prompt
-    assert "- at(object) = place or at(object) = robot or at(robot) = place" in prompt
+    assert "- at(object) = object or at(object) = place or at(object) = robot" in prompt
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from typing import Any
 
 from ortools.sat.python import cp_model
 
@@ -39,6 +40,10 @@ class Optimum:
         return self.makespan_s - self.bound_s < 1.0 / TICKS_PER_S
 
 
+Timed = tuple[cp_model.IntVar, cp_model.IntVar, cp_model.IntVar]
+"""Whether it is done, from when and until when."""
+
+
 @dataclass(frozen=True)
 class _Visit:
     """Something that a robot may do: from where to where, and when."""
@@ -48,6 +53,7 @@ class _Visit:
     start: cp_model.IntVar
     end: cp_model.IntVar
     present: cp_model.IntVar
+    absent: cp_model.IntVar
 
 
 @dataclass
@@ -90,7 +96,9 @@ class _Model:
             self.cp.add(end == start + least)
         else:
             self.cp.add(end >= start + least)
-        made = _Visit(origin, target, start, end, present)
+        absent = self.cp.new_bool_var(f"{name} not")
+        self.cp.add(absent + present == 1)
+        made = _Visit(origin, target, start, end, present, absent)
         self.visits[robot].append(made)
         return made
 
@@ -101,7 +109,7 @@ class _Model:
             first = self.cp.new_bool_var(f"{robot} first {j}")
             self.cp.add(visit.start >= self.way(robot, at, visit.origin)).only_enforce_if(first)
             arcs += [(0, j, first), (j, 0, self.cp.new_bool_var(f"{robot} last {j}"))]
-            arcs.append((j, j, ~visit.present))
+            arcs.append((j, j, visit.absent))
             for k, other in enumerate(rows, start=1):
                 if k == j:
                     continue
@@ -185,16 +193,18 @@ def _ways(
         rides = cp.new_bool_var(f"{thing} rides {carrier}")
         ways.append(rides)
         loads = [_loaded(model, thing, origin, hand, carrier) for hand in hands]
-        cp.add(sum(by for by, *_ in loads) == 1).only_enforce_if(rides)
-        cp.add(sum(by for by, *_ in loads) == 0).only_enforce_if(~rides)
+        cp.add(_total(loads) == 1).only_enforce_if(rides)
+        cp.add(_total(loads) == 0).only_enforce_if(~rides)
         stays = cp.new_bool_var(f"{thing} stays in {carrier}")
         arrival = model.visit(carrier, target, target, 0, stays, f"{thing} arrives {carrier}")
         model.endings.append((carrier, arrival))
         cp.add(makespan >= arrival.end).only_enforce_if(stays)
-        unloads = [_unloaded(model, thing, target, h, carrier, makespan) for h in hands]
-        unloads = [row for row in unloads if row is not None]
-        cp.add(stays + sum(by for by, *_ in unloads) == 1).only_enforce_if(rides)
-        cp.add(stays + sum(by for by, *_ in unloads) == 0).only_enforce_if(~rides)
+        unloads: list[Timed] = []
+        for hand in hands:
+            if "pick_from_robot" in model.world.robots[hand].skills:
+                unloads.append(_unloaded(model, thing, target, hand, carrier, makespan))
+        cp.add(_total(unloads, stays) == 1).only_enforce_if(rides)
+        cp.add(_total(unloads, stays) == 0).only_enforce_if(~rides)
         for by, load_start, load_end in loads:
             cp.add(makespan >= load_end).only_enforce_if(by)
             cp.add(arrival.start >= load_end).only_enforce_if(by, stays)
@@ -221,8 +231,9 @@ def _aboard(
     )
 
 
-Timed = tuple[cp_model.IntVar, cp_model.IntVar, cp_model.IntVar]
-"""Whether it is done, from when and until when."""
+def _total(rows: Sequence[Timed], *more: cp_model.IntVar) -> Any:
+    """How many of them are done, and of `more`."""
+    return cp_model.LinearExpr.sum([*more, *(by for by, _, _ in rows)])
 
 
 def _loaded(model: _Model, thing: str, origin: str, hand: str, carrier: str) -> Timed:
@@ -238,10 +249,8 @@ def _loaded(model: _Model, thing: str, origin: str, hand: str, carrier: str) -> 
 
 def _unloaded(
     model: _Model, thing: str, target: str, hand: str, carrier: str, makespan: cp_model.IntVar
-) -> Timed | None:
-    """A hand takes a thing out of a basket and puts it down beside it; `None` where it cannot."""
-    if "pick_from_robot" not in model.world.robots[hand].skills:
-        return None
+) -> Timed:
+    """A hand takes a thing out of a basket and puts it down beside it."""
     by = model.cp.new_bool_var(f"{thing} {hand} unloads {carrier}")
     takes, puts = model.work(hand, "pick_from_robot"), model.work(hand, "place")
     name = f"{thing} {hand} {carrier} out"

@@ -40,7 +40,7 @@ from keyexpr_schema.payloads.plans import Plan
 
 MAX_COMBINATIONS = 256
 """Up to this many combinations are all compared; beyond, one sequence is changed at a time."""
-MOST_REFINED, REFINING_NODES = 24, 6000
+MOST_REFINED, REFINING_NODES = 12, 3000
 """Of those, how many of the most promising get a better allocation, and how long it is sought."""
 MAX_RESTORATIONS = 2
 """How often what the sequences for later subgoals undid is reached again, where no plan does."""

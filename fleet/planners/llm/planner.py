@@ -22,8 +22,8 @@ from fleet.planners.llm.candidate import (
     world_after,
 )
 from fleet.planners.llm.prompt_text import problem_text, skills_text, team_skills
-from keyexpr_schema.facts import AT
-from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.facts import LOCATED
+from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan
 
 log = logging.getLogger(__name__)
@@ -154,7 +154,9 @@ def _not_located(goals: Sequence[Goal], world: WorldModel) -> str | None:
     for goal in goals:
         for condition in goal.conditions:
             things = [subject for subject in condition.subjects if subject in world.objects]
-            if things and all(world.value(AT, thing) is None for thing in things):
+            if things and not world.holds(
+                Condition(relation=LOCATED, subject=things[0], value=True, any_of=tuple(things))
+            ):
                 return " or ".join(things)
     return None
 

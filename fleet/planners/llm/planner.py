@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan
+from fleet.core.model.derived import is_located
 from fleet.core.model.world import WorldModel
 from fleet.llm.budget import Budget
 from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
@@ -22,8 +23,7 @@ from fleet.planners.llm.candidate import (
     world_after,
 )
 from fleet.planners.llm.prompt_text import problem_text, skills_text, team_skills
-from keyexpr_schema.facts import LOCATED
-from keyexpr_schema.payloads.goals import Condition, Goal
+from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan
 
 log = logging.getLogger(__name__)
@@ -154,9 +154,7 @@ def _not_located(goals: Sequence[Goal], world: WorldModel) -> str | None:
     for goal in goals:
         for condition in goal.conditions:
             things = [subject for subject in condition.subjects if subject in world.objects]
-            if things and not world.holds(
-                Condition(relation=LOCATED, subject=things[0], value=True, any_of=tuple(things))
-            ):
+            if things and not any(is_located(thing, world.facts.get, world) for thing in things):
                 return " or ".join(things)
     return None
 

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
+from fleet.core.model.formulas.abstraction import reads
+from fleet.core.model.formulas.effects import Guarded, instances
+from fleet.core.model.formulas.evaluation import expanded
+from fleet.core.model.formulas.nodes import Holds
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
-from keyexpr_schema.facts import FactKey
+from fleet.core.model.world import WorldModel, capacity
+from keyexpr_schema.facts import AT, FactKey, Value
 from keyexpr_schema.ids import actor_arg, bare_name
 from keyexpr_schema.payloads.plans import Task
 
@@ -26,13 +31,19 @@ class ActionSequence:
 
 
 def deordered(
-    sequences: Sequence[ActionSequence], first_task: int = 1, one_actor_each: bool = False
+    sequences: Sequence[ActionSequence],
+    first_task: int = 1,
+    one_actor_each: bool = False,
+    *,
+    world: WorldModel | None = None,
 ) -> tuple[tuple[Task, ...], dict[str, str]]:
     """Tasks that do what the sequences do, in a partial order, and the actors that are pinned.
 
     A task waits for the last one before it that wrote what it reads, for those that read what it
     overwrites, and for its robots' earlier tasks in the same sequence (deordering by causal links).
     Each robot becomes a new actor in every sequence, or with `one_actor_each` one in all of them.
+    Without a `world`, only what is written in preconditions is known to be read, and not what that
+    is read off.
     """
     rows: dict[str, tuple[str, Action, dict[str, str]]] = {}
     pins: dict[str, str] = {}
@@ -53,7 +64,8 @@ def deordered(
                         pins[actors[robot]] = robot
             lifted = {robot: actor_arg(actors[robot]) for robot in action.participants}
             rows[f"t{first_task + len(rows)}"] = sequence.goal, action, lifted
-    reduced = TaskGraph(_dependencies(rows)).reduced()
+    touched = _Touched([action for _, action, _ in rows.values()], world)
+    reduced = TaskGraph(_dependencies(rows, touched)).reduced()
     tasks = tuple(
         Task(
             task=task,
@@ -70,7 +82,7 @@ def deordered(
 
 
 def _dependencies(
-    rows: Mapping[str, tuple[str, Action, Mapping[str, str]]],
+    rows: Mapping[str, tuple[str, Action, Mapping[str, str]]], touched: _Touched
 ) -> dict[str, set[str]]:
     after: dict[str, set[str]] = {}
     writer: dict[FactKey, str] = {}
@@ -78,8 +90,8 @@ def _dependencies(
     last: dict[str, str] = {}
     for task, (_, action, lifted) in rows.items():
         reads, writes = (
-            {FactKey(relation, lifted.get(subject, subject)) for (relation, subject), _ in literals}
-            for literals in (action.before, action.after)
+            {FactKey(relation, lifted.get(subject, subject)) for relation, subject in variables}
+            for variables in (touched.reads(action), touched.writes(action))
         )
         befores = {writer[variable] for variable in reads | writes if variable in writer}
         befores.update(*(readers[variable] for variable in writes))
@@ -91,3 +103,56 @@ def _dependencies(
             writer[variable], readers[variable] = task, set()
         after[task] = befores
     return after
+
+
+class _Touched:
+    """The variables that actions read and write, of those that any of them may write."""
+
+    def __init__(self, actions: Sequence[Action], world: WorldModel | None) -> None:
+        self._world = world
+        self._values: dict[FactKey, set[Value]] = defaultdict(set)
+        for action in actions:
+            for variable, value in action.after:
+                self._values[variable].add(value)
+            for row in self._guarded(action):
+                self._values[row.variable].add(row.value)
+
+    def _guarded(self, action: Action) -> list[Guarded]:
+        if self._world is None:
+            return []
+        return [row for e in action.conditional for row in instances(e, self._world)]
+
+    def _values_of(self, variable: FactKey) -> Collection[Value]:
+        known = {self._world.facts.get(variable)} if self._world is not None else set()
+        return self._values.get(variable, set()) | known
+
+    def reads(self, action: Action) -> set[FactKey]:
+        """What its preconditions, and the conditions of its effects, are read off."""
+        found = {literal.variable for literal in action.before}
+        if self._world is None:
+            return found
+        guarded = self._guarded(action)
+        for node in (
+            *map(Holds, action.before),
+            *(expanded(formula, self._world) for formula in action.conditions),
+            *(row.when for row in guarded),
+            *(row.to for row in guarded if row.to is not None),
+        ):
+            found |= reads(node, self._values_of, self._world)
+        for carrier in action.space_in:
+            if carrier in self._world.objects:
+                found |= self._in_the_way(carrier, self._world)
+        return found
+
+    def _in_the_way(self, carrier: str, world: WorldModel) -> set[FactKey]:
+        """Where things are that may be on or in it, if those are more than it takes."""
+        where = (FactKey(AT, thing) for thing in world.objects)
+        there = {variable for variable in where if carrier in self._values_of(variable)}
+        return there if len(there) > capacity(carrier, world) else set()
+
+    def writes(self, action: Action) -> set[FactKey]:
+        """What it writes, or may."""
+        return {
+            *(literal.variable for literal in action.after),
+            *(row.variable for row in self._guarded(action)),
+        }

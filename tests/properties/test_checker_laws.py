@@ -7,11 +7,13 @@ from itertools import combinations, pairwise
 from hypothesis import given, settings
 
 from fleet.core.checker.plan_checker import check_allocation, check_plan
-from fleet.core.model.preconditions import first_unmet
+from fleet.core.model.preconditions import applicable, made_true
 from fleet.core.model.task_graph import TaskGraph
-from fleet.core.model.world import WorldModel, condition_holds, room_left
+from fleet.core.model.world import WorldModel, condition_holds
 from keyexpr_schema.ids import bare_name
 from keyexpr_schema.payloads.plans import Plan
+from tests.support import random_kitchen_plans
+from tests.support.random_kitchen_plans import kitchen_plans
 from tests.support.random_plans import ALLOCATION, plans
 from tests.support.reached import Reached, reaches
 
@@ -47,11 +49,9 @@ def works(plan: Plan, world: WorldModel, allocation: dict[str, str]) -> bool:
         facts = dict(world.facts)
         for name in order:
             action = actions[name]
-            if first_unmet(action, facts, world) is not None or any(
-                room_left(robot, facts, world) < 1 for robot in action.space_in
-            ):
+            if not applicable(action, facts, world):
                 return False
-            facts.update({literal.variable: literal.value for literal in action.after})
+            facts.update(made_true(action, facts, world))
         if not all(condition_holds(facts, condition, world) for condition in plan.conditions):
             return False
     return True
@@ -84,3 +84,36 @@ def test_a_plan_passes_exactly_if_every_order_works(
     )
     reached["good and open"] += good and is_partial(plan)
     reached.update({violation.code for violation in violations})
+
+
+@reaches(
+    "goal-unmet",
+    least={
+        "good": 100,
+        "bad": 100,
+        **dict.fromkeys(("good and open", "condition-undone", "condition-unmet"), 5),
+        **dict.fromkeys((f"good with {skill}" for skill in random_kitchen_plans.SKILLS), 5),
+        **dict.fromkeys(
+            (f"bad at {skill}" for skill in random_kitchen_plans.SKILLS if skill != "fill"), 1
+        ),
+    },
+)
+@settings(max_examples=1500, deadline=None)
+@given(kitchen_plans())
+def test_formulas_hold_exactly_if_they_do_in_every_order(
+    reached: Reached, drawn: tuple[Plan, WorldModel]
+) -> None:
+    plan, world = drawn
+    allocation = random_kitchen_plans.ALLOCATION
+    good = works(plan, world, allocation)
+    violations = check_allocation(plan, world, allocation)
+    assert (not violations) == good, violations
+    if good:
+        assert not check_plan(plan, world).violations
+    skills = {task.task: task.skill for task in plan.tasks}
+    reached["good" if good else "bad"] += 1
+    reached["good and open"] += good and is_partial(plan)
+    reached.update({violation.code for violation in violations})
+    if good:
+        reached.update({f"good with {skill}" for skill in skills.values()})
+    reached.update({f"bad at {skills[v.task]}" for v in violations if v.task is not None})

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, field
 
+from fleet.core.model.derived import holds
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, known_value, room_left
 from keyexpr_schema.facts import FactKey, Literal, Value, render_value
@@ -147,5 +148,8 @@ class Candidates:
     def _unmet(self, robot: str, requirement: Requirement) -> Iterator[str]:
         """Relations that do not hold of the robot now as the actor needs them."""
         for relation, (value, _) in requirement.facts.items():
-            if known_value(FactKey(relation, robot), self._world.facts, self._world) != value:
+            if not holds(Literal(FactKey(relation, robot), value), self._value_of, self._world):
                 yield relation
+
+    def _value_of(self, variable: FactKey) -> Value:
+        return known_value(variable, self._world.facts, self._world)

@@ -7,13 +7,31 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping
+from math import inf
 
 from fleet.core.checker.actor_requirements import Requirement
 from fleet.core.checker.quantities import BasketLoads
+from fleet.core.checker.reachable_states import Failure, ReachableStates, Undecided
+from fleet.core.checker.writers import Writers
+from fleet.core.model.derived import holds, read_by
+from fleet.core.model.formulas.nodes import (
+    TRUE,
+    And,
+    Compare,
+    Constant,
+    Formula,
+    Holds,
+    Not,
+    Or,
+    Stored,
+    Sum,
+    Total,
+)
+from fleet.core.model.formulas.text import formula_text
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel, capacity, condition_holds, known_value
-from keyexpr_schema.facts import FactKey, Literal, Value, render_value
+from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value, render_value
 from keyexpr_schema.ids import actor_arg, actor_in, bare_name
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan, Violation
@@ -31,11 +49,15 @@ class Causality:
         self.violations: list[Violation] = []
         self.requirements: dict[str, Requirement] = defaultdict(Requirement)
         self._plan, self._world, self._graph, self._actions = plan, world, graph, actions
-        self._writers: dict[FactKey, list[tuple[str, Value]]] = defaultdict(list)
-        for task in graph.order:
-            for literal in actions[task].after:
-                self._writers[literal.variable].append((task, literal.value))
-        self._baskets = BasketLoads(world, graph, self._writers)
+        self._writers = Writers(graph, actions, world)
+        self._baskets = BasketLoads(world, graph, self._writers.plain)
+        self._unbound = any(
+            actor_in(name) is not None for a in actions.values() for name in a.participants
+        )
+        self._moved_by_chance = any(
+            self._writers.guarded_mask(FactKey(AT, thing)) for thing in world.objects
+        )
+        self._states = ReachableStates(graph, self._writers, world, self._at_start)
         self._check()
 
     def _check(self) -> None:
@@ -45,14 +67,107 @@ class Causality:
             for parameter in action.skill.robot_parameters:
                 self.requirements[action.args[parameter]].roles.append((action, parameter))
             for literal in action.before:
-                self._check_condition(task, literal)
+                if self._is_plain(literal):
+                    self._check_condition(task, literal)
+        # What actors need of their robots is known now, and is what formulas begin with.
+        for task in self._graph.order:
+            action = self._actions[task]
+            for literal in action.before:
+                if not self._is_plain(literal):
+                    self._check_formula(task, Holds(literal))
+            for formula in action.conditions:
+                self._check_formula(task, formula)
             for carrier in action.space_in:
                 self._check_space(task, carrier)
-        final = self._final_facts()
+        self._check_goals()
+
+    def _check_goals(self) -> None:
+        final = self._final_facts() if self._unbound else {}
         for condition in self._plan.conditions:
-            if not condition_holds(final, condition, self._world):
-                sentence = f"{condition} does not hold when the plan is done"
-                self._report("goal-unmet", sentence, condition=condition)
+            rows = (
+                Literal(FactKey(condition.relation, s), condition.value) for s in condition.subjects
+            )
+            formula = Or(tuple(Holds(row) for row in rows))
+            try:
+                failure = self._states.failure(formula, None, aboard=True)
+            except Undecided:
+                failure = Failure(formula, ())
+            if failure is None:
+                continue
+            if self._unbound and condition_holds(final, condition, self._world):
+                continue
+            sentence = f"{condition} does not hold when the plan is done"
+            if failure.open:
+                sentence = (
+                    f"whether {condition} holds when the plan is done depends on the order of too "
+                    f"many tasks: say which of {', '.join(failure.after)} come first"
+                )
+            self._report("goal-unmet", sentence, condition=condition)
+
+    def _is_plain(self, literal: Literal) -> bool:
+        """Whether it depends on its own variable alone, and on tasks that write it in any case."""
+        variable = literal.variable
+        if self._writers.guarded_mask(variable):
+            return False
+        return read_by(literal, self._values_of, self._world) == {variable}
+
+    def _values_of(self, variable: FactKey) -> set[Value]:
+        values = self._writers.values(variable)
+        return values | {known_value(variable, self._world.facts, self._world)}
+
+    def _at_start(self, variable: FactKey) -> Value:
+        """The value before the plan, as far as it does not depend on which robots actors will be.
+
+        Raises:
+            Undecided: it does.
+        """
+        if actor_in(variable.subject) is not None:
+            needed = self.requirements.get(variable.subject)
+            if needed is None or variable.relation not in needed.facts:
+                raise Undecided
+            return needed.facts[variable.relation][0]
+        value = known_value(variable, self._world.facts, self._world)
+        if self._unbound and (
+            variable.subject in self._world.robots or value in self._world.robots
+        ):
+            raise Undecided
+        return value
+
+    def _holds(self, literal: Literal, value: Value) -> bool:
+        """Whether a plain literal holds where its variable has that value."""
+        return value == literal.value or (
+            value is not None
+            and literal.variable.relation == AT
+            and holds(literal, lambda v: value if v == literal.variable else None, self._world)
+        )
+
+    def _check_formula(self, task: str, formula: Formula, what: str | None = None) -> None:
+        try:
+            failure = self._states.failure(formula, task)
+        except Undecided:
+            return
+        if failure is None:
+            return
+        needs = f"{task} needs {what or formula_text(failure.part)}"
+        names = ", ".join(failure.after)
+        if failure.open:
+            code, why = (
+                "too-many-orders",
+                (
+                    "whether that holds depends on the order of too many tasks: "
+                    f"say which of {names} come first"
+                ),
+            )
+        elif failure.after:
+            code, why = "condition-undone", f"that need not hold after {names}"
+        else:
+            code, why = "condition-unmet", "that does not hold at the start"
+        condition = None
+        if isinstance(failure.part, Holds):
+            (relation, subject), value = failure.part.literal
+            value = bare_name(value) if isinstance(value, str) else value
+            condition = Condition(relation=relation, subject=bare_name(subject), value=value)
+        self._report(code, f"{needs}, and {why}", task, condition)
 
     def _report(
         self, code: str, sentence: str, task: str | None = None, condition: Condition | None = None
@@ -76,10 +191,11 @@ class Causality:
 
     def _check_condition(self, task: str, literal: Literal) -> None:
         graph, variable = self._graph, literal.variable
-        rows = [row for row in self._writers.get(variable, ()) if row[0] != task]
-        restorers = [w for w, value in rows if value == literal.value and graph.precedes(w, task)]
+        rows = [row for row in self._writers.plain.get(variable, ()) if row[0] != task]
+        good = {value for _, value in rows if self._holds(literal, value)}
+        restorers = [w for w, value in rows if value in good and graph.precedes(w, task)]
         for writer, value in rows:
-            if value == literal.value or graph.precedes(task, writer):
+            if value in good or graph.precedes(task, writer):
                 continue
             if not any(graph.precedes(writer, restorer) for restorer in restorers):
                 verb = "makes" if graph.precedes(writer, task) else "may make"
@@ -100,7 +216,7 @@ class Causality:
         if actor_in(wanted) is not None and has in self._world.robots:
             # Who has it must be the actor: something is taken out of a basket, or back.
             self.requirements[str(wanted)].valued.setdefault(variable, task)
-        elif has != wanted:
+        elif not self._holds(literal, has):
             state = "that is not known" if has is None else f"it is {has}"
             self._unmet("condition-unmet", task, literal, f"at the start {state}")
 
@@ -111,6 +227,10 @@ class Causality:
         self._report(code, f"{task} needs {literal}, and {why}", task, condition)
 
     def _check_space(self, task: str, carrier: str) -> None:
+        if carrier in self._world.objects or self._moved_by_chance:
+            if actor_in(carrier) is None:
+                self._check_formula(task, self._has_room(carrier), f"room on or in {carrier}")
+            return
         at_start, planned = self._baskets.before(task, self._actions[task], carrier)
         if actor_in(carrier) is not None:
             requirement = self.requirements[carrier]
@@ -123,6 +243,19 @@ class Causality:
             )
             self._report("no-space", sentence, task)
 
+    def _has_room(self, carrier: str) -> Formula:
+        """That there is room for one more thing, see `room_left`."""
+        if (room := capacity(carrier, self._world)) == inf:
+            return TRUE
+        rows = []
+        for thing in self._world.objects:
+            where = FactKey(AT, thing)
+            if carrier in self._values_of(where):
+                held = Stored(Literal(FactKey(HOLDING, carrier), thing))
+                there = And((Stored(Literal(where, carrier)), Not(held)))
+                rows.append(Total("", "", there, Constant(1)))
+        return Compare(Sum(tuple(rows)), "<", Constant(room))
+
     def _final_facts(self) -> dict[FactKey, Value]:
         """Every variable at the end; unknown where the order of its last writers is open."""
         final: dict[FactKey, Value] = dict(self._world.facts)
@@ -130,7 +263,7 @@ class Causality:
         for actor, requirement in self.requirements.items():
             for relation, (value, _) in requirement.facts.items():
                 final[FactKey(relation, actor)] = value
-        for variable, rows in self._writers.items():
+        for variable, rows in self._writers.plain.items():
             last = {
                 value
                 for writer, value in rows
@@ -138,7 +271,7 @@ class Causality:
             }
             final[variable] = last.pop() if len(last) == 1 else None
         pinned = {actor_arg(actor): robot for actor, robot in self._plan.pins.items()}
-        for variable in self._writers:
+        for variable in self._writers.plain:
             value = final[variable]
             if isinstance(value, str) and value in pinned:
                 value = final[variable] = pinned[value]

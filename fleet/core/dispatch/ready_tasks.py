@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
 from fleet.core.indexes.fleet_index import carried_by
-from fleet.core.model.preconditions import action_of, unmet_before
+from fleet.core.model.preconditions import action_of, unmet_before, variables_of
 from fleet.core.model.skills import Action
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanScope
@@ -108,12 +108,13 @@ def _touches_unwanted_work(state: State, action: Action) -> bool:
 
     That of a robot that is lost, or of a plan that is over, may be carried out as well.
     """
-    variables = action.variables
+    world = state.world()
+    variables = variables_of(action, world)
     for entry in state.plans.values():
         for task in entry.unwanted:
             if task in entry.index.outstanding:
                 other = action_of(entry.records[task], state.skills)
-                if other is None or variables & other.variables:
+                if other is None or variables & variables_of(other, world):
                     return True
     return False
 

@@ -14,8 +14,12 @@ from collections.abc import Iterable, Iterator
 from fleet.core.belief_updates import ONE_VARIABLE_SINCE_LOGIC
 from fleet.core.indexes.fleet_index import carried_by
 from fleet.core.indexes.plan_index import OUTSTANDING
-from fleet.core.model.derived import holds, read_by
-from fleet.core.model.preconditions import action_of
+from fleet.core.model.derived import holds
+from fleet.core.model.formulas.abstraction import reads
+from fleet.core.model.formulas.evaluation import evaluate, expanded
+from fleet.core.model.formulas.nodes import Formula, Holds
+from fleet.core.model.formulas.text import formula_text
+from fleet.core.model.preconditions import ANY, action_of, spoken_of, written_by
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import PlanEntry
@@ -37,13 +41,15 @@ def contradicted(state: State, entry: PlanEntry, fact: Fact) -> PlanEntry | None
     world = state.world()
     for task, needed in _needs_about(state, entry, fact.key):
         record = entry.records[task]
-        if holds(needed, world.facts.get, world) or _is_still_to_be_made(entry, needed, world):
+        if evaluate(needed, world.facts.get, world) or _is_still_to_be_made(
+            entry, needed, fact.key, world
+        ):
             continue
         if record.state in OUTSTANDING and fact.source == record.robot:
             continue
         if state.plans_while_acting and _is_being_made(state, entry, fact):
             return None
-        sentence = f"{record.task} needs {needed}, and {fact.source} says otherwise"
+        sentence = f"{record.task} needs {formula_text(needed)}, and {fact.source} says otherwise"
         return entry.to_replan(
             ReplanScope.REPAIR,
             sentence,
@@ -54,28 +60,39 @@ def contradicted(state: State, entry: PlanEntry, fact: Fact) -> PlanEntry | None
     return None
 
 
-def _needs_about(state: State, entry: PlanEntry, known: FactKey) -> Iterator[tuple[str, Literal]]:
+def _needs_about(state: State, entry: PlanEntry, known: FactKey) -> Iterator[tuple[str, Formula]]:
     """What tasks need of the variable, or of what is where its subject is, as nothing before them
     provides it."""
     variables = [known]
     if known.subject not in state.places and state.logic >= ONE_VARIABLE_SINCE_LOGIC:
         for name in carried_by(state.index, known.subject):
             variables.extend(FactKey(relation, name) for relation in (AT, ON, IN, REACHABLE))
+    variables += [FactKey(relation, ANY) for relation, _ in dict.fromkeys(variables)]
     for variable in dict.fromkeys(variables):
         for task in entry.index.exposed.get(variable, ()):
             action = action_of(entry.records[task], state.skills)
-            if action is not None:
-                yield task, next(row for row in action.before if row.variable == variable)
+            for row in action.before if action is not None else ():
+                if row.variable == variable:
+                    yield task, Holds(row)
+            for formula in action.conditions if action is not None else ():
+                if variable in spoken_of(formula):
+                    yield task, formula
 
 
-def _is_still_to_be_made(entry: PlanEntry, needed: Literal, world: WorldModel) -> bool:
-    """Whether what the need is read off, other than its own variable, is yet to change."""
-    read = read_by(needed, lambda key: (world.facts.get(key),), world) - {needed.variable}
+def _is_still_to_be_made(
+    entry: PlanEntry, needed: Formula, known: FactKey, world: WorldModel
+) -> bool:
+    """Whether what the need is read off, other than the variable that has become known, is yet to
+    change."""
+    formula = expanded(needed, world)
+    read = reads(formula, lambda key: (world.facts.get(key),), world) - {known}
+    if isinstance(needed, Holds):
+        read.discard(needed.literal.variable)
     setters = entry.index.graph.setters
     return any(
         entry.records[task].state not in ENDED_TASKS
         for variable in read
-        for task in setters.get(variable, ())
+        for task in (*setters.get(variable, ()), *setters.get(FactKey(variable.relation, ANY), ()))
     )
 
 
@@ -100,6 +117,9 @@ def _is_of_its_making(record: TaskRecord, action: Action, fact: Fact, world: Wor
         )
 
     if is_said(action.after):
+        return True
+    changed = {*written_by(action)} - {row.variable for row in action.after}
+    if not changed.isdisjoint((fact.key, FactKey(fact.relation, ANY))):
         return True
     begun_s = record.ordered_s if record.started_s is None else record.started_s
     return is_said(action.before) and begun_s is not None and 0.0 < fact.time_s < begun_s

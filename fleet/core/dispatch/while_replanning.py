@@ -9,10 +9,12 @@ each time less is given out meanwhile.
 
 from __future__ import annotations
 
+from fleet.core.model.preconditions import variables_of
 from fleet.core.model.skills import Action
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanReason
 from fleet.core.state import State
+from keyexpr_schema.facts import FactKey
 from keyexpr_schema.payloads.tasks import TaskRecord
 
 
@@ -28,20 +30,23 @@ def waits_for_new_plan(state: State, entry: PlanEntry, record: TaskRecord, actio
         return False
     if stands_still(state, entry) or not entry.is_wanted(record):
         return True
-    if any(_touches(reason, record, action) for reason in reasons):
+    variables = variables_of(action, state.world()) if reasons else frozenset()
+    if any(_touches(reason, record, action, variables) for reason in reasons):
         return True
     if entry.job is None or (entry.discarded == 0 and _keeps_actors(entry)):
         return False
     return entry.discarded > 1 or not _has_begun(state, entry, record)
 
 
-def _touches(reason: ReplanReason, record: TaskRecord, action: Action) -> bool:
+def _touches(
+    reason: ReplanReason, record: TaskRecord, action: Action, variables: frozenset[FactKey]
+) -> bool:
     return (
         reason.whole
         or record.goal in reason.goals
         or record.task in reason.tasks
         or not set(reason.robots).isdisjoint(action.participants)
-        or not set(reason.variables).isdisjoint(action.variables)
+        or not set(reason.variables).isdisjoint(variables)
     )
 
 

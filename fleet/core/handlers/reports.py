@@ -10,7 +10,7 @@ from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.model.durations import learn
-from fleet.core.model.preconditions import action_of, effects_hold, unmet_before
+from fleet.core.model.preconditions import action_of, effects_hold, made_true, unmet_before
 from fleet.core.model.skills import Action
 from fleet.core.model.world import Hopeless
 from fleet.core.plan_entry import PlanEntry
@@ -36,7 +36,7 @@ MAX_ATTEMPTS = 3
 
 def report_received(state: State, event: events.ReportReceived) -> State:
     """A report of an attempt that is not current, or of another planner's, only brings facts."""
-    report = event.report
+    report, before = event.report, state
     for fact in report.facts:
         state = believe(state, fact)
     entry = state.plans.get(report.plan)
@@ -56,7 +56,7 @@ def report_received(state: State, event: events.ReportReceived) -> State:
             record = replace(record, state=TaskState.RUNNING, started_s=report.started_s)
             return set_record(state, entry, record)
         case ReportState.SUCCEEDED:
-            return _succeeded(state, entry, record, report)
+            return _succeeded(state, entry, record, report, before)
         case ReportState.CANCELLED:
             return set_record(state, entry, _ended(record, report, TaskState.CANCELLED))
         case ReportState.FAILED:
@@ -91,11 +91,15 @@ def _again(record: TaskRecord, report: Report) -> TaskRecord:
     )
 
 
-def _succeeded(state: State, entry: PlanEntry, record: TaskRecord, report: Report) -> State:
+def _succeeded(
+    state: State, entry: PlanEntry, record: TaskRecord, report: Report, before: State
+) -> State:
+    """`before` is the state without what the report itself says: effects depend on that."""
     reported = {as_written(state, fact).key for fact in report.facts}
     action = action_of(record, state.skills)
     state = _learned(state, record, report, action)
-    for literal in action.after if action is not None else ():
+    world = before.world()
+    for literal in made_true(action, world.facts, world) if action is not None else ():
         fact = Fact.of(literal, PLANNER_SOURCE, report.ended_s or state.time_s)
         fact = as_written(state, fact)
         if fact.key not in reported:

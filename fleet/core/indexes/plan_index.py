@@ -20,7 +20,7 @@ import msgspec
 from msgspec.structs import replace
 
 from fleet.core.model.durations import late_at_s
-from fleet.core.model.preconditions import action_of
+from fleet.core.model.preconditions import ANY, action_of, spoken_of, written_by
 from fleet.core.model.skills import Skills
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.table import Table
@@ -44,7 +44,8 @@ class PlanGraph:
     `position` is each task's place in the plan, `successors` the tasks that wait for it. `needs`
     are the values that a task needs of variables; `suppliers` the last tasks before it that set
     such a variable, `consumers` the tasks and variables that a task is such a supplier of.
-    `setters` are all tasks that set a variable.
+    `setters` are all tasks that set a variable. What is said of all or some of a type of things is
+    of the subject `ANY`.
     """
 
     def __init__(
@@ -71,15 +72,24 @@ class PlanGraph:
         for name, record in current.items():
             action = action_of(record, skills)
             if action is not None:
-                self.needs[name] = tuple(dict.fromkeys(row.variable for row in action.before))
-                for literal in action.after:
-                    self.setters[literal.variable].append(name)
+                read = [literal.variable for literal in action.before]
+                read += [key for formula in action.conditions for key in spoken_of(formula)]
+                self.needs[name] = tuple(dict.fromkeys(read))
+                for variable in dict.fromkeys(written_by(action)):
+                    self.setters[variable].append(name)
         self.suppliers: dict[tuple[str, FactKey], tuple[str, ...]] = {}
         self.consumers: dict[str, list[tuple[str, FactKey]]] = defaultdict(list)
-        masks = {variable: graph.mask(names) for variable, names in self.setters.items()}
+        masks: dict[FactKey, int] = defaultdict(int)
+        of_relation: dict[str, int] = defaultdict(int)
+        for variable, names in self.setters.items():
+            masks[variable] = graph.mask(names)
+            of_relation[variable.relation] |= masks[variable]
         for name, variables in self.needs.items():
             for variable in variables:
-                if variable in masks and (last := graph.last_before(name, masks[variable])):
+                mask = masks.get(variable, 0) | masks.get(FactKey(variable.relation, ANY), 0)
+                if variable.subject == ANY:
+                    mask = of_relation.get(variable.relation, 0)
+                if mask and (last := graph.last_before(name, mask)):
                     self.suppliers[name, variable] = last
                     for supplier in last:
                         self.consumers[supplier].append((name, variable))

@@ -1,14 +1,22 @@
-"""Tasks as ground actions, and whether those can be applied now."""
+"""Tasks as ground actions, whether those can be applied now, and what they then make true."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from fleet.core.model.derived import holds
+from fleet.core.model.formulas.abstraction import reads
+from fleet.core.model.formulas.effects import Guarded, carried_out, instances
+from fleet.core.model.formulas.evaluation import conjuncts, evaluate, expanded
+from fleet.core.model.formulas.nodes import Formula, Holds, Variable, atoms
+from fleet.core.model.formulas.text import formula_text
 from fleet.core.model.skills import Action, Skills
 from fleet.core.model.world import WorldModel, known_value, room_left
 from keyexpr_schema.facts import FactKey, Literal, Value, render_value
 from keyexpr_schema.payloads.tasks import TaskRecord
+
+ANY = "$"
+"""Stands for the subjects of a formula that is about all or some names of a type."""
 
 
 def action_of(record: TaskRecord, skills: Skills) -> Action | None:
@@ -19,17 +27,41 @@ def action_of(record: TaskRecord, skills: Skills) -> Action | None:
     return skill.ground(record.args)
 
 
+def spoken_of(formula: Formula) -> Iterator[FactKey]:
+    """The variables that a formula names, those of all or some of a type as of `ANY`. What else
+    it may be read off, `variables_of` knows."""
+    for atom in atoms(formula):
+        yield _of_any(atom.key if isinstance(atom, Variable) else atom.literal.variable)
+
+
+def written_by(action: Action) -> Iterator[FactKey]:
+    """The variables that it may write, those of all of a type as of `ANY`."""
+    for literal in action.after:
+        yield literal.variable
+    for effect in action.conditional:
+        yield _of_any(effect.variable)
+
+
+def _of_any(variable: FactKey) -> FactKey:
+    bound = variable.subject.startswith(ANY)
+    return FactKey(variable.relation, ANY) if bound else variable
+
+
 def first_unmet(
     action: Action, facts: Mapping[FactKey, Value], world: WorldModel
-) -> Literal | None:
-    """The first precondition of the action that does not hold in `facts`; baskets aside."""
+) -> Formula | None:
+    """The first precondition of the action that does not hold in `facts`; room aside."""
 
     def value_of(variable: FactKey) -> Value:
         return known_value(variable, facts, world)
 
     for literal in action.before:
         if not holds(literal, value_of, world):
-            return literal
+            return Holds(literal)
+    for formula in action.conditions:
+        if not evaluate(formula, value_of, world):
+            parts = conjuncts(expanded(formula, world))
+            return next((part for part in parts if not evaluate(part, value_of, world)), formula)
     return None
 
 
@@ -40,17 +72,62 @@ def applicable(action: Action, facts: Mapping[FactKey, Value], world: WorldModel
     )
 
 
+def made_true(
+    action: Action, facts: Mapping[FactKey, Value], world: WorldModel
+) -> tuple[Literal, ...]:
+    """What the action makes true if it is done in `facts`: of a variable the last word counts."""
+    if not action.conditional:
+        return action.after
+
+    def value_of(variable: FactKey) -> Value:
+        return known_value(variable, facts, world)
+
+    return (*action.after, *carried_out(_guarded(action, world), value_of, world))
+
+
 def effects_hold(action: Action, world: WorldModel) -> bool:
-    """Whether all that the action makes true is believed already."""
-    return all(holds(literal, world.facts.get, world) for literal in action.after)
+    """Whether all that the action makes true is believed already; a number that it changes may
+    always have to be changed once more."""
+    return all(holds(literal, world.facts.get, world) for literal in action.after) and all(
+        row.to is None
+        and (
+            world.facts.get(row.variable) == row.value
+            or not evaluate(row.when, world.facts.get, world)
+        )
+        for row in _guarded(action, world)
+    )
+
+
+def _guarded(action: Action, world: WorldModel) -> Iterator[Guarded]:
+    return (row for effect in action.conditional for row in instances(effect, world))
+
+
+def variables_of(action: Action, world: WorldModel) -> frozenset[FactKey]:
+    """The variables that the action reads or writes, as things are now."""
+    if not action.conditions and not action.conditional:
+        return action.variables
+
+    def now(variable: FactKey) -> tuple[Value]:
+        return (world.facts.get(variable),)
+
+    read = (expanded(formula, world) for formula in action.conditions)
+    rows = tuple(_guarded(action, world))
+    return action.variables.union(
+        (row.variable for row in rows),
+        *(reads(formula, now, world) for formula in (*read, *(row.when for row in rows))),
+        *(reads(row.to, now, world) for row in rows if row.to is not None),
+    )
 
 
 def unmet_before(action: Action, world: WorldModel) -> str | None:
     """The first precondition that the facts do not grant, as a phrase, or `None`."""
-    literal = first_unmet(action, world.facts, world)
-    if literal is not None:
-        has, wanted = world.value(*literal.variable), literal.value
-        return f"{literal.variable} should be {render_value(wanted)} and is {render_value(has)}"
+    unmet = first_unmet(action, world.facts, world)
+    if isinstance(unmet, Holds):
+        has, wanted = world.value(*unmet.literal.variable), unmet.literal.value
+        variable = unmet.literal.variable
+        return f"{variable} should be {render_value(wanted)} and is {render_value(has)}"
+    if unmet is not None:
+        return f"{formula_text(unmet)} should hold, and does not"
     for carrier in action.space_in:
         if room_left(carrier, world.facts, world) < 1:
             where = f"in {carrier}'s basket" if carrier in world.robots else f"on or in {carrier}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from heapq import heapify, heappop, heappush
 
 
@@ -79,9 +80,39 @@ class TaskGraph:
             bits |= 1 << self._index[task]
         return bits
 
+    def before(self, task: str) -> int:
+        """The tasks that end before it starts in every order, as a bit set."""
+        return self._ancestors[self._index[task]]
+
+    def behind(self, task: str) -> int:
+        """The tasks that it ends before in every order, as a bit set."""
+        return self._descendants[self._index[task]]
+
+    @cached_property
+    def _descendants(self) -> list[int]:
+        found = [0] * len(self.order)
+        for number in reversed(range(len(self.order))):
+            for later in self.successors[self.order[number]]:
+                index = self._index[later]
+                found[number] |= found[index] | 1 << index
+        return found
+
+    def named(self, mask: int) -> tuple[str, ...]:
+        """The tasks in a bit set, in the graph's order."""
+        found = []
+        while mask:
+            bit = mask & -mask
+            found.append(self.order[bit.bit_length() - 1])
+            mask ^= bit
+        return tuple(found)
+
     def last_before(self, task: str, mask: int) -> tuple[str, ...]:
         """Of the tasks in `mask`, those before `task` with no other of them in between."""
-        rest = self._ancestors[self._index[task]] & mask
+        return self.last(self._ancestors[self._index[task]] & mask)
+
+    def last(self, mask: int) -> tuple[str, ...]:
+        """Of the tasks in a bit set, those that no other of them follows."""
+        rest = mask
         found = []
         while rest:
             index = rest.bit_length() - 1

@@ -108,7 +108,7 @@ def merged(candidates: Sequence[Plan], problem: PlanningProblem, keep_order: boo
             for task in ordered
         )
         sequences.append(ActionSequence("", actions, frozenset(robots.values())))
-    tasks, pins = deordered(sequences, problem.first_task)
+    tasks, pins = deordered(sequences, problem.first_task, world=world)
     if keep_order:
         tasks = _with_model_order(tasks, rows, candidates)
     tasks = tuple(replace(task, goal=row.goal) for task, row in zip(tasks, rows, strict=True))

@@ -285,7 +285,10 @@ def _plan(problem: PlanningProblem, choice: Choice, explored: Exploration | None
     """The plan of these sequences; it promises the conditions of goals that have one."""
     sequences = [*choice, *(explored.sequences if explored else ())]
     tasks, pins = deordered(
-        sequences, problem.first_task, one_actor_each=problem.strategy == MONOLITHIC
+        sequences,
+        problem.first_task,
+        one_actor_each=problem.strategy == MONOLITHIC,
+        world=problem.world,
     )
     seeks = frozenset(explored.seeks if explored else ())
     served = {sequence.goal for sequence in choice}

@@ -156,7 +156,7 @@ def expanded(node: Formula, world: TypedInventory) -> Formula:
         case Is(name, kind):
             return TRUE if name in world.of_type(kind) else FALSE
         case Compare(left, relation, right):
-            compared = Compare(_expanded_term(left, world), relation, _expanded_term(right, world))
+            compared = Compare(expanded_term(left, world), relation, expanded_term(right, world))
             if isinstance(compared.left, Constant) and isinstance(compared.right, Constant):
                 return (
                     TRUE if _compare(compared.left.value, relation, compared.right.value) else FALSE
@@ -178,7 +178,8 @@ def expanded(node: Formula, world: TypedInventory) -> Formula:
             )
 
 
-def _expanded_term(node: Term, world: TypedInventory) -> Term:
+def expanded_term(node: Term, world: TypedInventory) -> Term:
+    """The same of a term."""
     match node:
         case Constant():
             return node
@@ -187,9 +188,11 @@ def _expanded_term(node: Term, world: TypedInventory) -> Term:
             return node if found is None else Constant(found)
         case Sum(plus, minus):
             return Sum(
-                tuple(_expanded_term(term, world) for term in plus),
-                tuple(_expanded_term(term, world) for term in minus),
+                tuple(expanded_term(term, world) for term in plus),
+                tuple(expanded_term(term, world) for term in minus),
             )
+        case Total("", "", where, of):
+            return Total("", "", expanded(where, world), expanded_term(of, world))
         case Total(name, kind, where, of):
             # A sum of totals over one name each: `$x` stands in none of them any more.
             rows = []
@@ -198,7 +201,7 @@ def _expanded_term(node: Term, world: TypedInventory) -> Term:
                 condition = expanded(grounded(where, args), world)
                 if condition != FALSE:
                     rows.append(
-                        Total("", "", condition, _expanded_term(grounded_term(of, args), world))
+                        Total("", "", condition, expanded_term(grounded_term(of, args), world))
                     )
             return Sum(tuple(rows))
 

@@ -7,15 +7,16 @@ from dataclasses import replace
 import pytest
 from msgspec.structs import replace as with_fields
 
-from fleet.core.checker.plan_checker import InvalidPlan, check_plan
+from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.core.model.parameter_types import BadType, narrowed, parse_type
 from fleet.core.model.skill_file import skills_from_data
 from fleet.core.model.world import WorldModel
-from fleet.planners.symbolic.search import ground_actions
-from keyexpr_schema.payloads.goals import Condition
+from fleet.planners.base import PlanningProblem
+from fleet.planners.symbolic.planner import SymbolicPlanner
+from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.world import Object
-from tests.support.household import home, manipulator
+from tests.support.household import fact, home, manipulator
 
 THINGS = (
     Object(object="mug_1", kind="mug", label="mug", categories=("cup", "dish"), features=("open",)),
@@ -33,9 +34,9 @@ DUST = {
 def house() -> WorldModel:
     robot = with_fields(manipulator(), skills=(*manipulator().skills, "dust"))
     skills = skills_from_data({"skills": DUST}, "here")
-    return replace(
-        home((robot,)), skills={**home().skills, **skills}, objects={t.object: t for t in THINGS}
-    )
+    world = home((robot,), facts=tuple(fact(t.object, "at", "kitchen") for t in THINGS))
+    things = {thing.object: thing for thing in THINGS}
+    return replace(world, skills={**world.skills, **skills}, objects=things)
 
 
 @pytest.mark.parametrize(
@@ -83,10 +84,9 @@ def test_the_checker_refuses_an_argument_of_another_type() -> None:
     assert not check_plan(dusting("mug_1"), house()).violations
 
 
-def test_actions_are_made_of_arguments_of_the_right_type_only() -> None:
-    world = house()
-    goal = Condition(
-        relation="dusty", subject="mug_1", value=False, any_of=("mug_1", "jar_1", "tv_1")
-    )
-    found = ground_actions(world, ["hsr"], list(world.objects), goal)
-    assert {action.args["object"] for action in found} == {"mug_1", "jar_1"}
+@pytest.mark.parametrize(("thing", "planned"), [("mug_1", True), ("jar_1", True), ("tv_1", False)])
+def test_only_what_is_of_the_type_is_planned_with(thing: str, planned: bool) -> None:
+    wanted = Condition(relation="dusty", subject=thing, value=False)
+    goal = Goal(goal="g", text="dust it", conditions=(wanted,))
+    made = SymbolicPlanner().plan(PlanningProblem("p", (goal,), house()))
+    assert isinstance(made, CheckedPlan) is planned

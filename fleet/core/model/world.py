@@ -10,7 +10,7 @@ from math import inf
 import msgspec
 
 from fleet.core.model.derived import Inventory, holds
-from fleet.core.model.durations import pace, work_s
+from fleet.core.model.durations import only_moves, pace, work_s
 from fleet.core.model.parameter_types import ParameterType, names_of, parse_type
 from fleet.core.model.skills import Action, SkillModel
 from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Literal, Value
@@ -168,8 +168,13 @@ class WorldModel:
         return work_s(self._durations(robot), skill)
 
     def duration_s(self, action: Action, origin: Value, robot: str) -> float:
-        """Seconds that a robot takes for an action, travel from `origin` to it included."""
+        """Seconds that a robot takes for an action, travel from `origin` to it included.
+
+        None to get where it is already.
+        """
         to = action.skill.travel_to
+        if to is not None and origin == action.args[to] and only_moves(action.skill):
+            return 0.0
         travel_s = 0.0 if to is None else self.travel_s(robot, origin, action.args[to])
         return self.work_s(robot, action.skill) + travel_s
 

@@ -130,8 +130,8 @@ def alternatives_for(
         rides_with = world.value(AT, condition.subject)
         spoken_of = (condition.subject, condition.value, rides_with)
         named = frozenset(robot for robot in world.robots if robot in spoken_of)
-        content = tuple((action.skill.name, *action.args.values()) for action in result.actions)
-        sequences.setdefault(content, ActionSequence(subgoal.goal, result.actions, named))
+        sequence = ActionSequence(subgoal.goal, result.actions, named)
+        sequences.setdefault(sequence.lifted, sequence)
     return tuple(sequences.values())[:ALTERNATIVES], found[0][0].facts
 
 

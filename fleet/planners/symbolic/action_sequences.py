@@ -13,8 +13,9 @@ from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import ActionSequence
 from fleet.planners.symbolic.finite_domain import FiniteDomainTask
-from fleet.planners.symbolic.grounding import Facts, Grounding
+from fleet.planners.symbolic.grounding import Grounding
 from fleet.planners.symbolic.impossibility import what_is_missing
+from fleet.planners.symbolic.instantiation import Facts
 from fleet.planners.symbolic.robot_classes import representatives
 from fleet.planners.symbolic.search import Solution, Solver, Unfinished, Unreachable
 from fleet.planners.symbolic.travel import Travel

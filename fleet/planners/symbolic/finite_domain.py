@@ -20,7 +20,7 @@ from fleet.core.model.formulas.nodes import (
 )
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, room_left
-from fleet.planners.symbolic.grounding import Facts
+from fleet.planners.symbolic.instantiation import Facts
 from fleet.planners.symbolic.nodes import Nodes, Stands, State, watch_lists
 from fleet.planners.symbolic.travel import Moves, Travel
 from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value

@@ -9,17 +9,17 @@ costs (`fleet.planners.symbolic.travel`).
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Sequence
-from functools import cache
+from collections.abc import Collection, Sequence
 
 from fleet.core.model import derived
 from fleet.core.model.formulas.evaluation import expanded
 from fleet.core.model.formulas.nodes import And, Formula, Holds, Not, Or, Stored, Variable, atoms
-from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, parse_type
+from fleet.core.model.parameter_types import ROBOT
 from fleet.core.model.skills import Action, SkillModel
-from fleet.core.model.world import WorldModel, known_value, room_left
+from fleet.core.model.world import WorldModel, room_left
+from fleet.planners.symbolic.instantiation import ANY, Binding, Facts, Instantiation
 from fleet.planners.symbolic.readings import is_read_off
-from fleet.planners.symbolic.relevance import Row, few_of_each, related_skills, rows_of
+from fleet.planners.symbolic.relevance import Row
 from keyexpr_schema.facts import (
     AT,
     HELD,
@@ -32,11 +32,6 @@ from keyexpr_schema.facts import (
     Literal,
     Value,
 )
-
-Facts = dict[FactKey, Value]
-Binding = dict[str, str]
-ANY = "?any"
-"""As a wanted value: whatever the variable can be changed to."""
 
 
 class Grounding:
@@ -60,20 +55,9 @@ class Grounding:
         self.goal = goal
         self.robots = robots
         self.free = frozenset(free)
-        self.refused: dict[Literal, list[str]] = defaultdict(list)
-        """Why robots cannot do what would make a literal true."""
         self._thorough = thorough
-        self._skills = related_skills(world, goal)
-        self._writers: dict[str, list[Row]] = defaultdict(list)
-        for skill in self._skills:
-            for row in rows_of(skill):
-                self._writers[row.relation].append(row)
-        self._names = cache(self._names_of)
-        self._all_of = cache(self._set_of)
+        self.skills = Instantiation(world, start, goal, robots, free)
         self._along: set[Literal] = set()
-        self.writable = cache(self._writable)
-        self._fixed_chain = cache(self._chain_if_fixed)
-        self._restores = cache(self._only_from)
         self._wanted: set[Literal] = set()
         self._open: list[Literal] = []
         self._possible: dict[FactKey, set[Value]] = {}
@@ -93,7 +77,10 @@ class Grounding:
     def makers_of(self, literal: Literal) -> list[tuple[SkillModel, Binding]]:
         """The skills that could make a literal true, each with the parameters that this fixes."""
         literal = derived.written(literal, self.world)
-        found = ((row, self._unified(row, literal)) for row in self._writers[literal.variable[0]])
+        found = (
+            (row, self.skills.unified(row, literal))
+            for row in self.skills.writers[literal.variable[0]]
+        )
         return [(row.skill, binding) for row, binding in found if binding is not None]
 
     # What is wanted.
@@ -138,7 +125,9 @@ class Grounding:
                 self._want(Literal(FactKey(HOLDING, robot), NOTHING))
         if self._thorough:
             values += [thing for thing in self._carriers if where in self._around(thing)]
-            values += [thing for thing in self._carriers if self.writable(FactKey(AT, thing))]
+            values += [
+                thing for thing in self._carriers if self.skills.writable(FactKey(AT, thing))
+            ]
         for value in dict.fromkeys(values):
             if value != subject:
                 self._want(Literal(key, value))
@@ -146,7 +135,7 @@ class Grounding:
             return
         around = [*self._around(subject), *(self._carriers if self._thorough else ())]
         for carrier in around:  # it comes along with what carries it
-            if carrier in self.world.objects and self.writable(FactKey(AT, carrier)):
+            if carrier in self.world.objects and self.skills.writable(FactKey(AT, carrier)):
                 literal = Literal(FactKey(AT, carrier), where)
                 if carrier not in (subject, where) and literal not in self._along:
                     self._along.add(literal)
@@ -154,15 +143,15 @@ class Grounding:
 
     def _that_carry(self) -> list[str]:
         """Things that a skill can put others on or in."""
-        kinds = {row.kind_of(row.value) for row in self._writers[AT]} - {None, ROBOT}
+        kinds = {row.kind_of(row.value) for row in self.skills.writers[AT]} - {None, ROBOT}
         return sorted(
             name
             for name in self.world.objects
-            if any(kind is not None and self._fits(kind, name) for kind in kinds)
+            if any(kind is not None and self.skills.fits(kind, name) for kind in kinds)
         )
 
     def _around(self, name: str) -> tuple[str, ...]:
-        return tuple(derived.carriers(name, self._known, self.world, aboard=True))
+        return tuple(derived.carriers(name, self.skills.known, self.world, aboard=True))
 
     def _inside(self, where: str) -> list[str]:
         """A place or thing, and its parts."""
@@ -214,40 +203,39 @@ class Grounding:
     # What makes it true.
 
     def _achieve(self, literal: Literal) -> None:
-        for row in self._writers.get(literal.variable.relation, ()):
-            binding = self._unified(row, literal)
+        for row in self.skills.writers.get(literal.variable.relation, ()):
+            binding = self.skills.unified(row, literal)
             if binding is None:
                 continue
             before = next((b for b in row.skill.before if b.variable == row.variable), None)
             if (
                 before is not None
                 and before.value in row.skill.parameters
-                and self._restores(row.relation, literal.value)
+                and self.skills.restores(row.relation, literal.value)
             ):
                 # It gives back what such actions take: only what has been taken matters.
                 self._waiting[literal.variable].append((row, before, literal))
                 for value in list(self._values(literal.variable)):
                     self._restore(row, before, binding, value)
                 continue
-            for values in self._completed(row.skill, binding, literal):
+            for values in self.skills.completed(row.skill, binding, literal):
                 self._add(row.skill, values)
 
     def _restore(self, row: Row, before: Literal, binding: Binding, value: Value) -> None:
         parameter = str(before.value)
-        if not isinstance(value, str) or not self._fits(row.skill.parameters[parameter], value):
+        if not isinstance(value, str) or not self.skills.fits(
+            row.skill.parameters[parameter], value
+        ):
             return
         if binding.get(parameter, value) == value:
-            for values in self._completed(row.skill, {**binding, parameter: value}, None):
+            for values in self.skills.completed(row.skill, {**binding, parameter: value}, None):
                 self._add(row.skill, values)
 
     def _values(self, variable: FactKey) -> set[Value]:
         """The values that a variable has now or that an action of use gives it."""
         if variable not in self._possible:
-            self._possible[variable] = {self._known(variable)}
+            self._possible[variable] = {self.skills.known(variable)}
         return self._possible[variable]
-
-    def _known(self, variable: FactKey) -> Value:
-        return known_value(variable, self.start, self.world)
 
     def _add(self, skill: SkillModel, args: Binding) -> None:
         key = skill.name, tuple(args[name] for name in skill.parameters)
@@ -269,173 +257,6 @@ class Grounding:
             if value not in known:
                 known.add(value)
                 for row, before, wanted in self._waiting.get(variable, ()):
-                    binding = self._unified(row, wanted)
+                    binding = self.skills.unified(row, wanted)
                     if binding is not None:
                         self._restore(row, before, binding, value)
-
-    def _unified(self, row: Row, literal: Literal) -> Binding | None:
-        """The parameters that are fixed if this row of a skill's effects is the literal."""
-        binding: Binding = {}
-        wanted: list[tuple[Value, Value]] = [(row.variable.subject, literal.variable.subject)]
-        if literal.value != ANY:
-            if row.adds:
-                return None
-            wanted.append((row.value, literal.value))
-        for term, value in wanted:
-            kind = row.kind_of(term)
-            if kind is None:
-                if term != value:
-                    return None
-                continue
-            if not isinstance(value, str) or not self._fits(kind, value):
-                return None
-            if binding.setdefault(str(term), value) != value:
-                return None
-        return {name: value for name, value in binding.items() if name in row.skill.parameters}
-
-    def _completed(
-        self, skill: SkillModel, binding: Binding, literal: Literal | None
-    ) -> Iterator[Binding]:
-        """Every way to fill in the other parameters that no unchanging fact speaks against."""
-        if not self._consistent(skill, binding, literal):
-            return
-        missing = [name for name in skill.parameters if name not in binding]
-        if not missing:
-            yield dict(binding)
-            return
-        fixed = self._fixed_by_facts(skill, binding)
-        if fixed is not None:
-            parameter, value = fixed
-            if isinstance(value, str) and self._fits(skill.parameters[parameter], value):
-                yield from self._completed(skill, {**binding, parameter: value}, literal)
-            return
-        parameter = min(missing, key=lambda name: len(self._names(skill.parameters[name])))
-        for value in self._names(skill.parameters[parameter]):
-            yield from self._completed(skill, {**binding, parameter: value}, literal)
-
-    def _fixed_by_facts(self, skill: SkillModel, binding: Binding) -> tuple[str, Value] | None:
-        """A parameter that only a fact that never changes can give, and the value it gives."""
-        for (relation, subject), value in skill.before:
-            if value not in skill.parameters or value in binding or subject not in binding:
-                continue
-            variable = FactKey(relation, binding[subject])
-            if relation == AT and variable.subject in self.world.objects:
-                chain = self._fixed_chain(variable.subject)
-                if chain is not None:
-                    return str(value), self._place_in(chain, skill.parameters[str(value)])
-            elif not self.writable(variable) and not is_read_off(Literal(variable, ""), self.world):
-                return str(value), self._known(variable)
-        return None
-
-    def _place_in(self, chain: tuple[str, ...], kind: str) -> str | None:
-        """What of all that carries something is meant: the innermost place, or what it is on."""
-        if parse_type(kind).bases == (PLACE,):
-            return next((carrier for carrier in chain if carrier in self.world.places), None)
-        return next(iter(chain), None)
-
-    def _chain_if_fixed(self, name: str) -> tuple[str, ...] | None:
-        """All that carries a thing, if nothing can change that."""
-        try:
-            return tuple(derived.carriers(name, self._unchanging, self.world))
-        except _MayChange:
-            return None
-
-    def _unchanging(self, key: FactKey) -> Value:
-        if self.writable(key):
-            raise _MayChange
-        return self._known(key)
-
-    def _consistent(self, skill: SkillModel, binding: Binding, literal: Literal | None) -> bool:
-        robots = [binding[name] for name in skill.robot_parameters if name in binding]
-        if len(set(robots)) < len(robots):
-            return False
-        for (relation, subject), value in skill.before:
-            if subject not in binding or (value in skill.parameters and value not in binding):
-                continue
-            wanted = binding[value] if isinstance(value, str) and value in binding else value
-            try:
-                if not self._may_hold(Literal(FactKey(relation, binding[subject]), wanted)):
-                    return False
-            except _MayChange:
-                continue
-        return all(
-            self._able(skill, binding, parameter, literal)
-            for parameter in skill.robot_parameters
-            if parameter in binding
-        )
-
-    def _may_hold(self, literal: Literal) -> bool:
-        """Whether a literal holds.
-
-        Raises:
-            _MayChange: it can change whether it does.
-        """
-        (relation, subject), wanted = literal
-        if relation == AT and subject in self.world.objects and wanted in self.world.places:
-            chain = self._fixed_chain(subject)
-            if chain is None:
-                raise _MayChange
-            return next((c for c in chain if c in self.world.places), None) == wanted
-        return derived.holds(literal, self._unchanging, self.world)
-
-    def _able(
-        self, skill: SkillModel, binding: Binding, parameter: str, literal: Literal | None
-    ) -> bool:
-        """Whether its robot can stand for a parameter, as far as what is filled in tells."""
-        complete = len(binding) == len(skill.parameters)
-        measured = {need.of for need in skill.needs.get(parameter, ()) if need.of is not None}
-        if not complete and not measured <= binding.keys():
-            if parameter != skill.actor_parameter:
-                return True
-            return skill.name in self.world.robots[binding[parameter]].skills
-        if not complete and parameter == skill.actor_parameter and self.world.hopeless:
-            return True  # the whole call may be one that is not to be tried again
-        args = {name: binding.get(name, "") for name in skill.parameters}
-        why = self.world.lacks(binding[parameter], skill.ground(args), parameter)
-        if why is not None and literal is not None and why not in self.refused[literal]:
-            self.refused[literal].append(why)
-        return why is None
-
-    def _fits(self, kind: str, name: str) -> bool:
-        if kind == ROBOT:
-            return name in self.robots
-        return name in self._all_of(kind)
-
-    def _set_of(self, kind: str) -> frozenset[str]:
-        return frozenset(self.world.of_type(kind))
-
-    def _names_of(self, kind: str) -> tuple[str, ...]:
-        """Names to fill in for a parameter of which nothing is known."""
-        if kind == ROBOT:
-            return tuple(self.robots)
-        if OBJECT not in parse_type(kind).bases:
-            return self.world.of_type(kind)
-        few = few_of_each(self.world, self.start, self.goal, self._skills)
-        return tuple(n for n in self.world.of_type(kind) if n not in self.world.objects or n in few)
-
-    def _writable(self, variable: FactKey) -> bool:
-        """Whether a skill can change it, for all that is known of types."""
-        relation, subject = variable
-        if relation == AT and subject in self.free:
-            return True
-        return any(
-            kind is not None and self._fits(kind, subject)
-            for row in self._writers.get(relation, ())
-            if (kind := row.kind_of(row.variable.subject)) is not None
-        )
-
-    def _only_from(self, relation: str, value: Value) -> bool:
-        """Whether a variable takes any of its other, listed values only from `value`: nothing else
-        than having had it leads there, as a hand takes something only when it is empty.
-        """
-        for row in self._writers.get(relation, ()):
-            if row.kind_of(row.value) is None:
-                continue
-            before = next((b for b in row.skill.before if b.variable == row.variable), None)
-            if before is None or before.value != value:
-                return False
-        return True
-
-
-class _MayChange(Exception):
-    """What is asked for depends on a variable that a skill changes."""

@@ -15,7 +15,7 @@ from fleet.core.model import derived
 from fleet.core.model.formulas.evaluation import evaluate
 from fleet.core.model.formulas.nodes import Formula, Holds, Not
 from fleet.core.model.world import WorldModel, known_value
-from fleet.planners.symbolic.grounding import Facts
+from fleet.planners.symbolic.instantiation import Facts
 from fleet.planners.symbolic.readings import (
     Assumed,
     TooManyWays,

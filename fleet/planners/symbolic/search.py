@@ -15,7 +15,7 @@ from math import inf
 from fleet.core.model.skills import Action
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.symbolic.finite_domain import FiniteDomainTask
-from fleet.planners.symbolic.grounding import Facts
+from fleet.planners.symbolic.instantiation import Facts
 from fleet.planners.symbolic.nodes import State
 from fleet.planners.symbolic.relaxation import Estimate, Relaxation
 from fleet.planners.symbolic.travel import Moves

@@ -14,10 +14,11 @@ from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import ActionSequence
 from fleet.planners.symbolic.finite_domain import FiniteDomainTask
-from fleet.planners.symbolic.grounding import Facts, Grounding
+from fleet.planners.symbolic.grounding import Grounding
 from fleet.planners.symbolic.impossibility import what_is_missing
+from fleet.planners.symbolic.instantiation import Facts
 from fleet.planners.symbolic.robot_classes import representatives
-from fleet.planners.symbolic.search import Solution, Solver, Unfinished
+from fleet.planners.symbolic.search import Solution, Solver, Unfinished, Unreachable
 from fleet.planners.symbolic.travel import Travel
 from keyexpr_schema.facts import AT, HELD, HOLDING, SEARCHED, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
@@ -180,21 +181,21 @@ def _different_solutions(sought: _Sought, budget: TimeBudget) -> list[Solution] 
     task, travel = sought.task, sought.task.travel
     charge_s = [0.0] * len(task.operators)
     numbers = {id(operator.action): number for number, operator in enumerate(task.operators)}
+    found: Solution | Unreachable | Unfinished | None = sought.solver.solve(charge_s, budget)
+    if isinstance(found, Unfinished):
+        return found
     solutions: list[Solution] = []
-    for _ in range(ALTERNATIVES):
-        found = sought.solver.solve(charge_s, budget, thorough=not solutions)
-        if isinstance(found, Unfinished) and not solutions:
-            return found
-        if not isinstance(found, Solution):
-            break
+    while isinstance(found, Solution):
         solutions.append(found)
+        if len(solutions) == ALTERNATIVES:
+            break
         for action in found.actions:
             number = numbers.get(id(action))
             if number is not None:
                 charge_s[number] += REUSE_CHARGE_S
             else:
-                way = action.actor, str(action.after[0].value)
-                travel.charge_s[way] = travel.charge_s.get(way, 0.0) + REUSE_CHARGE_S
+                travel.charge(action.actor, str(action.after[0].value), REUSE_CHARGE_S)
+        found = sought.solver.another(charge_s, budget)
     return solutions
 
 

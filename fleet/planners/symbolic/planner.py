@@ -33,7 +33,7 @@ from fleet.planners.symbolic.action_sequences import (
     exploration_for,
     subgoals_in_order,
 )
-from fleet.planners.symbolic.grounding import Facts
+from fleet.planners.symbolic.instantiation import Facts
 from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
 from fleet.scheduling.quick_allocation import quick_allocation
 from keyexpr_schema.payloads.plans import Plan

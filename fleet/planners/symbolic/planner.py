@@ -20,6 +20,7 @@ from math import inf, prod
 
 from fleet.core.actors import carried_at_end
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
+from fleet.core.model.derived import is_located
 from fleet.core.model.world import WorldModel
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, Planner, PlanningProblem
@@ -32,10 +33,9 @@ from fleet.planners.symbolic.action_sequences import (
     exploration_for,
     subgoals_in_order,
 )
-from fleet.planners.symbolic.grounding import Facts
+from fleet.planners.symbolic.instantiation import Facts
 from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
 from fleet.scheduling.quick_allocation import quick_allocation
-from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.plans import Plan
 
 MAX_COMBINATIONS = 256
@@ -142,7 +142,7 @@ def _in_time(
 
 def _needs_locating(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
     return any(
-        subject in world.objects and facts.get(FactKey(AT, subject)) is None
+        subject in world.objects and not is_located(subject, facts.get, world)
         for subject in subgoal.condition.subjects
     )
 

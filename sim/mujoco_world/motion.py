@@ -37,6 +37,9 @@ NEAR_M = 0.02
 """A base this close to where it was driven by hand is there."""
 
 
+HELD_UP_S = 5.0
+
+
 class MotionFailed(Exception):
     """A motion fails. The message is one sentence for a person."""
 
@@ -146,14 +149,23 @@ def stow(run: MotionRun) -> Step:
 
 
 def drive_straight(run: MotionRun, goal: PoseMRad, phase: str, speed_m_s: float = 0.25) -> Step:
-    """Move the base without the navigator, slowly, to a pose close by."""
+    """Move the base without the navigator, slowly, to a pose close by.
+
+    Raises:
+        MotionFailed: it stands still before it is there.
+    """
     run.phase = phase
     run.manual = True
     drive = run.robot.drive
     drive.drive(*goal, speed_m_s)
+    still_s = 0.0
     while True:
         yield
         x, y, yaw = run.robot.pose()
         near = math.dist((x, y), goal[:2]) < NEAR_M and abs(wrap(yaw - goal[2])) < 0.02
         if near and not run.robot.moving():
             return
+        still_s = 0.0 if run.robot.moving() else still_s + PERIOD_S
+        if still_s > HELD_UP_S:
+            drive.halt()
+            raise MotionFailed(f"something holds {run.robot.name} up while {phase}")

@@ -136,6 +136,7 @@ def interpretation_input(state: State, goal: str) -> InterpretationInput:
             robots=dict(words.robots),
             whereabouts=dict(words.whereabouts),
             rests=dict(words.rests),
+            carriers=dict(words.carriers),
         ),
         skills=state.skills,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 from msgspec.structs import replace
 
-from fleet.core.indexes.fact_views import FactValues, Resting, Whereabouts
+from fleet.core.indexes.fact_views import Carriers, FactValues, Resting, Whereabouts
 from fleet.core.indexes.fleet_index import NO_FLEET, FleetIndex, index_of
 from fleet.core.indexes.plan_index import EMPTY_INDEX
 from fleet.core.indexes.touches import UNTOUCHED, Touches
@@ -110,13 +110,15 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     def vocabulary(self) -> Vocabulary:
         """The names that sentences can use."""
+        around = Carriers(self.facts, self)
         return Vocabulary(
             self.places,
             self.objects,
             self.robots,
-            Whereabouts(self.facts),
-            Resting(self.facts, self.places),
+            Whereabouts(around, self.objects),
+            Resting(self.facts, around, self.places, self.objects),
             self.policy.skill_phrases,
+            around,
         )
 
     def world(self) -> WorldModel:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import msgspec
 
 from keyexpr_schema.facts import Value
 from keyexpr_schema.payloads.robots import RobotSpec
-from keyexpr_schema.payloads.world import Object, Place
+from keyexpr_schema.payloads.world import Feature, Object, Place
+
+_CARRYING = (Feature.SUPPORTS, Feature.CONTAINS, Feature.PERSON)
 
 
 class SkillPhrase(msgspec.Struct, frozen=True, kw_only=True):
@@ -36,11 +39,13 @@ class SkillPhrase(msgspec.Struct, frozen=True, kw_only=True):
 class Vocabulary:
     """Places, objects and robots that exist, by id.
 
-    `whereabouts` may say at which place (or robot) an object is believed to be; phrases such as
-    "the cup in the kitchen" or "all cups from the kitchen" are told apart by it, and "tidy up the
-    kitchen" is said of what is believed to be there. `rests` may say on which surface (or `floor`)
-    it is believed to lie there: "everything on the coffee table". `skill_phrases` are skills that
-    can be asked for by name, where the grammar has no verb of that name.
+    `whereabouts` may say at which place (or robot, or person) an object is believed to be; phrases
+    such as "the cup in the kitchen" or "all cups from the kitchen" are told apart by it, and "tidy
+    up the kitchen" is said of what is believed to be there. `rests` may say on or in what it is
+    believed to lie there: a thing, a surface, or `floor`. `carriers` may say all that it is on or
+    in, the nearest first: "the fork in the drawer" also of one in a box in that drawer.
+    `skill_phrases` are skills that can be asked for by name, where the grammar has no verb of that
+    name. `speaker` is the person who speaks: "me".
     """
 
     places: Mapping[str, Place]
@@ -49,3 +54,33 @@ class Vocabulary:
     whereabouts: Mapping[str, str] = field(default_factory=dict)
     rests: Mapping[str, str] = field(default_factory=dict)
     skill_phrases: tuple[SkillPhrase, ...] = ()
+    carriers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    speaker: str | None = None
+
+    def is_at(self, name: str, where: str) -> bool:
+        """Whether something is believed to be there, directly or on or in what is there."""
+        known = (self.whereabouts.get(name), self.rests.get(name), *self.carriers.get(name, ()))
+        return where in known
+
+    def place_of(self, name: str) -> str | None:
+        """The place in which a thing is believed to be; a place is its own."""
+        known = (name, *self.carriers.get(name, ()), self.whereabouts.get(name))
+        return next((place for place in known if place in self.places), None)
+
+    @cached_property
+    def good_for(self) -> Mapping[str, frozenset[Feature]]:
+        """What has others on it or in it, or is a person, by id: by itself, or by its parts."""
+        found: dict[str, set[Feature]] = {}
+        for thing in self.objects.values():
+            features = {feature for feature in _CARRYING if thing.is_a(feature)}
+            here: Object | None = thing
+            seen: set[str] = set()
+            while features and here is not None and here.object not in seen:
+                found.setdefault(here.object, set()).update(features)
+                seen.add(here.object)
+                here = self.objects.get(here.part_of) if here.part_of is not None else None
+        return {name: frozenset(features) for name, features in found.items()}
+
+    def is_person(self, name: str) -> bool:
+        """Whether somebody of that name is there, whom things can be given to."""
+        return Feature.PERSON in self.good_for.get(name, ())

@@ -29,6 +29,21 @@ class ActionSequence:
     actions: tuple[Action, ...]
     named: frozenset[str] = frozenset()
 
+    @property
+    def lifted(self) -> tuple[object, ...]:
+        """What is the same for sequences that differ only in who does what, named robots aside."""
+        roles: dict[str, object] = {}
+        for action in self.actions:
+            for robot in action.participants:
+                roles.setdefault(robot, robot if robot in self.named else len(roles))
+        return tuple(
+            (
+                action.skill.name,
+                *(roles.get(value := action.args[name], value) for name in action.skill.parameters),
+            )
+            for action in self.actions
+        )
+
 
 def deordered(
     sequences: Sequence[ActionSequence],

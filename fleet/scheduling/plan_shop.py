@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
+from typing import NamedTuple
 
 from fleet.core.actors import carried_at_end, first_actors
 from fleet.core.checker.plan_checker import CheckedPlan
+from fleet.core.model.durations import only_moves
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
@@ -123,6 +125,13 @@ def plan_shop(
     return PlanShop(shop, tuple(able), robots, graph.order)
 
 
+class _Way(NamedTuple):
+    """The way to a place by a skill that only gets a robot there: nothing to do if it is there."""
+
+    place: str
+    skill: str
+
+
 class _Numbers:
     """Kinds of robots, sites, and how long things take."""
 
@@ -138,7 +147,7 @@ class _Numbers:
                 kinds[what] = len(kinds)
                 self._samples.append(robot)
             self.kind_of[robot] = kinds[what]
-        self._sites: dict[Value, int] = {None: ANYWHERE}
+        self._sites: dict[Value | _Way, int] = {None: ANYWHERE}
         """Those that the plan or a robot is at; `travel_s` is for these."""
         self._durations_s: dict[str, tuple[float, ...]] = {}
 
@@ -152,13 +161,18 @@ class _Numbers:
         """Where the action's robot drives first, and where it is afterwards, if that is said."""
         travel_to = action.skill.travel_to
         target = ANYWHERE if travel_to is None else self.site(action.args[travel_to])
+        if target and travel_to is not None and only_moves(action.skill):
+            way = _Way(action.args[travel_to], action.skill.name)
+            target = self._sites.setdefault(way, len(self._sites))
         place = FactKey(AT, action.actor)
         moved = [value for variable, value in action.after if variable == place]
         return target or None, self.site(moved[-1]) if moved else None
 
     def durations_s(self, action: Action) -> tuple[float, ...]:
-        """By kind of robot, without the travel."""
+        """By kind of robot, without the travel: nothing for those that only travel."""
         skill = action.skill
+        if only_moves(skill):
+            return (0.0,) * len(self._samples)
         if skill.name not in self._durations_s:
             self._durations_s[skill.name] = tuple(
                 self._world.work_s(robot, skill) for robot in self._samples
@@ -169,14 +183,21 @@ class _Numbers:
         """By kind, origin and target."""
         return tuple(
             tuple(
-                tuple(
-                    self._world.travel_s(robot, origin, target) if isinstance(target, str) else 0.0
-                    for target in self._sites
-                )
+                tuple(self._way_s(robot, origin, target) for target in self._sites)
                 for origin in self._sites
             )
             for robot in self._samples
         )
+
+    def _way_s(self, robot: str, origin: Value | _Way, target: Value | _Way) -> float:
+        if isinstance(origin, _Way):
+            origin = origin.place
+        if isinstance(target, _Way):
+            if origin == target.place:
+                return 0.0
+            work_s = self._world.work_s(robot, self._world.skills[target.skill])
+            return work_s + self._world.travel_s(robot, origin, target.place)
+        return self._world.travel_s(robot, origin, target) if isinstance(target, str) else 0.0
 
 
 def _positions(

@@ -214,7 +214,9 @@ def _drawers(name: str, entry: FurnitureEntry, hx: float, hy: float, height: flo
         bottom = high - number * pitch
         half_wall = min(0.5 * pitch - 0.03, 0.05)
         floor = bottom + 0.02
-        handle = (0.0, -hy - PANEL_M - STANDOFF_M, bottom + pitch / 2)
+        # A hand comes from above, with its arm to the left: lower handles are farther left.
+        aside = ((count + 1) / 2 - number) * min(0.2, (2 * hx - 0.2) / count)
+        handle = (aside, -hy - PANEL_M - STANDOFF_M, bottom + pitch / 2)
         wall_z = floor + half_wall
         movers.append(
             Mover(
@@ -312,16 +314,16 @@ def _sink(name: str, entry: FurnitureEntry, hx: float, hy: float, height: float)
 
 
 def _lamp(name: str, entry: FurnitureEntry, hx: float, hy: float, height: float) -> _Parts:
-    foot = min(hx, hy)
-    at = 0.62
+    """A standard lamp, with its button on a bracket, clear of the shade."""
+    foot, at, out = min(hx, hy), 0.60, 0.22
     panels = [
         Panel((0, 0, 0.015), (foot, 0.015, 0), "dark", "cylinder"),
         Panel((0, 0, height / 2), (0.015, height / 2, 0), "metal", "cylinder"),
-        Panel((0, 0, height - 0.12), (max(foot, 0.16), 0.12, 0), "light", "cylinder", main=True),
-        # a little shelf on the pole that carries the button
-        Panel((0, -0.06, at - 0.015), (0.035, 0.055, 0.015), "dark"),
+        Panel((0, 0, height - 0.11), (0.15, 0.11, 0), "light", "cylinder", main=True),
+        Panel((0, -out / 2, at - 0.01), (0.012, out / 2, 0.01), "metal"),
+        Panel((0, -out, at - 0.01), (0.035, 0.035, 0.01), "dark"),
     ]
-    return panels, [], [], (0.0, -0.085, at)
+    return panels, [], [], (0.0, -out, at)
 
 
 def _switch(name: str, entry: FurnitureEntry, hx: float, hy: float, height: float) -> _Parts:

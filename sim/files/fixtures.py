@@ -15,6 +15,8 @@ from keyexpr_schema.payloads.motions import PointM
 from sim.files.furniture_schema import Rgba
 
 PANEL_M = 0.02
+ROOF_M = 0.05
+"""What is not deeper than this below the top of a piece of furniture lies on it."""
 
 Look = Literal["wood", "dark", "front", "metal", "block", "soft", "light", "skin", "cloth", "hair"]
 COLOURS: dict[Look, Rgba] = {
@@ -136,6 +138,16 @@ class Fixture:
     def inward_rad(self) -> float:
         """The heading of who stands before its front and looks at it."""
         return math.remainder(self.yaw_rad + math.pi / 2, math.tau)
+
+    def roofs(self, point_m: PointM) -> bool:
+        """Whether a point of the world frame is in it below its roof: reached from its front."""
+        x, y, z = self.local_m(point_m)
+        return (
+            any(carrier.roofed for carrier in self.all_carriers)
+            and abs(x) < self.half_m[0]
+            and abs(y) < self.half_m[1]
+            and z < self.height_m - ROOF_M
+        )
 
     def mover(self, thing: str) -> Mover | None:
         """What opens `thing`."""

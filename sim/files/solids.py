@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from sim.files.fixtures import PANEL_M
 from sim.files.furniture_schema import PointXY
 from sim.files.world_schema import WorldFile
 
@@ -35,7 +34,12 @@ class Solid:
 
 def solids(world: WorldFile) -> tuple[Solid, ...]:
     """Everything that stands in the way on the floor: outer walls, inner walls, furniture."""
-    return (*_outer_walls(world), *_inner_walls(world), *_furniture(world))
+    return (*walls(world), *_furniture(world))
+
+
+def walls(world: WorldFile) -> tuple[Solid, ...]:
+    """Outer and inner walls."""
+    return (*_outer_walls(world), *_inner_walls(world))
 
 
 def _outer_walls(world: WorldFile) -> list[Solid]:
@@ -95,24 +99,35 @@ def _furniture(world: WorldFile) -> list[Solid]:
 
 
 def barriers(world: WorldFile) -> tuple[Solid, ...]:
-    """What a hand does not reach through on the level: of furniture that is open at its front,
-    its back and its sides, and all else as in `solids`.
+    """What a hand does not reach through on the level: of furniture that is open in front, its back
+    and its sides, of a lamp nothing, and all else as in `solids`.
 
     The doors of cupboards are not counted.
     """
-    found = [*_outer_walls(world), *_inner_walls(world)]
+    found = [*walls(world)]
     for solid in _furniture(world):
         fixture = world.fixtures.by_name[solid.name]
-        if not any(carrier.roofed for carrier in fixture.all_carriers):
-            found.append(solid)
-            continue
-        for number, panel in enumerate(fixture.panels):
-            if min(panel.half_m[:2]) < PANEL_M and panel.half_m[2] > PANEL_M:
-                x, y, _ = fixture.point_m(panel.center_m)
-                half = (panel.half_m[0], panel.half_m[1])
+        if solid.kind == "sink":
+            level = min(carrier.center_m[2] for carrier in fixture.carriers)
+            found.append(replace(solid, height_m=level))
+        elif solid.kind in OPEN_IN_FRONT:
+            for number, panel in enumerate(fixture.panels):
+                (x, y, z), (half_x, half_y, half_z) = panel.center_m, panel.half_m
+                if half_z <= FLAT_M:
+                    continue
+                center = fixture.point_m((x, y, 0.0))[:2]
                 name = f"{solid.name}_{number}"
-                found.append(Solid(solid.kind, name, (x, y), half, solid.yaw_rad, solid.height_m))
+                found.append(
+                    Solid(solid.kind, name, center, (half_x, half_y), solid.yaw_rad, z + half_z)
+                )
+        elif solid.kind != "lamp":
+            found.append(solid)
     return tuple(found)
+
+
+OPEN_IN_FRONT = ("shelf", "cupboard", "fridge", "sofa", "bed")
+FLAT_M = 0.03
+"""Boards are no thicker than twice this: a hand gets over or under them."""
 
 
 def reserves(world: WorldFile) -> tuple[Solid, ...]:

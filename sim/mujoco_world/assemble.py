@@ -1,7 +1,7 @@
 """Puts world file and robot models together into one MuJoCo model.
 
 Names: the robot's parts are `ROBOT/part`; `object/NAME`, `furniture/NAME`, `walls/NAME` and `floor`
-are bodies, and a geom that others rest on has its body's name (a table's top has `furniture/NAME`).
+are bodies; `furnishing` says what furniture consists of.
 An object's body has its origin at the centre of its base.
 """
 
@@ -14,9 +14,10 @@ from typing import Any
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.errors import BadFile
-from sim.files.solids import Solid, solids
+from sim.files.solids import Solid, walls
 from sim.files.world_schema import ObjectKind, WorldFile
 from sim.mujoco_world.description import RobotModel
+from sim.mujoco_world.furnishing import add_fixture, add_holds, add_hollow
 
 STEP_S = 0.005
 """Physics step. 5 ms carries a grasp by friction with the solver settings below."""
@@ -26,12 +27,6 @@ SOLREF = (0.01, 1.0)
 
 FLOOR_RGBA = (0.86, 0.84, 0.80, 1.0)
 WALL_RGBA = (0.94, 0.93, 0.90, 1.0)
-TABLE_RGBA = (0.72, 0.53, 0.35, 1.0)
-LEG_RGBA = (0.45, 0.33, 0.22, 1.0)
-BLOCK_RGBA = (0.55, 0.62, 0.66, 1.0)
-
-TOP_THICKNESS_M = 0.03
-LEG_HALF_M = 0.025
 
 
 def compile_world(world: WorldFile, robots: Sequence[tuple[str, RobotModel]]) -> Any:
@@ -44,6 +39,7 @@ def compile_world(world: WorldFile, robots: Sequence[tuple[str, RobotModel]]) ->
 
     spec = mujoco.MjSpec()
     spec.modelname = world.world
+    spec.compiler.degree = False
     option = spec.option
     option.timestep = STEP_S
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -56,12 +52,11 @@ def compile_world(world: WorldFile, robots: Sequence[tuple[str, RobotModel]]) ->
     option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
 
     _add_floor(spec, world)
-    for solid in solids(world):
-        if solid.kind == "wall":
-            # A body each: the box around all walls holds every robot, and each would be looked at.
-            _add_wall(spec.worldbody.add_body(name=f"walls/{solid.name}"), solid)
-        else:
-            _add_furniture(spec.worldbody, solid)
+    for solid in walls(world):
+        # A body each: the box around all walls holds every robot, and each would be looked at.
+        _add_wall(spec.worldbody.add_body(name=f"walls/{solid.name}"), solid)
+    for fixture in world.fixtures.by_name.values():
+        add_fixture(spec, fixture)
     for name in world.object_entries:
         _add_object(spec.worldbody, world, name)
     for name, model in robots:
@@ -75,6 +70,7 @@ def compile_world(world: WorldFile, robots: Sequence[tuple[str, RobotModel]]) ->
         for one, two in itertools.combinations(bodies, 2):
             # A robot's controllers keep it out of its own way.
             spec.add_exclude(bodyname1=f"{name}/{one}", bodyname2=f"{name}/{two}")
+    add_holds(spec, world, robots)
     for geom in spec.geoms:
         geom.solref[:2] = SOLREF
     try:
@@ -97,11 +93,7 @@ def yaw_of(pose_quaternion: Any) -> float:
 def pose_in(world: WorldFile, name: str) -> tuple[tuple[float, float, float], PoseMRad]:
     """An object's start: base centre (x, y, z), and (x, y, yaw)."""
     x, y, z = world.start_point_m(name)
-    entry = world.object_entries[name]
-    yaw = math.radians(entry.yaw_deg)
-    if entry.on in world.furniture:
-        yaw += math.radians(world.furniture[entry.on].yaw_deg)
-    return (x, y, z), (x, y, yaw)
+    return (x, y, z), (x, y, world.start_yaw_rad(name))
 
 
 def _add_floor(spec: Any, world: WorldFile) -> None:
@@ -130,50 +122,15 @@ def _add_wall(wall: Any, solid: Solid) -> None:
     )
 
 
-def _add_furniture(worldbody: Any, solid: Solid) -> None:
-    import mujoco
-
-    name = f"furniture/{solid.name}"
-    body = worldbody.add_body(
-        name=name, pos=(*solid.center_m, 0.0), quat=yaw_quaternion(solid.yaw_rad)
-    )
-    box = mujoco.mjtGeom.mjGEOM_BOX
-    (half_x, half_y), height = solid.half_m, solid.height_m
-    if solid.kind == "block":
-        body.add_geom(
-            name=name,
-            type=box,
-            size=(half_x, half_y, height / 2),
-            pos=(0.0, 0.0, height / 2),
-            rgba=BLOCK_RGBA,
-        )
-        return
-    half_top = min(TOP_THICKNESS_M, height / 2) / 2
-    body.add_geom(
-        name=name,
-        type=box,
-        size=(half_x, half_y, half_top),
-        pos=(0.0, 0.0, height - half_top),
-        rgba=TABLE_RGBA,
-        friction=(0.8, 0.005, 0.0001),
-    )
-    half_leg = height / 2 - half_top
-    inset = 2 * LEG_HALF_M
-    for number, (sx, sy) in enumerate(itertools.product((-1, 1), (-1, 1))):
-        body.add_geom(
-            name=f"{name}/leg_{number}",
-            type=box,
-            size=(LEG_HALF_M, LEG_HALF_M, half_leg),
-            pos=(sx * max(half_x - inset, 0.0), sy * max(half_y - inset, 0.0), half_leg),
-            rgba=LEG_RGBA,
-        )
-
-
 def _add_object(worldbody: Any, world: WorldFile, name: str) -> None:
     entry, kind = world.object_entries[name], world.kind_of(name)
     point, (_, _, yaw) = pose_in(world, name)
     body = worldbody.add_body(name=f"object/{name}", pos=point, quat=yaw_quaternion(yaw))
     body.add_freejoint(name=f"object/{name}")
+    options = {"rgba": entry.rgba or kind.rgba, "friction": (0.8, 0.01, 0.001)}
+    if kind.hollow:
+        add_hollow(body, f"object/{name}", kind, **options)
+        return
     shape, size = _shape(kind)
     body.add_geom(
         name=f"object/{name}",
@@ -181,8 +138,7 @@ def _add_object(worldbody: Any, world: WorldFile, name: str) -> None:
         size=size,
         pos=(0.0, 0.0, kind.extent_m[2] / 2),
         mass=kind.mass_kg,
-        rgba=entry.rgba or kind.rgba,
-        friction=(0.8, 0.01, 0.001),
+        **options,
     )
 
 

@@ -23,12 +23,17 @@ from sim.mujoco_world.base_motions import approach, fold, go_to, look
 from sim.mujoco_world.collisions import Collisions
 from sim.mujoco_world.description import load_description
 from sim.mujoco_world.drawing import FrameDrawer, draw_scene
-from sim.mujoco_world.grasping import grasp, release
-from sim.mujoco_world.handover import release_in_basket
+from sim.mujoco_world.grasping import release
+from sim.mujoco_world.handover import release_in_basket, take
+from sim.mujoco_world.mechanisms import Mechanisms
 from sim.mujoco_world.motion import MotionContext, MotionFailed, MotionRun, Steps
 from sim.mujoco_world.observer import Observer
+from sim.mujoco_world.opening import close_thing, open_thing
+from sim.mujoco_world.placing import hand_over, place_at
 from sim.mujoco_world.robot_body import RobotBody
+from sim.mujoco_world.switching import switch
 from sim.navigation import Navigator
+from sim.states import ThingStates
 
 STEPS = round(PERIOD_S / STEP_S)
 WATCH_EVERY = 2
@@ -41,17 +46,17 @@ MOTIONS: dict[MotionKind, Callable[[MotionContext, MotionRun], Steps]] = {
     MotionKind.GO_TO: go_to,
     MotionKind.LOOK: look,
     MotionKind.APPROACH: approach,
-    MotionKind.GRASP: grasp,
+    MotionKind.GRASP: take,
     MotionKind.RELEASE: release,
     MotionKind.RELEASE_IN_BASKET: release_in_basket,
     MotionKind.STOW: fold,
+    MotionKind.PLACE_AT: place_at,
+    MotionKind.HAND_OVER: hand_over,
+    MotionKind.OPEN: open_thing,
+    MotionKind.CLOSE: close_thing,
+    MotionKind.SWITCH_ON: switch,
+    MotionKind.SWITCH_OFF: switch,
 }
-
-
-def _not_yet(context: MotionContext, run: MotionRun) -> Steps:
-    """A motion that this world does not have."""
-    yield from ()
-    raise MotionFailed(f"no robot of the physical world can {run.motion.kind.value} things")
 
 
 class MujocoBackend(Backend):
@@ -93,8 +98,14 @@ class MujocoBackend(Backend):
             navigator.add_robot(
                 spec.robot, start, found.description.clearance_m, spec.capabilities["drive"]
             )
-        observer = Observer(self._model, self._data, world, self._bodies, seed)
-        self._context = MotionContext(world, self._bodies, navigator, observer)
+        self._mechanisms = Mechanisms(
+            self._model, self._data, world, self._bodies, ThingStates(world)
+        )
+        navigator.look_out_for(self._mechanisms.obstacles)
+        observer = Observer(
+            self._model, self._data, world, self._bodies, self.things, self._mechanisms, seed
+        )
+        self._context = MotionContext(world, self._bodies, navigator, observer, self._mechanisms)
         self._collisions = Collisions(self._model, self._data, self._bodies)
         self._runs: dict[str, MotionRun] = {}
         self._ctrl = self._data.ctrl.copy()
@@ -125,7 +136,7 @@ class MujocoBackend(Backend):
 
     def _begin(self, robot: str, motion: Motion) -> None:
         run = self._runs[robot] = MotionRun(self._bodies[robot], motion, self.time_s)
-        run.steps = MOTIONS.get(motion.kind, _not_yet)(self._context, run)
+        run.steps = MOTIONS[motion.kind](self._context, run)
 
     def _stop(self, robot: str) -> None:
         run = self._runs.get(robot)
@@ -152,6 +163,7 @@ class MujocoBackend(Backend):
         for robot, body in self._bodies.items():
             self._steer(robot, body)
         self._physics()
+        self._mechanisms.advance(self.time_s, context.observer.contents)
 
     def _resume(self, robot: str, run: MotionRun) -> None:
         try:
@@ -178,6 +190,7 @@ class MujocoBackend(Backend):
         detections: tuple[Detection, ...] = (),
     ) -> None:
         run.steps.close()
+        self._mechanisms.let_go(robot)
         self._context.navigator.cancel(robot)
         self._bodies[robot].freeze()
         run.ended = MotionOutcome(
@@ -213,6 +226,7 @@ class MujocoBackend(Backend):
             self._context.observer.note_sleepers()
             if step % WATCH_EVERY == 0:
                 self._collisions.watch(self.time_s, runs)
+                self._mechanisms.watch(self.time_s)
         self.time_s = round(self.time_s + PERIOD_S, 6)
 
     def _runs_still(self, robot: str) -> bool:

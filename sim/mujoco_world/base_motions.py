@@ -27,7 +27,7 @@ def go_to(context: MotionContext, run: MotionRun) -> Steps:
     assert place is not None
     yield from stow(run)
     run.phase = f"driving to {place}"
-    yield from _navigate(context, run, lambda: context.navigator.go_to_place(run.robot.name, place))
+    yield from navigate(context, run, lambda: context.navigator.go_to_place(run.robot.name, place))
     x, y, _ = run.robot.pose()
     if context.world.place_at(x, y) != place:
         raise MotionFailed(f"it stopped at ({x:.2f}, {y:.2f}), which is not in {place}")
@@ -46,8 +46,8 @@ def approach(context: MotionContext, run: MotionRun) -> Steps:
         # that reaches into its basket.
         run.guest_of = host
         yield
-    reach = _reach_m(run) if host is None else BESIDE_ROBOT_M
-    yield from _navigate(
+    reach = reach_m(run) if host is None else BESIDE_ROBOT_M
+    yield from navigate(
         context, run, lambda: context.navigator.approach(run.robot.name, point, reach)
     )
     return ()
@@ -62,7 +62,7 @@ def _robot_at(context: MotionContext, run: MotionRun, point: PointM) -> str | No
     return None
 
 
-def _reach_m(run: MotionRun) -> tuple[float, float]:
+def reach_m(run: MotionRun) -> tuple[float, float]:
     """How far from a point a robot may stand to reach it, (least, greatest), m."""
     about = run.robot.description
     if about.arm is None:
@@ -88,6 +88,9 @@ def look(context: MotionContext, run: MotionRun) -> Steps:
         for name in context.observer.in_view(robot):
             if name not in seen and robot.held != name and context.observer.sees(robot, name):
                 seen[name] = context.observer.detect(robot, name)
+        for name in context.observer.noticed:
+            if name not in seen and context.observer.notices(robot, name):
+                seen[name] = context.observer.detect_fixture(name)
         yield
         yaw = robot.pose()[2]
         turned += wrap(yaw - last)
@@ -95,7 +98,8 @@ def look(context: MotionContext, run: MotionRun) -> Steps:
     robot.drive.halt()
     while robot.moving():
         yield
-    return tuple(seen[name] for name in context.world.object_entries if name in seen)
+    order = (*context.world.object_entries, *context.observer.noticed)
+    return tuple(seen[name] for name in order if name in seen)
 
 
 def fold(context: MotionContext, run: MotionRun) -> Steps:
@@ -107,7 +111,7 @@ def fold(context: MotionContext, run: MotionRun) -> Steps:
     return ()
 
 
-def _navigate(context: MotionContext, run: MotionRun, ask: Callable[[], None]) -> Step:
+def navigate(context: MotionContext, run: MotionRun, ask: Callable[[], None]) -> Step:
     """Have the navigator bring the robot somewhere, and wait until it stands there."""
     try:
         ask()

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 from keyexpr_schema.payloads.motions import PointM
+from keyexpr_schema.payloads.robots import PoseMRad
 from sim.mujoco_world.arm import Arm, Gripper
 from sim.mujoco_world.base_controllers import PERIOD_S
 from sim.mujoco_world.base_motions import distance_m
@@ -19,6 +20,7 @@ from sim.mujoco_world.motion import (
     MotionRun,
     Step,
     Steps,
+    drive_straight,
     face,
     move_arm,
     stow,
@@ -45,6 +47,14 @@ RELEASE_LIFT_M = 0.004
 
 RELEASE_OPENING_M = 0.025
 CLEARANCE_M = 0.005
+
+BASKET_OPENING_M = 0.012
+"""In a basket the fingers open only this much, so as not to push against its walls."""
+
+ROOM_M = 0.38
+"""So far from where it reaches in under a roof a robot unfolds its arm."""
+
+REACH_IN_M_S = 0.12
 
 
 @dataclass(frozen=True)
@@ -77,7 +87,12 @@ def grasp(context: MotionContext, run: MotionRun) -> Steps:
     target = (point[0], point[1], point[2] + grip_m)
     path = reach_down(arm, target, context.observer.opening_rad(name))
     robot.grip_above_base_m = grip_m
+    opening_m = gripper.entry.open_m
+    if run.motion.robot is not None:
+        opening_m = _grip_width_m(context, name) / 2 + BASKET_OPENING_M
     try:
+        gripper.open(opening_m)
+        yield from reach_over(context, run, point, path)
         yield from _take(run, path, name)
     except MotionFailed:
         robot.let_go()
@@ -95,11 +110,9 @@ def _take(run: MotionRun, path: Reach, name: str) -> Step:
     """
     robot = run.robot
     _, gripper = hand_of(robot)
-    gripper.open()
-    yield from move_arm(run, path.above, "moving the hand above the object")
     yield from move_arm(run, path.at, "lowering the hand", slower=1.5)
     robot.reaching_for = name
-    yield from _close(run, gripper, name)
+    yield from close_on(run, gripper, name)
     yield from move_arm(run, path.above, f"lifting {name}", slower=2.0)
     yield from wait(SETTLE_S)
     if not (robot.held == name and gripper.feels()):
@@ -113,6 +126,26 @@ def release(context: MotionContext, run: MotionRun) -> Steps:
     """Set the held object down so that its base touches a point."""
     point = run.motion.point_m
     assert point is not None
+    yield from set_down(context, run, point)
+    return ()
+
+
+def set_down(
+    context: MotionContext,
+    run: MotionRun,
+    point: PointM,
+    *,
+    into: str | None = None,
+    above_m: float = 0.0,
+    opening_m: float = RELEASE_OPENING_M,
+) -> Step:
+    """Set the held object down at a point: on or in the thing `into`, if that is given, and let go
+    `above_m` above it.
+
+    Raises:
+        MotionFailed: it is out of reach, something stands there, or the object is still in the hand
+            or lost.
+    """
     robot = run.robot
     arm, _ = hand_of(robot)
     held = held_by(robot)
@@ -120,18 +153,59 @@ def release(context: MotionContext, run: MotionRun) -> Steps:
     _check_reach(run, point)
     run.handling = True
     yield from face(run, point[0], point[1])
-    _check_free(context, robot, held, point)
-    target = (point[0], point[1], point[2] + robot.grip_above_base_m + RELEASE_LIFT_M)
-    path = reach_down(arm, target, None)
+    _check_free(context, robot, held, point, into)
+    lift = robot.grip_above_base_m + RELEASE_LIFT_M + above_m
+    path = reach_down(arm, (point[0], point[1], point[2] + lift), None)
     try:
-        yield from move_arm(run, path.above, "moving the hand above the point", slower=1.5)
+        yield from reach_over(context, run, point, path, slower=1.5)
         # folded, the arm hid from the camera what is straight ahead
-        _check_free(context, robot, held, point)
-        yield from let_down(run, path, held, RELEASE_OPENING_M)
+        _check_free(context, robot, held, point, into)
+        yield from let_down(run, path, held, opening_m)
     except MotionFailed:
         yield from stow(run)
         raise
-    return ()
+
+
+def reach_over(
+    context: MotionContext, run: MotionRun, point: PointM, path: Reach, slower: float = 1.0
+) -> Step:
+    """Bring the hand above a point: from above or, under a roof, from the front.
+
+    Raises:
+        MotionFailed: something is in the way.
+    """
+    if any(fixture.roofs(point) for fixture in context.world.fixtures.by_name.values()):
+        yield from reach_in(context, run, path, ROOM_M, slower)
+    else:
+        yield from move_arm(run, path.above, "moving the hand above the point", slower=slower)
+
+
+def reach_in(
+    context: MotionContext, run: MotionRun, path: Reach, back_m: float, slower: float = 1.0
+) -> Step:
+    """Unfold the arm `back_m` farther back, and drive up with it.
+
+    An arm that unfolds reaches out farther, and lower, than where it comes to in the end.
+
+    Raises:
+        MotionFailed: something is in the way.
+    """
+    robot = run.robot
+    start = robot.pose()
+    back = behind(start, back_m)
+    run.phase = "waiting for room to stand back"
+    while not context.navigator.reserve(robot.name, [back[:2], start[:2]]):
+        yield
+    yield from drive_straight(run, back, "standing back")
+    robot.way_out = back
+    yield from move_arm(run, path.above, "reaching out", slower=slower)
+    yield from drive_straight(run, start, "reaching in", REACH_IN_M_S)
+
+
+def behind(pose: PoseMRad, back_m: float) -> PoseMRad:
+    """The pose so far behind another one."""
+    x, y, yaw = pose
+    return (x - back_m * math.cos(yaw), y - back_m * math.sin(yaw), yaw)
 
 
 def let_down(run: MotionRun, path: Reach, held: str, opening_m: float) -> Step:
@@ -222,13 +296,17 @@ def reach_down(arm: Arm, target: PointM, opening_rad: float | None) -> Reach:
         at = arm.solve(target, seed, opening_rad)
         if at is None:
             continue
+        hit = arm.obstacle(at)
+        if hit is not None:
+            touched = hit
+            continue
         for hover in HOVERS_M:
             above = arm.solve((x, y, z + hover), at, opening_rad)
             if above is not None:
-                touched = arm.obstacle(at) or arm.obstacle(above)
-                if touched is None:
+                hit = arm.obstacle(above)
+                if hit is None:
                     return Reach(above=above, at=at)
-                break
+                touched = hit
     if touched is not None:
         raise MotionFailed(f"the arm would touch {touched}: approach the point from another side")
     raise MotionFailed(
@@ -236,7 +314,7 @@ def reach_down(arm: Arm, target: PointM, opening_rad: float | None) -> Reach:
     )
 
 
-def _close(run: MotionRun, gripper: Gripper, name: str) -> Step:
+def close_on(run: MotionRun, gripper: Gripper, name: str) -> Step:
     """Close the hand until both fingers press on something.
 
     Raises:
@@ -254,17 +332,27 @@ def _close(run: MotionRun, gripper: Gripper, name: str) -> Step:
             raise MotionFailed(f"the hand closed on nothing: {name} is not between the fingers")
 
 
-def _check_free(context: MotionContext, robot: RobotBody, held: str, point: PointM) -> None:
+def _check_free(
+    context: MotionContext, robot: RobotBody, held: str, point: PointM, into: str | None
+) -> None:
     """Raises `MotionFailed` where the camera sees something standing on the point."""
     for name in context.world.object_entries:
-        if name == held or not context.observer.sees(robot, name):
+        if name in (held, into) or not context.observer.sees(robot, name):
             continue
-        seen = context.observer.detect(robot, name).point_m
+        detection = context.observer.detect(robot, name)
+        if detection.support == held:
+            continue  # it goes where the held one goes
+        seen = detection.point_m
         room = (width_m(context, name) + width_m(context, held)) / 2 + 0.03
         if math.dist(seen, point) < room:
             raise MotionFailed(
                 f"{name} stands where {held} was to be set down; keep {room:.2f} m from it"
             )
+
+
+def _grip_width_m(context: MotionContext, name: str) -> float:
+    """The smaller horizontal extent of an object [m], across which the hand takes it."""
+    return min(context.world.kind_of(name).extent_m[:2])
 
 
 def width_m(context: MotionContext, name: str) -> float:

@@ -6,24 +6,29 @@ import math
 from collections.abc import Generator
 
 from keyexpr_schema.payloads.motions import PointM
-from keyexpr_schema.payloads.robots import PoseMRad
-from sim.files.solids import solids
-from sim.mujoco_world.base_controllers import wrap
 from sim.mujoco_world.base_motions import distance_m
 from sim.mujoco_world.grasping import (
+    BASKET_OPENING_M,
     RELEASE_LIFT_M,
     Reach,
+    grasp,
     hand_of,
     held_by,
     let_down,
     reach_down,
     width_m,
 )
-from sim.mujoco_world.motion import MotionContext, MotionFailed, MotionRun, Step, Steps, face, stow
+from sim.mujoco_world.motion import (
+    MotionContext,
+    MotionFailed,
+    MotionRun,
+    Step,
+    Steps,
+    drive_straight,
+    face,
+    stow,
+)
 from sim.mujoco_world.robot_body import RobotBody
-
-BASKET_OPENING_M = 0.012
-"""In a basket the fingers open only this much, so as not to push against its walls."""
 
 CLOSE_IN_M = 1.15
 CLOSE_IN_M_S = 0.25
@@ -63,9 +68,40 @@ def release_in_basket(context: MotionContext, run: MotionRun) -> Steps:
         yield from let_down(run, path, held, BASKET_OPENING_M)
     except MotionFailed:
         yield from stow(run)
-        yield from _drive_straight(run, start, "backing off")
+        yield from drive_straight(run, start, "backing off")
         raise
-    yield from _drive_straight(run, start, "backing off")
+    yield from drive_straight(run, start, "backing off")
+    return ()
+
+
+def take(context: MotionContext, run: MotionRun) -> Steps:
+    """Close the hand on an object: where it lies, or in the basket of the robot that is named."""
+    if run.motion.robot is None:
+        return (yield from grasp(context, run))
+    other = context.robots[run.motion.robot]
+    name = run.motion.object
+    assert name is not None
+    if other.basket < 0:
+        raise MotionFailed(f"{other.name} has no basket")
+    run.guest_of = other.name
+    run.handling = True
+    yield from stow(run)
+    run.phase = f"waiting for {other.name} to stand still"
+    while other.moving():
+        yield
+    if name not in context.observer.basket(other):
+        raise MotionFailed(f"{name} is not in the basket of {other.name}")
+    start = run.robot.pose()
+    point = context.observer.base_point(name)
+    try:
+        yield from face(run, point[0], point[1])
+        yield from _close_in(context, run, point, other)
+        yield from grasp(context, run)
+    except MotionFailed:
+        yield from stow(run)
+        yield from drive_straight(run, start, "backing off")
+        raise
+    yield from drive_straight(run, start, "backing off")
     return ()
 
 
@@ -116,16 +152,16 @@ def _close_in(context: MotionContext, run: MotionRun, spot: PointM, other: Robot
     apart = robot.description.radius_m + other.description.radius_m + APART_M
     if math.dist(goal[:2], other.pose()[:2]) < apart:
         raise MotionFailed(f"to reach that spot it would run into {other.name}")
-    blocker = _in_the_way(context, run, other, (x, y), goal[:2])
+    blocker = in_the_way(context, run, other, (x, y), goal[:2])
     if blocker is not None:
         raise MotionFailed(f"{blocker} is in the way to the basket of {other.name}")
-    yield from _drive_straight(run, goal, f"driving up to {other.name}")
+    yield from drive_straight(run, goal, f"driving up to {other.name}")
 
 
-def _in_the_way(
+def in_the_way(
     context: MotionContext,
     run: MotionRun,
-    host: RobotBody,
+    host: RobotBody | None,
     start: tuple[float, float],
     goal: tuple[float, float],
 ) -> str | None:
@@ -135,7 +171,7 @@ def _in_the_way(
     for step in range(11):
         share = step / 10
         x, y = (a + share * (b - a) for a, b in zip(start, goal, strict=True))
-        for solid in solids(context.world):
+        for solid in context.solids:
             if solid.distance_m(x, y) < room:
                 return solid.name
         for other in context.robots.values():
@@ -144,19 +180,6 @@ def _in_the_way(
             if math.dist(other.pose()[:2], (x, y)) < room + other.description.clearance_m:
                 return other.name
     return None
-
-
-def _drive_straight(run: MotionRun, goal: PoseMRad, phase: str) -> Step:
-    """Move the base by hand, slowly, to a pose close by."""
-    run.phase = phase
-    drive = run.robot.drive
-    drive.drive(*goal, CLOSE_IN_M_S)
-    while True:
-        yield
-        x, y, yaw = run.robot.pose()
-        near = math.dist((x, y), goal[:2]) < 0.02 and abs(wrap(yaw - goal[2])) < 0.02
-        if near and not run.robot.moving():
-            return
 
 
 def _free_spots(context: MotionContext, other: RobotBody, held: str) -> list[PointM]:

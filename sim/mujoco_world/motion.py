@@ -9,10 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Generator
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from keyexpr_schema.payloads.motions import Detection, Motion, MotionOutcome
+from keyexpr_schema.payloads.robots import PoseMRad
+from sim.files.solids import Solid, solids
 from sim.files.world_schema import WorldFile
 from sim.mujoco_world.base_controllers import PERIOD_S, wrap
+from sim.mujoco_world.mechanisms import Mechanisms
 from sim.mujoco_world.observer import Observer
 from sim.mujoco_world.robot_body import RobotBody
 from sim.navigation import Leg, Navigator
@@ -29,6 +33,10 @@ BLOCKED_S = 2.5
 """An arm that is not at its setpoints this long after is held up by something."""
 
 
+NEAR_M = 0.02
+"""A base this close to where it was driven by hand is there."""
+
+
 class MotionFailed(Exception):
     """A motion fails. The message is one sentence for a person."""
 
@@ -41,7 +49,13 @@ class MotionContext:
     robots: dict[str, RobotBody]
     navigator: Navigator
     observer: Observer
+    mechanisms: Mechanisms
     legs: dict[str, Leg] = field(default_factory=dict)
+
+    @cached_property
+    def solids(self) -> tuple[Solid, ...]:
+        """What stands on the floor."""
+        return solids(self.world)
 
 
 @dataclass
@@ -118,11 +132,28 @@ def stow(run: MotionRun) -> Step:
     x, y, z = arm.grip_point()
     radius = math.dist(robot.pose()[:2], (x, y))
     if radius > robot.description.clearance_m:
-        for rise in (0.15, 0.10, 0.06, 0.03):
+        for rise in (0.15, 0.10, 0.06, 0.03) if robot.way_out is None else (0.03, 0.015):
             above = arm.solve((x, y, z + rise), arm.setpoint)
-            if above is not None:
+            if above is not None and arm.obstacle(above) is None:
                 yield from move_arm(run, above, "raising the hand")
                 break
+    if robot.way_out is not None:
+        yield from drive_straight(run, robot.way_out, "drawing the arm out")
+        robot.way_out = None
     yield from move_arm(run, list(arm.entry.stow), "folding the arm")
     if robot.held is None and robot.gripper is not None:
         robot.gripper.open(0.0)
+
+
+def drive_straight(run: MotionRun, goal: PoseMRad, phase: str, speed_m_s: float = 0.25) -> Step:
+    """Move the base without the navigator, slowly, to a pose close by."""
+    run.phase = phase
+    run.manual = True
+    drive = run.robot.drive
+    drive.drive(*goal, speed_m_s)
+    while True:
+        yield
+        x, y, yaw = run.robot.pose()
+        near = math.dist((x, y), goal[:2]) < NEAR_M and abs(wrap(yaw - goal[2])) < 0.02
+        if near and not run.robot.moving():
+            return

@@ -9,7 +9,10 @@ from typing import Any
 
 from keyexpr_schema.payloads.motions import Detection
 from keyexpr_schema.payloads.simulation import Truth
-from sim.files.world_schema import FLOOR, WorldFile
+from keyexpr_schema.payloads.world import Object
+from sim.files.world_schema import FLOOR, FLOOR_M, WorldFile
+from sim.mujoco_world.carriers import Carriers
+from sim.mujoco_world.mechanisms import Mechanisms
 from sim.mujoco_world.robot_body import RobotBody
 
 SETTLED_M_S = 0.02
@@ -24,6 +27,10 @@ NOISE_M = 0.003
 """Standard deviation of a seen point, each axis in the plane: what an RGB-D camera gives at 2 m."""
 
 
+SPOT_M = 0.08
+"""What is less than twice as long has room for one thing only."""
+
+
 class Observer:
     """Truths, and what the robots' sensors get of them. `seed` makes the cameras' noise."""
 
@@ -33,11 +40,23 @@ class Observer:
         data: Any,
         world: WorldFile,
         robots: Mapping[str, RobotBody],
+        things: Mapping[str, Object],
+        mechanisms: Mechanisms,
         seed: int,
     ) -> None:
         import numpy as np
 
         self._model, self._data, self._world, self._robots = model, data, world, robots
+        self._mechanisms = mechanisms
+        self._carriers = Carriers(model, data, world, mechanisms)
+        self.noticed = {
+            name: things[name].kind
+            for name in things
+            if name in world.fixtures.movers
+            or name in world.fixtures.buttons
+            or name in world.people
+        }
+        """Furniture whose states can be seen, and people, with their kinds."""
         self._random = np.random.default_rng(seed)
         self._objects = {
             name: int(model.body(f"object/{name}").id) for name in world.object_entries
@@ -55,7 +74,7 @@ class Observer:
             if head == "object":
                 self._of_geom[geom] = ("object", tail)
             elif head == "furniture":
-                self._of_geom[geom] = ("surface", tail)
+                self._of_geom[geom] = ("surface", tail.partition("/")[0])
             elif body == "floor":
                 self._of_geom[geom] = ("surface", FLOOR)
             elif head in robots:
@@ -71,7 +90,7 @@ class Observer:
     def opening_rad(self, object: str) -> float | None:
         """The heading along which fingers shall open around it; `None` for a round thing."""
         kind = self._world.kind_of(object)
-        if kind.shape != "box":
+        if kind.shape not in ("box", "open_box"):
             return None
         frame = self._data.xmat[self._objects[object]].reshape(3, 3)
         length, width, _ = kind.extent_m
@@ -83,7 +102,8 @@ class Observer:
         if robot.basket < 0 or not self._objects:
             return ()
         inside = robot.in_basket(self._data.xpos[self._bodies])
-        return tuple(itertools.compress(self._objects, inside))
+        lying = tuple(itertools.compress(self._objects, inside))
+        return tuple(name for name in lying if self._carriers.object_below(name, lying) is None)
 
     def note_sleepers(self) -> None:
         """Take down what objects touch that fell asleep in this physics step."""
@@ -123,17 +143,14 @@ class Observer:
         return found
 
     def truths(self, time_s: float) -> tuple[Truth, ...]:
-        """Where every object really is."""
-        touching = self.touching()
-        baskets = {
-            name: robot.name for robot in self._robots.values() for name in self.basket(robot)
-        }
+        """Where every object really is, and how everything is that has states."""
+        supports, touching = self._supports()
         found = []
         for name, body in self._objects.items():
             x, y, z = self.base_point(name)
             address = int(self._model.body_dofadr[body])
             speed = self._data.qvel[address : address + 6]
-            support = _support(touching[name], baskets.get(name), touching)
+            support = supports[name]
             found.append(
                 Truth(
                     object=name,
@@ -145,9 +162,86 @@ class Observer:
                     held_by=self._holder(touching[name]) if support is None else None,
                     settled=math.hypot(*speed[:3]) < SETTLED_M_S
                     and math.hypot(*speed[3:]) < SETTLED_RAD_S,
+                    states=self._mechanisms.state_of(name),
+                )
+            )
+        for name, kind in self.noticed.items():
+            x, y = self._world.fixture_of[name].center_m
+            found.append(
+                Truth(
+                    object=name,
+                    kind=kind,
+                    time_s=time_s,
+                    point_m=(x, y, 0.0),
+                    place=self._world.place_at(x, y),
+                    support=FLOOR,
+                    held_by=None,
+                    settled=True,
+                    states=self._mechanisms.state_of(name),
                 )
             )
         return tuple(found)
+
+    def spots_on(self, object: str) -> list[tuple[float, float, float]]:
+        """Points on or in an object that carries others, its middle first, world frame."""
+        length, width, _ = self._world.kind_of(object).extent_m
+        along = [0.0] if length < SPOT_M * 2 else [-length / 4, length / 4]
+        across = [0.0] if width < SPOT_M * 2 else [-width / 4, width / 4]
+        x, y, z = self.base_point(object)
+        kind = self._world.kind_of(object)
+        frame = self._data.xmat[self._objects[object]].reshape(3, 3)
+        level = FLOOR_M if kind.hollow else kind.extent_m[2]
+        found = []
+        for a in along:
+            for b in across:
+                dx, dy, dz = (float(v) for v in frame @ (a, b, level))
+                found.append((x + dx, y + dy, z + dz))
+        return found
+
+    def contents(self, carrier: str) -> list[str]:
+        """What is directly on or in a thing."""
+        return [name for name, support in self._supports()[0].items() if support == carrier]
+
+    def _supports(self) -> tuple[dict[str, str | None], dict[str, set[tuple[str, str]]]]:
+        """What carries each object directly, and what it touches."""
+        touching = self.touching()
+        baskets = {
+            name: robot.name for robot in self._robots.values() for name in self.basket(robot)
+        }
+        return {
+            name: self._support(name, baskets.get(name), touching) for name in self._objects
+        }, touching
+
+    def _support(
+        self,
+        name: str,
+        basket: str | None,
+        touching: Mapping[str, set[tuple[str, str]]],
+        above: frozenset[str] = frozenset(),
+    ) -> str | None:
+        """What carries an object: a hand that a person holds it in, a box that it is in, a basket,
+        furniture, or what carries the object that it lies on."""
+        if name in self._mechanisms.given:
+            return self._mechanisms.given[name]
+        touches = touching[name]
+        others = sorted(other for kind, other in touches if kind == "object")
+        below = self._carriers.object_below(name, others)
+        if below is not None:
+            return below
+        if basket is not None:
+            return basket if others or ("robot", basket) in touches else None
+        surfaces = sorted(surface for kind, surface in touches if kind == "surface")
+        if surfaces:
+            point = self.base_point(name)
+            found = [self._carriers.at_fixture(surface, point) for surface in surfaces]
+            return next((one for one in found if one is not None), surfaces[0])
+        for other in others:
+            if other not in above:
+                support = self._support(other, None, touching, above | {name})
+                # What it has in it does not carry it.
+                if support is not None and support not in above | {name}:
+                    return support
+        return None
 
     def _holder(self, touches: set[tuple[str, str]]) -> str | None:
         for name, robot in self._robots.items():
@@ -221,36 +315,56 @@ class Observer:
             point_m=(x, y, z),
             place=self._world.place_at(x, y),
             support=self._seen_support(object, x, y, z),
+            states=self._mechanisms.state_of(object),
         )
 
     def _seen_support(self, object: str, x: float, y: float, z: float) -> str:
+        if object in self._mechanisms.given:
+            return self._mechanisms.given[object]
+        below = self._carriers.object_below(object, self._objects)
+        if below is not None:
+            return below
         for other in self._robots.values():
             if other.held == object or object in self.basket(other):
                 return other.name
-        for surface in self._world.surfaces():
-            if surface.distance_m(x, y) == 0.0 and abs(z - surface.z_m) < 0.06:
-                return surface.surface
+        for fixture in self._world.fixtures.by_name:
+            carrier = self._carriers.at_fixture(fixture, (x, y, z), above_m=0.06)
+            if carrier is not None:
+                return carrier
         return FLOOR
 
+    def notices(self, robot: RobotBody, thing: str) -> bool:
+        """Whether a robot's camera sees furniture or a person well enough to tell its states."""
+        import mujoco
+        import numpy as np
 
-def _support(
-    touches: set[tuple[str, str]],
-    basket: str | None,
-    touching: Mapping[str, set[tuple[str, str]]],
-) -> str | None:
-    """What carries an object: a basket it lies in, a surface, or what carries one that it is on."""
-    if basket is not None:
-        return basket if ("robot", basket) in touches or _on_other(touches) else None
-    surfaces = sorted(name for kind, name in touches if kind == "surface")
-    if surfaces:
-        return surfaces[0]
-    for kind, name in sorted(touches):
-        if kind == "object":
-            below = sorted(n for k, n in touching[name] if k == "surface")
-            if below:
-                return below[0]
-    return None
+        camera = robot.description.camera
+        if camera is None:
+            return False
+        eye = np.array(self._data.site_xpos[robot.camera])
+        ahead = self._data.site_xmat[robot.camera].reshape(3, 3)[:, 0]
+        ray = np.array(self._mechanisms.face_m(thing)) - eye
+        if np.linalg.norm(ray) > robot.spec.capabilities.get("see", 0.0):
+            return False
+        bearing = math.atan2(
+            ahead[0] * ray[1] - ahead[1] * ray[0], ahead[0] * ray[0] + ahead[1] * ray[1]
+        )
+        if abs(bearing) > math.radians(camera.fov_deg) / 2:
+            return False
+        geom = np.zeros(1, dtype=np.int32)
+        own_head = int(self._model.site_bodyid[robot.camera])
+        # A little further, so as to end in it and not before it.
+        mujoco.mj_ray(self._model, self._data, eye, 1.05 * ray, None, 1, own_head, geom)
+        owner = self._world.fixture_of[thing].name
+        return self._of_geom.get(int(geom[0])) == ("surface", owner)
 
-
-def _on_other(touches: set[tuple[str, str]]) -> bool:
-    return any(kind == "object" for kind, _ in touches)
+    def detect_fixture(self, thing: str) -> Detection:
+        """What the camera reports of furniture or a person that it notices."""
+        x, y = self._world.fixture_of[thing].center_m
+        return Detection(
+            object=thing,
+            kind=self.noticed[thing],
+            point_m=(x, y, 0.0),
+            place=self._world.place_at(x, y),
+            states=self._mechanisms.state_of(thing),
+        )

@@ -35,6 +35,8 @@ class RobotBody:
         """What the hand was last commanded to grasp: a hand feels that it holds, not what."""
         self.grip_above_base_m = 0.0
         """How far above the held object's base the hand took it."""
+        self.way_out: PoseMRad | None = None
+        """Where to drive before the arm is folded, when it reaches in under a roof."""
         self._untouched_s = 0.0
         about = found.description
         try:

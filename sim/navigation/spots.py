@@ -26,9 +26,6 @@ TABLE_FRONT_M = 0.9
 FAR_M = 3.0
 """How far around a point that nobody can reach it is looked for the nearest free floor."""
 
-ROOF_M = 0.05
-"""What is not deeper than this below the top of a piece of furniture lies on it."""
-
 DOCK_M = 1.3
 """Longest straight way from the lattice to a stance."""
 
@@ -189,16 +186,9 @@ class Spots:
 
     def _heading_into(self, point_m: tuple[float, float, float]) -> float | None:
         """How to face a point in furniture under whose roof one gets from the front only."""
-        for fixture in self._fixtures.by_name.values():
-            x, y, z = fixture.local_m(point_m)
-            if (
-                any(carrier.roofed for carrier in fixture.all_carriers)
-                and abs(x) < fixture.half_m[0]
-                and abs(y) < fixture.half_m[1]
-                and z < fixture.height_m - ROOF_M
-            ):
-                return fixture.inward_rad
-        return None
+        return next(
+            (f.inward_rad for f in self._fixtures.by_name.values() if f.roofs(point_m)), None
+        )
 
     def why_not(
         self, point_m: tuple[float, float, float], radius_m: float, reach_m: tuple[float, float]

@@ -108,7 +108,7 @@ class WorldPublisher:
 
     def _publish_truth(self, repeat: bool) -> None:
         for truth in self._backend.truths():
-            state = (truth.place, truth.support, truth.held_by, truth.settled)
+            state = (truth.place, truth.support, truth.held_by, truth.settled, truth.states)
             if repeat or self._truths.get(truth.object) != state:
                 self._truths[truth.object] = state
                 self._session.put(SIM_TRUTH, TruthAddress(truth.object), truth)

@@ -31,7 +31,7 @@ furniture:
     yaw_deg: 180
     switch: true
     process: {state: temperature, value: hot, after_s: 20}
-  lamp: {kind: lamp, place: hall, center_m: [5.6, 0.5], size_m: [0.3, 0.3, 1.3], yaw_deg: 180}
+  lamp: {kind: lamp, place: hall, center_m: [5.6, 0.5], size_m: [0.3, 0.3, 1.5], yaw_deg: 180}
 people:
   anna: {at_m: [7.2, 0.7], yaw_deg: 90, label: Anna}
 object_kinds:

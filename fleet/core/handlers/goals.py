@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace as changed
+
 from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.belief_updates import conclude
 from fleet.core.effects import PLANNER_SOURCE
+from fleet.core.indexes.fact_views import FactValues
 from fleet.core.indexes.touches import Part, Touch
+from fleet.core.model.derived import holds
 from fleet.core.over import goal_taken_back
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import GoalsAdded, ReplanScope
@@ -22,7 +26,7 @@ from fleet.core.state_updates import (
 )
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, read_goal
-from keyexpr_schema.facts import AT, NOTHING, SEARCHED, Value
+from keyexpr_schema.facts import AT, IN, NOTHING, ON, SEARCHED, Value
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.world import Fact
 
@@ -117,7 +121,7 @@ def next_stage(state: State, goal: str) -> State:
     kept = tuple(
         condition
         for condition in status.conditions
-        if condition.relation == AT
+        if condition.relation in (AT, ON, IN)
         and about.isdisjoint(condition.subjects)
         and not state.robots.keys() & set(condition.subjects)
     )
@@ -179,8 +183,10 @@ def _understand(
         reading = _reading(state, goal)
         stages = reading.stages
         for condition in (condition for stage in stages for condition in stage):
-            for name in (*condition.subjects, condition.value):
+            for name in condition.subjects:
                 _check_name(state, name)
+            if condition.value not in _words(state, condition.relation):
+                _check_name(state, condition.value)
     except NotUnderstood as error:
         return replace(status, state=GoalState.REJECTED, reason=str(error)), None
     status = replace(status, conditions=stages[0], stages=stages, note=_note(state, reading))
@@ -190,15 +196,27 @@ def _understand(
 def _reading(state: State, goal: Goal) -> Reading:
     if goal.conditions:
         return Reading(goal.text, (goal.conditions,))
-    return read_goal(goal.text, state.vocabulary())
+    if goal.speaker is not None and not state.vocabulary().is_person(goal.speaker):
+        known = sorted(filter(state.vocabulary().is_person, state.objects))
+        raise NotUnderstood(
+            f"{goal.speaker!r}, who says it, is no person that is known; "
+            f"known are {', '.join(known) or 'none'}"
+        )
+    return read_goal(goal.text, changed(state.vocabulary(), speaker=goal.speaker))
 
 
 def _note(state: State, reading: Reading) -> str | None:
     """What a goal's sentence says besides what must hold, so that no word is lost unseen."""
     notes = [f"{remark!r} asks for nothing" for remark in reading.remarks]
-    for (relation, subject), value in reading.presumed:
+    facts = FactValues(state.facts)
+    for literal in reading.presumed:
+        (relation, subject), value = literal
         fact = state.fact(relation, subject)
-        if fact is not None and fact.value not in (None, value):
+        if (
+            fact is not None
+            and fact.value not in (None, value)
+            and not holds(literal, facts.get, state, aboard=True)
+        ):
             notes.append(f"it takes {subject} to be at {value}; believed is {fact.value}")
     return "; ".join(notes) or None
 
@@ -211,6 +229,14 @@ def _presume(state: State, goal: str, reading: Reading) -> State:
             source = f"{PLANNER_SOURCE}:{goal}"
             state = conclude(state, Fact.of(literal, source, state.time_s))
     return state
+
+
+def _words(state: State, relation: str) -> tuple[str, ...]:
+    """The words that skills declare as a relation's values: "hot", "cold"."""
+    for skill in state.skills.values():
+        if (known := skill.relations.get(relation)) is not None:
+            return known.values if isinstance(known.values, tuple) else ()
+    return ()
 
 
 def _check_name(state: State, name: Value) -> None:

@@ -66,7 +66,7 @@ def learn(
     `way_s` is its way at top speed, s. An attempt that had no way to go teaches nothing about a
     skill that only gets somewhere.
     """
-    if not isfinite(took_s) or took_s < 0.0 or (way_s <= 0.0 and _only_moves(skill)):
+    if not isfinite(took_s) or took_s < 0.0 or (way_s <= 0.0 and only_moves(skill)):
         return known
     before = known.get(model) or Durations(model=model)
     work, slow = work_s(before, skill), pace(before)
@@ -101,7 +101,8 @@ def _observed(old: Estimate, value: float, weight: float, full: float) -> Estima
     )
 
 
-def _only_moves(skill: SkillModel) -> bool:
+def only_moves(skill: SkillModel) -> bool:
+    """Whether all that a skill does is to get its robot somewhere."""
     return skill.travel_to is not None and all(
         literal == Literal(FactKey(AT, skill.actor_parameter), skill.travel_to)
         for literal in skill.after

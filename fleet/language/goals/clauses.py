@@ -11,6 +11,7 @@ from fleet.language.phrases.mentions import Mention
 from fleet.language.phrases.subjects import Subject
 from fleet.language.words.wordlists import ANYWHERE, WHOLE_HOUSE
 from keyexpr_schema.facts import AT, HELD, LOCATED, SEARCHED
+from keyexpr_schema.payloads.world import Feature
 
 _ROBOTS_TELL = "robots say themselves where they are; see their states"
 
@@ -98,7 +99,7 @@ class Clauses(Tidying):
         for i, place in enumerate(self._route()):
             if i:
                 self.draft.next_stage()
-            self.draft.add(AT, mentions[0], place)
+            self.draft.add(AT, mentions[0], self.place_of(place))
             self.last_place = place
         self.subjects.remember(mentions)
 
@@ -123,7 +124,13 @@ class Clauses(Tidying):
         return tuple(name for mention in named for name in mention.subjects)
 
     def searched(self, places: Sequence[str], key: int) -> None:
-        """Wish that somebody looked around in these places."""
+        """Wish that somebody looked around in these places, or into these things."""
+        places = [self._searchable(place) for place in places]
         self.draft.add(SEARCHED, Mention(tuple(places), "place", key), True)
         if len(places) == 1:
             self.last_place = places[0]
+
+    def _searchable(self, name: str) -> str:
+        """What is looked into: a thing that others can be in; else the place where it is."""
+        inside = Feature.CONTAINS in self.vocabulary.good_for.get(name, ())
+        return name if inside else self.place_of(name)

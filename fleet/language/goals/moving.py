@@ -17,8 +17,9 @@ from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.lexicon import EntityType, lexicon_of
 from fleet.language.words.morphology import gerund
 from fleet.language.words.verb_senses import PARTICLES
-from fleet.language.words.wordlists import HOME, RELATIVE
-from keyexpr_schema.facts import AT, HELD
+from fleet.language.words.wordlists import HOME, RELATIVE, SPEAKER
+from keyexpr_schema.facts import AT, HELD, IN, ON
+from keyexpr_schema.payloads.world import Feature
 
 HOME_HINT = 'give it one with the field "home" of the object'
 
@@ -40,7 +41,7 @@ class Moving:
         self.nouns = NounPhrases(self.cursor)
         self.subjects = Subjects(self.cursor, self.nouns, vocabulary)
         self.locations = Locations(self.cursor, self.nouns, vocabulary)
-        self.draft = GoalDraft()
+        self.draft = GoalDraft(vocabulary.is_at)
         self.moved: list[Subject] = []  # what "and then to the kitchen" is about
         self.last_place: str | None = None
         self.verb = ""
@@ -58,14 +59,14 @@ class Moving:
         `fetch`: a later clause may say where to, as in "fetch the cup and put it in the kitchen".
         """
         cursor = self.cursor
-        cursor.take_word(("me", "us"))
+        to_speaker = cursor.take_word(SPEAKER) is not None
         moved = self.subjects.read("an object", THINGS)
         first = moved[0]
         to_robot = (
             self.verb in _OFFERING
             and len(moved) == 1
             and isinstance(first, NounPhrase)
-            and first.type == "robot"
+            and (first.type == "robot" or all(map(self.vocabulary.is_person, first.names)))
         )
         if to_robot and not cursor.at_border() and self.nouns.starts(("object",)):
             assert isinstance(first, NounPhrase)
@@ -73,15 +74,22 @@ class Moving:
             return self.to_target(moved, Where(None, *self._receiver(first)), False)
         locatives, home = self.locatives()
         where = self.where(locatives, each=not give)
-        if give and where.target is not None and where.target_type != "robot":
+        if to_speaker and where.target is None and not where.each and not home:
+            where = replace(where, target=self.vocabulary.speaker, target_type="object")
+        if give and where.target is not None and not self._receives(where):
+            people = sorted(filter(self.vocabulary.is_person, self.vocabulary.objects))
+            known = listed([*cursor.lexicon.known(("robot",)), *people])
             raise NotUnderstood(
-                f"{where.target!r} is no robot that something could be given to; known are "
-                f"{listed(cursor.lexicon.known(('robot',)))}"
+                f"{where.target!r} is no {'robot or person' if people else 'robot'} that something "
+                f"could be given to; known are {known}"
             )
         whereto = where.target is not None or bool(where.each) or home
         if fetch and not whereto and (cursor.at_border() or self._and_next()):
             return self._fetched(moved, where)
         return self.to_target(moved, where, home or (tidy and where.target is None))
+
+    def _receives(self, where: Where) -> bool:
+        return where.target_type == "robot" or self.vocabulary.is_person(where.target or "")
 
     def _and_next(self) -> bool:
         return self.cursor.word() in ("and", "then")
@@ -101,8 +109,8 @@ class Moving:
     def _receiver(self, noun: NounPhrase) -> tuple[str, EntityType]:
         mention = noun.resolve()
         if mention.open or len(mention.subjects) != 1:
-            raise NotUnderstood(f"{noun.text!r} does not say which robot: name it")
-        return mention.subjects[0], "robot"
+            raise NotUnderstood(f"{noun.text!r} does not say which {noun.type}: name it")
+        return mention.subjects[0], mention.type
 
     def locatives(self) -> tuple[list[Locative], bool]:
         """The prepositional phrases and particles that come next; whether they say "home"."""
@@ -159,7 +167,7 @@ class Moving:
         where = self.locations.where(locatives)
         if where.each and not each:
             raise self._which_of(where)
-        if where.target is not None and where.target_type == "place":
+        if where.target is not None and where.target_type != "robot":
             self.last_place = where.target
         elif where.source in self.vocabulary.places:
             self.last_place = where.source
@@ -206,13 +214,33 @@ class Moving:
             elif where.target_type == "robot" and mention.type == "robot":
                 raise NotUnderstood("a robot goes to a place, not to a robot: name the place")
             else:
-                on_robot = where.target_type == "robot"
-                self.draft.add(AT, mention, where.target, on_robot=on_robot)
+                self._put(mention, where, where.target)
         self.subjects.remember(mentions)
         if where.target is not None and where.target_type == "robot":
             receiver = Mention((where.target,), "robot", self.cursor.at)
             self.subjects.recent = [*self.subjects.recent, receiver]
         return None
+
+    def _put(self, mention: Mention, where: Where, target: str) -> None:
+        if mention.type == "robot":
+            return self.draft.add(AT, mention, self.place_of(target))
+        if mention.open or target not in mention.subjects:
+            kept = [name for name in mention.subjects if name != target]
+            one = replace(mention, subjects=tuple(kept), open=mention.open and len(kept) > 1)
+            handed = where.target_type == "robot" or self.vocabulary.is_person(target)
+            return self.draft.add(where.relation, one, target, on_robot=handed)
+        raise NotUnderstood(f"{self.clause!r}: nothing can be on or in itself")
+
+    def place_of(self, target: str) -> str:
+        """The place where somebody goes who goes there.
+
+        Raises:
+            NotUnderstood: it is a thing, and not known where.
+        """
+        place = self.vocabulary.place_of(target)
+        if place is None:
+            raise NotUnderstood(f"it is not known in which place {target} is: name the place")
+        return place
 
     def _no_target(self) -> NotUnderstood:
         cursor = self.cursor
@@ -238,15 +266,26 @@ class Moving:
             for n in mention.subjects
             if n in self.vocabulary.objects
         }
-        homeless = [n for n in mention.subjects if homes.get(n) not in self.vocabulary.places]
+        homeless = [n for n in mention.subjects if not self.is_spot(homes.get(n))]
         if homeless or (mention.open and len(set(homes.values())) > 1):
             name = homeless[0] if homeless else mention.subjects[0]
             raise NotUnderstood(f"it is not known where {name} belongs: {HOME_HINT}")
         if mention.open:
-            self.draft.add(AT, mention, homes[mention.subjects[0]])
+            self.to_home(mention, homes[mention.subjects[0]])
             return
         for name in mention.subjects:
-            self.draft.add(AT, Mention((name,), "object", mention.key), homes[name])
+            self.to_home(Mention((name,), "object", mention.key), homes[name])
+
+    def is_spot(self, name: str | None) -> bool:
+        """Whether things can belong there: in a place, or on or in a thing."""
+        return name in self.vocabulary.places or name in self.vocabulary.good_for
+
+    def to_home(self, mention: Mention, home: str | None) -> None:
+        """Wish that it is where it belongs."""
+        good_for = self.vocabulary.good_for.get(home or "", ())
+        on = Feature.SUPPORTS in good_for
+        within = Feature.CONTAINS in good_for
+        self.draft.add(AT if on == within else ON if on else IN, mention, home)
 
     # --- going -----------------------------------------------------------------------------------
     def go(self, who: Sequence[Subject] | None) -> None:
@@ -255,10 +294,10 @@ class Moving:
         if home:
             raise NotUnderstood("a robot has no home: name the place where it shall go")
         where = self.where(locatives)
-        if where.target is None or where.target_type != "place":
+        if where.target is None or where.target_type == "robot":
             raise self.cursor.unknown("a place", ("place",))
         if who is not None:
             return self.to_target(who, where, False)
         self.moved = [robot := self.subjects.some_robot()]
-        self.draft.add(AT, robot, where.target, means=True)
+        self.draft.add(AT, robot, self.place_of(where.target), means=True)
         return None

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from fleet.errors import NotUnderstood
 from fleet.language.goals.sentences import Sentences
 from fleet.language.phrases.locations import PLACES
-from fleet.language.phrases.mentions import Mention
 from fleet.language.phrases.subjects import THINGS, Subject
-from fleet.language.vocabulary import SkillPhrase, Vocabulary
-from fleet.language.words.tokens import SENTENCE_ENDS, words_of
-from fleet.language.words.verb_senses import EXAMPLE, IMPERATIVES
+from fleet.language.vocabulary import Vocabulary
+from fleet.language.words.tokens import SENTENCE_ENDS
+from fleet.language.words.verb_senses import EXAMPLE
 from fleet.language.words.wordlists import (
     ASKING_WHERE,
     CAUSATIVES,
@@ -172,8 +171,10 @@ class _GoalParser(Sentences):
             self.declarative(bare_infinitive=True)
         elif cursor.word() in ("clear", "empty") and self._table_next():
             self.clear()
-        elif (phrase := self._skill_phrase()) is not None:
-            self._done_to(phrase)
+        elif (phrase := self.skill_phrase()) is not None:
+            self.done_to(phrase)
+        elif self.parted_verb():
+            pass
         elif cursor.verb_next():
             self.imperative()
         elif cursor.word() in ("can", "could", "would", "will", "should", "may"):
@@ -189,33 +190,6 @@ class _GoalParser(Sentences):
             self.declarative()
         else:
             raise self.no_clause()
-
-    def _skill_phrase(self) -> SkillPhrase | None:
-        """The skill whose name comes next, unless a verb of ours is as long; past it."""
-        names = {words_of(phrase.verb): phrase for phrase in self.vocabulary.skill_phrases}
-        verb = self.cursor.longest(names)
-        if verb is None or len(self.cursor.longest(IMPERATIVES) or ()) >= len(verb):
-            return None
-        self.cursor.at += len(verb)
-        return names[verb]
-
-    def _done_to(self, phrase: SkillPhrase) -> None:
-        """`vacuum the hallway and the kitchen`, after the verb."""
-        if phrase.type == "place":
-            names = self.places()
-            mentions = [Mention((name,), "place", self.cursor.at) for name in names]
-        else:
-            found = self.subjects.read("an object", ("object",))
-            things = self.vocabulary.objects.values()
-            able = {thing.object for thing in things if phrase.fits(thing)}
-            mentions = [
-                self.subjects.resolve(self.subjects.fit(subject, able, phrase.verb))
-                for subject in found
-            ]
-            self.subjects.remember(mentions)
-        for mention in mentions:
-            for relation, value in phrase.wants:
-                self.draft.add(relation, mention, value)
 
     def _table_next(self) -> bool:
         """Whether the next word is a verb, and a place or surface is what it is about; past it."""

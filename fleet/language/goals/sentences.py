@@ -158,6 +158,8 @@ class Sentences(Clauses):
     def _to_be(self, who: Sequence[Subject]) -> None:
         """What follows "should be": a place, or what should have been done."""
         self.elliptic = "be"
+        if all(s.type == "object" for s in who) and (made := self.state()) is not None:
+            return self.made_so(who, made)
         done = self._done()
         relation = next((name for sense, name in _RELATIONS.items() if sense in done), None)
         if relation is not None and VerbSense.MOVE not in done:

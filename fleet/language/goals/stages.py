@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.phrases.mentions import Mention
 from fleet.language.refusals import one_of
-from keyexpr_schema.facts import AT, HELD, LOCATED, SEARCHED, Value
+from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, SEARCHED, Value
 from keyexpr_schema.payloads.goals import Condition
 
+PLACED = frozenset({AT, ON, IN})
+"""Relations that say where a thing is: all of one variable."""
 _THEN = 'if one is to come after the other, say "then"'
 
 
@@ -43,8 +45,12 @@ class Wish:
 
 @dataclass
 class GoalDraft:
-    """The stages of a goal while its sentence is read."""
+    """The stages of a goal while its sentence is read.
 
+    `is_at` says whether a thing is in a place, or on or in another thing.
+    """
+
+    is_at: Callable[[str, str], bool] = lambda name, where: False
     stages: list[list[Wish]] = field(default_factory=lambda: [[]])
 
     @property
@@ -96,7 +102,7 @@ class GoalDraft:
             part for stage in self.stages for part in _sequenced(_without_implied_travel(stage))
         ]
         return tuple(
-            tuple(dict.fromkeys(wish.condition() for wish in _consistent(stage)))
+            tuple(dict.fromkeys(wish.condition() for wish in _consistent(stage, self.is_at)))
             for stage in stages
             if stage
         )
@@ -128,7 +134,7 @@ def _check_carried(wishes: Sequence[Wish]) -> None:
 
 
 def _brings(wish: Wish, held: Wish) -> bool:
-    return wish.relation == AT and _same(wish, held)
+    return wish.relation in PLACED and _same(wish, held)
 
 
 def _without_implied_travel(stage: Sequence[Wish]) -> list[Wish]:
@@ -160,7 +166,8 @@ def _sequenced(stage: Sequence[Wish]) -> list[list[Wish]]:
     return split
 
 
-def _consistent(stage: Sequence[Wish]) -> list[Wish]:
+def _consistent(stage: Sequence[Wish], is_at: Callable[[str, str], bool]) -> list[Wish]:
+    stage = _finest(stage, is_at)
     kept = [
         wish
         for i, wish in enumerate(stage)
@@ -170,14 +177,15 @@ def _consistent(stage: Sequence[Wish]) -> list[Wish]:
     fixed: dict[tuple[str, str], Wish] = {}
     for wish in kept:
         if not wish.open:
-            before = fixed.setdefault((wish.relation, wish.subjects[0]), wish)
+            relation = AT if wish.relation in PLACED else wish.relation
+            before = fixed.setdefault((relation, wish.subjects[0]), wish)
             if before.value != wish.value:
                 raise NotUnderstood(
                     f"it wants {wish.subjects[0]} in two places: {before.value} and "
                     f"{wish.value}; {_THEN}"
                 )
     for wish in kept:
-        put_down = [w for w in kept if w.relation == AT and not w.on_robot]
+        put_down = [w for w in kept if w.relation in PLACED and not w.on_robot]
         if wish.relation == HELD and any(
             w.key == wish.key or (not w.open and w.subjects == wish.subjects) for w in put_down
         ):
@@ -186,19 +194,35 @@ def _consistent(stage: Sequence[Wish]) -> list[Wish]:
     return kept
 
 
+def _finest(stage: Sequence[Wish], is_at: Callable[[str, str], bool]) -> list[Wish]:
+    """Without those that say less finely what others say: in the kitchen, and on a table there."""
+    placed = [wish for wish in stage if wish.relation in PLACED]
+    return [
+        wish
+        for wish in stage
+        if wish not in placed
+        or not any(
+            _same(wish, other)
+            and other.value != wish.value
+            and is_at(str(other.value), str(wish.value))
+            for other in placed
+        )
+    ]
+
+
 def _implies(wish: Wish, other: Wish, later: bool) -> bool:
     """Whether `other` need not be said beside `wish`."""
     same = wish.subjects == other.subjects or wish.key == other.key
     if other.relation == LOCATED:
-        return same and wish.relation in (AT, HELD)
-    return same and other.relation == HELD and wish.relation == AT and later
+        return same and wish.relation in {*PLACED, HELD}
+    return same and other.relation == HELD and wish.relation in PLACED and later
 
 
 def _narrowed(wish: Wish, others: Sequence[Wish]) -> Wish:
     """An open wish without those that another one names: "the first cup and another cup"."""
-    if not wish.open or wish.relation != AT:
+    if not wish.open or wish.relation not in PLACED:
         return wish
-    named = {w.subjects[0] for w in others if w.relation == AT and not w.open}
+    named = {w.subjects[0] for w in others if w.relation in PLACED and not w.open}
     left = tuple(s for s in wish.subjects if s not in named)
     if not left:
         raise NotUnderstood(f"it wants more of {one_of(wish.subjects)} than there are; {_THEN}")
@@ -210,7 +234,7 @@ def _check_open(kept: Sequence[Wish], fixed: dict[tuple[str, str], Wish]) -> Non
 
     Wishes are matched with subjects by augmenting paths (Kuhn 1955).
     """
-    at = [wish for wish in kept if wish.open and wish.relation == AT]
+    at = [wish for wish in kept if wish.open and wish.relation in PLACED]
     for wish in at:
         for other in at:
             if wish.key == other.key and wish.value != other.value:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.goals.moving import HOME_HINT, Moving
-from fleet.language.phrases.locations import PLACES
+from fleet.language.goals.moving import HOME_HINT
+from fleet.language.goals.states import States
 from fleet.language.phrases.mentions import Mention
 from fleet.language.refusals import one_of
-from fleet.language.words.verb_senses import EXAMPLE
 from fleet.language.words.wordlists import WHOLE_HOUSE
-from keyexpr_schema.facts import AT
+from keyexpr_schema.payloads.world import Feature
 
 
-class Tidying(Moving):
+class Tidying(States):
     """Turns clauses about order into wishes that things are where they belong."""
 
     def tidy(self) -> None:
@@ -31,7 +29,7 @@ class Tidying(Moving):
         homes = {
             o.object: o.home
             for o in self.vocabulary.objects.values()
-            if o.movable and o.home and o.home in self.vocabulary.places
+            if o.is_a(Feature.MOVABLE) and o.home and self.is_spot(o.home)
         }
         names = tuple(homes)
         if preposed or not (cursor.at_border() or cursor.word() == "and"):
@@ -44,7 +42,8 @@ class Tidying(Moving):
 
     def clear(self) -> None:
         """`clear TABLE`, after the verb: what lies on it goes where it belongs."""
-        homes = {o.object: o.home for o in self.vocabulary.objects.values() if o.movable and o.home}
+        things = self.vocabulary.objects.values()
+        homes = {o.object: o.home for o in things if o.is_a(Feature.MOVABLE) and o.home}
         mentions = self.place_mentions() or []
         if not mentions or any(mention.type != "surface" for mention in mentions):
             places = [name for m in mentions for name in m.subjects] or list(self.vocabulary.places)
@@ -57,7 +56,7 @@ class Tidying(Moving):
     def _to_their_homes(self, names: Sequence[str], homes: Mapping[str, str]) -> None:
         start = self.began
         for name in names:
-            self.draft.add(AT, Mention((name,), "object", start), homes[name])
+            self.to_home(Mention((name,), "object", start), homes[name])
         self.subjects.remember([Mention(tuple(names), "object", start)])
 
     def _within(self, homes: Mapping[str, str]) -> tuple[str, ...]:
@@ -78,9 +77,11 @@ class Tidying(Moving):
         Raises:
             NotUnderstood: there is nothing of that kind in one of them.
         """
-        at = self.vocabulary.whereabouts
-        names = tuple(n for n, home in homes.items() if at.get(n) in where and at[n] != home)
-        if tidy := [place for place in where if place not in {at[name] for name in names}]:
+        at = self.vocabulary.is_at
+        names = tuple(
+            n for n, home in homes.items() if any(at(n, p) for p in where) and not at(n, home)
+        )
+        if tidy := [place for place in where if not any(at(name, place) for name in names)]:
             raise NotUnderstood(
                 f"nothing that belongs elsewhere is believed to be in {one_of(tidy)}: have it "
                 'searched first, or say where things belong with the field "home" of the object'
@@ -93,42 +94,24 @@ class Tidying(Moving):
         Raises:
             NotUnderstood: there is nothing, or not all of it is known, or some cannot go anywhere.
         """
-        (place,), surface, vocabulary = table.subjects, one_of(table.surfaces), self.vocabulary
+        surface, vocabulary = one_of(table.surfaces), self.vocabulary
+        place = self.place_of(table.subjects[0])
         there = [n for n, where in vocabulary.whereabouts.items() if where == place]
-        there = [n for n in there if n in vocabulary.objects and vocabulary.objects[n].movable]
+        things = vocabulary.objects
+        there = [n for n in there if n in things and things[n].is_a(Feature.MOVABLE)]
         searched = f"have {place} searched first"
         if unsure := [name for name in there if name not in vocabulary.rests]:
             raise NotUnderstood(
                 f"it is not known whether {one_of(unsure)} lies on {surface}: {searched}, or name "
                 "the things and where to bring them"
             )
-        names = [name for name in there if vocabulary.rests[name] in table.surfaces]
+        on = table.surfaces
+        names = [n for n in there if any(vocabulary.is_at(n, s) for s in on)]
         if not names:
             raise NotUnderstood(f"nothing is believed to lie on {surface}: {searched}")
-        if stuck := [name for name in names if homes.get(name, place) == place]:
+        if stuck := [n for n in names if homes.get(n, place) in (place, *on)]:
             raise NotUnderstood(
                 f"of what lies on {surface}, {' and '.join(stuck)} has no home in another place: "
                 "say where to bring it"
             )
         return names
-
-    def places(self) -> tuple[str, ...]:
-        """The places that come next: one, several, or all of them."""
-        named = self.place_mentions()
-        if named is None:
-            return tuple(self.vocabulary.places)
-        return tuple(dict.fromkeys(name for m in named for name in m.subjects))
-
-    def place_mentions(self) -> list[Mention] | None:
-        """The places that come next, and places of surfaces; `None` for the whole house."""
-        cursor = self.cursor
-        named = cursor.lexicon.exact(cursor.tokens, cursor.at, PLACES)[1]
-        if not named and self.vocabulary.places and cursor.take_of(WHOLE_HOUSE):
-            return None
-        mentions = []
-        for subject in self.subjects.read("a place", PLACES):
-            mention = self.subjects.resolve(subject)
-            if mention.open or mention.type not in PLACES:
-                raise NotUnderstood(f"it does not say which place: {EXAMPLE}")
-            mentions.append(replace(mention, surfaces=subject.surfaces))
-        return mentions

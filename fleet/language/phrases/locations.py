@@ -12,25 +12,34 @@ from fleet.language.phrases.noun_phrases import NounPhrases
 from fleet.language.refusals import one_of
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.lexicon import EntityType
-from fleet.language.words.wordlists import BASKETS, DEFINITE, INDEFINITE
+from fleet.language.words.wordlists import BASKETS, DEFINITE, INDEFINITE, SPEAKER
+from keyexpr_schema.facts import AT, IN, ON
+from keyexpr_schema.payloads.world import Feature
 
 PLACES: tuple[EntityType, ...] = ("place", "surface")
 SPOTS: tuple[EntityType, ...] = ("place", "robot", "surface")
+_ON = frozenset({"on", "onto", "top"})
+_IN = frozenset({"in", "into", "inside", "within"})
 
 
 @dataclass(frozen=True)
 class Locative:
-    """One prepositional phrase: `to`, `in` or `from`, and what stands behind it."""
+    """One prepositional phrase: `to`, `in` or `from`, and what stands behind it.
+
+    `word` is the preposition as it was said.
+    """
 
     preposition: str
     noun: NounPhrase
+    word: str = ""
 
 
 @dataclass(frozen=True)
 class Where:
-    """What the prepositional phrases of one clause say: places or robots, by id.
+    """What the prepositional phrases of one clause say: places, things or robots, by id.
 
-    `source_surface` and `target_surface` are the surfaces in those places, where one is named.
+    `source_surface` and `target_surface` are the surfaces in those places, where one is named that
+    is no thing. `relation` is what must hold of the target: `at`, `on` or `in` it.
     `each`: instead of one target, all of several ("to every room"); `text` are their words.
     """
 
@@ -41,6 +50,7 @@ class Where:
     target_surface: str | None = None
     each: tuple[str, ...] = ()
     text: str = ""
+    relation: str = AT
 
 
 class Locations:
@@ -53,11 +63,17 @@ class Locations:
         """What stands behind a preposition that was just read.
 
         Raises:
-            NotUnderstood: it is neither a place, nor a robot, nor a robot's basket.
+            NotUnderstood: it is neither a place, nor a thing that others can be on or in, nor a
+                person, a robot, or a robot's basket.
         """
         cursor, start = self.cursor, self.cursor.at
+        word = cursor.tokens[start - 1].word if start else ""
+        if (speaker := self._speaker()) is not None:
+            return Locative(preposition, speaker, word)
         if (basket := self._basket(start)) is not None:
             return Locative(preposition, basket)
+        if self.vocabulary.good_for and not self.nouns.starts(SPOTS):
+            self._refuse_thing()
         noun = self.nouns.noun("a place", SPOTS)
         if noun.type == "robot":
             possessed = cursor.take("'s") or cursor.take("'")
@@ -70,7 +86,32 @@ class Locations:
                     f"{cursor.quote(start)!r} is followed by what is not understood; "
                     "a robot has a basket"
                 )
-        return Locative(preposition, noun)
+        return Locative(preposition, noun, word)
+
+    def _speaker(self) -> NounPhrase | None:
+        """Who says "me", if that comes next and it is known."""
+        cursor, start = self.cursor, self.cursor.at
+        if self.vocabulary.speaker is None or not cursor.take_word(SPEAKER):
+            return None
+        found = tuple(
+            e
+            for e in cursor.lexicon.entities
+            if e.type == "surface" and e.id == self.vocabulary.speaker
+        )
+        return NounPhrase(found, cursor.quote(start), start, exact=True) if found else None
+
+    def _refuse_thing(self) -> None:
+        """Say why nothing can be put on what comes next, if it is a thing.
+
+        Raises:
+            NotUnderstood: it is.
+        """
+        cursor, start = self.cursor, self.cursor.at
+        if self.nouns.starts(("object",)):
+            noun = self.nouns.noun("an object", ("object",))
+            raise NotUnderstood(
+                f"{cursor.quote(start)!r}: nothing can be put on or in {one_of(noun.names)}"
+            )
 
     def _with_baskets(self) -> list[str]:
         return sorted(
@@ -81,7 +122,11 @@ class Locations:
         """`the basket`, `its basket`, `the basket of the robot`."""
         cursor = self.cursor
         cursor.take_word(DEFINITE | INDEFINITE)
-        named = cursor.lexicon.exact(cursor.tokens, cursor.at, SPOTS)[1]
+        lexicon, tokens = cursor.lexicon, cursor.tokens
+        named = (
+            lexicon.exact(tokens, cursor.at, SPOTS)[1]
+            or lexicon.described(tokens, cursor.at, ("surface",))[1]
+        )
         if named or not cursor.take_word(BASKETS):
             cursor.at = start
             return None
@@ -112,7 +157,7 @@ class Locations:
             targets = [p for p in locatives if p not in sources]
         else:
             targets = inside
-            while len(targets) > 1 and not _shared(targets):
+            while len(targets) > 1 and not self._shared(targets):
                 sources = [targets[0], *sources]
                 targets = targets[1:]
         source, _ = self._one(sources) if sources else (None, "place")
@@ -124,23 +169,62 @@ class Locations:
         if source is not None and source == target:
             raise NotUnderstood(f"the sentence says both from and to {source}: say where to")
         kind: EntityType = "robot" if target_type == "robot" else "place"
-        return Where(source, target, kind, _surface(sources, source), _surface(targets, target))
+        if target in self.vocabulary.objects:
+            kind = "object"
+        return Where(
+            source,
+            target,
+            kind,
+            _surface(sources, source),
+            _surface(targets, target),
+            relation=self._relation(targets, target) if target is not None else AT,
+        )
+
+    def _relation(self, locatives: Sequence[Locative], target: str) -> str:
+        """What must hold of the target: `on` or `in`, as it is good for, or `at` of all else.
+
+        Raises:
+            NotUnderstood: it is said to be on what things can only be in.
+        """
+        good_for = self.vocabulary.good_for.get(target, frozenset())
+        words = {p.word for p in locatives if target in p.noun.names}
+        if Feature.SUPPORTS in good_for:
+            both = Feature.CONTAINS in good_for
+            return ON if not both or words & _ON else IN if words & _IN else AT
+        if Feature.CONTAINS in good_for:
+            if words & _ON:
+                raise NotUnderstood(f"nothing can be put on {target}, only in it")
+            return IN
+        return AT
 
     def _one(self, locatives: Sequence[Locative]) -> tuple[str, EntityType]:
         """The one place or robot that all the phrases mean."""
-        shared = _shared(locatives)
+        shared = self._shared(locatives)
         if not shared:
             names = " and ".join(repr(locative.noun.text) for locative in locatives)
             raise NotUnderstood(
                 f'{names} are two places; if one is to come after the other, say "then"'
             )
-        for locative in locatives:
+        finest = [p for p in locatives if not shared.isdisjoint(p.noun.names)]
+        for locative in finest:
             mention = locative.noun.among(shared).resolve()
             if mention.open or len(mention.subjects) != 1:
                 raise NotUnderstood(
                     f"{locative.noun.text!r} could be {one_of(mention.subjects)}: say which"
                 )
         return mention.subjects[0], mention.type
+
+    def _shared(self, locatives: Sequence[Locative]) -> frozenset[str]:
+        """Who could be meant by every one of the phrases: by its name, or as what is there."""
+        return frozenset(
+            name
+            for locative in locatives
+            for name in locative.noun.names
+            if all(
+                any(name == there or self.vocabulary.is_at(name, there) for there in p.noun.names)
+                for p in locatives
+            )
+        )
 
 
 def _surface(locatives: Sequence[Locative], place: str | None) -> str | None:
@@ -149,14 +233,6 @@ def _surface(locatives: Sequence[Locative], place: str | None) -> str | None:
         entity.id
         for locative in locatives
         for entity in locative.noun.found
-        if entity.type == "surface" and entity.stands_for == place
+        if entity.type == "surface" and entity.stands_for == place != entity.id
     }
     return found.pop() if len(found) == 1 else None
-
-
-def _shared(locatives: Sequence[Locative]) -> frozenset[str]:
-    """Who could be meant by every one of the phrases."""
-    found = frozenset(locatives[0].noun.names)
-    for locative in locatives[1:]:
-        found &= frozenset(locative.noun.names)
-    return found

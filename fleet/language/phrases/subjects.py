@@ -212,7 +212,7 @@ class Subjects:
             reason: str | None = str(error)
         else:
             reason = None
-        there = [name for name in noun.names if self.vocabulary.whereabouts.get(name) == source]
+        there = [name for name in noun.names if self.vocabulary.is_at(name, source)]
         if surface is not None:
             there = self._on(surface, there, all_of_them=reason is None and not mention.open)
         if there:

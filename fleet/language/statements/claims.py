@@ -8,7 +8,7 @@ from fleet.errors import NotUnderstood
 from fleet.language.goals.clauses import Clauses
 from fleet.language.phrases.subjects import Subject
 from fleet.language.refusals import one_of
-from fleet.language.vocabulary import Vocabulary
+from fleet.language.vocabulary import SkillPhrase, Vocabulary
 from keyexpr_schema.facts import AT, HOLDING, NOTHING, ON, SEARCHED, FactKey, Value
 
 
@@ -42,10 +42,11 @@ class Claims(Clauses):
                 raise NotUnderstood(
                     f"{self.clause!r} does not say which of {one_of(mention.subjects)}: name it"
                 )
-            if mention.type == "robot" and target not in self.vocabulary.places:
+            if mention.type == "robot" and target in self.vocabulary.robots:
                 raise NotUnderstood("a robot is at a place, not on a robot: name the place")
+            robot = mention.type == "robot" and target is not None
             for name in mention.subjects:
-                self.fact(AT, name, target)
+                self.fact(AT, name, self.place_of(target) if robot and target else target)
                 if surface is not None and mention.type == "object":
                     self.fact(ON, name, surface)
         self.subjects.remember(mentions)
@@ -74,6 +75,16 @@ class Claims(Clauses):
                 self.fact(HOLDING, name, objects[0] if objects else NOTHING)
             for thing in objects:
                 self.fact(AT, thing, name)
+
+    def are_so(self, things: Sequence[Subject], phrase: SkillPhrase) -> None:
+        """These are as a skill makes them: open, switched on."""
+        for thing in things:
+            mention = self.subjects.resolve(thing)
+            if mention.open:
+                raise NotUnderstood(f"it does not say which of {one_of(mention.subjects)}: name it")
+            for name in mention.subjects:
+                for relation, value in phrase.wants:
+                    self.fact(relation, name, value)
 
     def looked_around(self, places: Sequence[str], value: bool) -> None:
         """Somebody looked around in these places, or nobody did."""

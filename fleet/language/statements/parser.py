@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
 from fleet.language.phrases.locations import PLACES, SPOTS
+from fleet.language.phrases.mentions import NounPhrase
 from fleet.language.phrases.subjects import THINGS, Subject
 from fleet.language.statements.claims import Claims
 from fleet.language.vocabulary import Vocabulary
@@ -141,6 +142,8 @@ class _StatementParser(Claims):
                 return self.lost(things)
             raise self._unread()
         standing = cursor.tokens[cursor.at - 1].word == "'s"
+        if self._has(things):
+            return None
         if all(s.type == "robot" for s in things):
             holding = cursor.take_of(GRIPPING)
             if holding or cursor.take_of(CARRYING):
@@ -172,7 +175,26 @@ class _StatementParser(Claims):
             raise self._unread(start if cursor.ended else None)
         if cursor.take_of(UNKNOWN):
             return self.lost(things)
+        if all(s.type == "object" for s in things) and (made := self.state()) is not None:
+            return self.are_so(things, made)
         return self._at(things)
+
+    def _has(self, subjects: Sequence[Subject]) -> bool:
+        """`Anna has the cup`, `the drawer contains the forks`, after the subject; past it."""
+        cursor, start = self.cursor, self.cursor.at
+        if len(subjects) != 1 or subjects[0].type != "object":
+            return False
+        one = subjects[0]
+        names = one.names if isinstance(one, NounPhrase) else one.subjects
+        person = all(map(self.vocabulary.is_person, names))
+        verbs = (*CARRYING, *GRIPPING) if person else HOUSES
+        known = person or all(name in self.vocabulary.good_for for name in names)
+        if not known or not cursor.take_of(verbs) or not self.nouns.starts(("object",)):
+            cursor.at = start
+            return False
+        by = self.subjects.resolve(one).subjects
+        self.put(self.subjects.read("an object", ("object",)), by[0])
+        return True
 
     def _at(self, things: Sequence[Subject]) -> None:
         """`… in PLACE`, after what stands there."""

@@ -24,8 +24,9 @@ CATEGORIES: dict[EntityType, tuple[str, ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class Entity:
-    """Something that has a name; of each there is one in a lexicon. A surface stands for the place
-    that it belongs to."""
+    """Something that has a name. A surface stands for the place that it belongs to, where it is no
+    thing of its own. A thing that others can be on or in, and a person, is a surface as well as an
+    object, and stands for itself."""
 
     id: str
     type: EntityType
@@ -190,16 +191,21 @@ def lexicon_of(vocabulary: Vocabulary) -> Lexicon:
 
 def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
     for thing in vocabulary.objects.values():
+        names = _names(thing.object, thing.label, *thing.aliases)
+        kin = _names(thing.kind)
         yield Entity(
             thing.object,
             "object",
             thing.object,
-            _names(thing.object, thing.label, *thing.aliases),
+            names,
             _kinds("object", thing.kind, *thing.categories),
             thing.ordinal,
-            _names(thing.kind),
+            kin,
             frozenset(thing.uses),
         )
+        if thing.object in vocabulary.good_for:
+            kinds = _names(thing.kind, *thing.categories)
+            yield Entity(thing.object, "surface", thing.object, names, kinds, thing.ordinal, kin)
     for spec in vocabulary.robots.values():
         yield Entity(
             spec.robot,
@@ -218,6 +224,8 @@ def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
             _kinds("place"),
         )
         for surface in place.surfaces:
+            if surface.surface in vocabulary.objects:
+                continue
             yield Entity(
                 surface.surface, "surface", place.place, _names(surface.surface), frozenset()
             )

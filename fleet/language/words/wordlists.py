@@ -30,6 +30,7 @@ WHOLE_HOUSE = phrases(
     "the whole home|the flat|the whole flat|the building|the whole building|everywhere|house|"
     "everything|the entire apartment|the entire home|the entire flat|the entire building"
 )
+SPEAKER = frozenset({"me", "us"})
 BASKETS = frozenset({"basket", "tray"})
 
 # --- who and how many ----------------------------------------------------------------------------

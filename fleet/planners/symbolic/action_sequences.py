@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
 from msgspec.structs import replace
 
+from fleet.core.model.derived import is_closed, is_located
 from fleet.core.model.world import WorldModel, condition_holds
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import ActionSequence
 from fleet.planners.symbolic.finite_domain import FiniteDomainTask
-from fleet.planners.symbolic.grounding import Facts, Grounding
+from fleet.planners.symbolic.grounding import Grounding
 from fleet.planners.symbolic.impossibility import what_is_missing
+from fleet.planners.symbolic.instantiation import Facts
 from fleet.planners.symbolic.robot_classes import representatives
-from fleet.planners.symbolic.search import Solution, Solver, Unfinished
+from fleet.planners.symbolic.search import Solution, Solver, Unfinished, Unreachable
 from fleet.planners.symbolic.travel import Travel
 from keyexpr_schema.facts import AT, HELD, HOLDING, SEARCHED, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
@@ -26,6 +28,8 @@ ALTERNATIVES = 4
 UNLOADING_S = 30.0
 """What it counts for, in seconds, that an object ends in a basket and not on a table: somebody
 still has to take it out, which is about one more task for a hand."""
+CLOSED = "openable & contains"
+"""What things may be in that are not seen from outside."""
 NEAREST_STEPS = 4
 """Steps named of those that a search still lacked when it gave up."""
 REUSE_CHARGE_S = 200.0
@@ -130,8 +134,8 @@ def alternatives_for(
         rides_with = world.value(AT, condition.subject)
         spoken_of = (condition.subject, condition.value, rides_with)
         named = frozenset(robot for robot in world.robots if robot in spoken_of)
-        content = tuple((action.skill.name, *action.args.values()) for action in result.actions)
-        sequences.setdefault(content, ActionSequence(subgoal.goal, result.actions, named))
+        sequence = ActionSequence(subgoal.goal, result.actions, named)
+        sequences.setdefault(sequence.lifted, sequence)
     return tuple(sequences.values())[:ALTERNATIVES], found[0][0].facts
 
 
@@ -177,21 +181,21 @@ def _different_solutions(sought: _Sought, budget: TimeBudget) -> list[Solution] 
     task, travel = sought.task, sought.task.travel
     charge_s = [0.0] * len(task.operators)
     numbers = {id(operator.action): number for number, operator in enumerate(task.operators)}
+    found: Solution | Unreachable | Unfinished | None = sought.solver.solve(charge_s, budget)
+    if isinstance(found, Unfinished):
+        return found
     solutions: list[Solution] = []
-    for _ in range(ALTERNATIVES):
-        found = sought.solver.solve(charge_s, budget, thorough=not solutions)
-        if isinstance(found, Unfinished) and not solutions:
-            return found
-        if not isinstance(found, Solution):
-            break
+    while isinstance(found, Solution):
         solutions.append(found)
+        if len(solutions) == ALTERNATIVES:
+            break
         for action in found.actions:
             number = numbers.get(id(action))
             if number is not None:
                 charge_s[number] += REUSE_CHARGE_S
             else:
-                way = action.actor, str(action.after[0].value)
-                travel.charge_s[way] = travel.charge_s.get(way, 0.0) + REUSE_CHARGE_S
+                travel.charge(action.actor, str(action.after[0].value), REUSE_CHARGE_S)
+        found = sought.solver.another(charge_s, budget)
     return solutions
 
 
@@ -218,7 +222,8 @@ def _sought(
 def exploration_for(
     subgoals: Sequence[Subgoal], problem: PlanningProblem, budget: TimeBudget
 ) -> Exploration | None:
-    """Looking around in every place where nobody has looked yet, for all that the subgoals lack.
+    """Looking around in every place where nobody has looked yet, for all that the subgoals lack;
+    when that is done, into everything that is closed.
 
     `None` where nothing is left to look for, or nobody can look. Places that the `budget` does not
     suffice for are left to a later revision.
@@ -229,20 +234,34 @@ def exploration_for(
             subject
             for subgoal in subgoals
             for subject in subgoal.condition.subjects
-            if subject in world.objects and world.value(AT, subject) is None
+            if subject in world.objects and not is_located(subject, world.facts.get, world)
         )
     )
     if not seeks:
         return None
-    facts: Facts = dict(world.facts)
+    closed = (name for name in world.of_type(CLOSED) if is_closed(name, world.facts.get, world))
+    return _looked_into(world.places, seeks, subgoals[0], problem, budget) or _looked_into(
+        closed, seeks, subgoals[0], problem, budget
+    )
+
+
+def _looked_into(
+    spots: Iterable[str],
+    seeks: tuple[str, ...],
+    subgoal: Subgoal,
+    problem: PlanningProblem,
+    budget: TimeBudget,
+) -> Exploration | None:
+    """Looking around in places, or into things, where nobody has looked yet."""
+    facts: Facts = dict(problem.world.facts)
     sequences: list[ActionSequence] = []
     conditions: list[Condition] = []
-    for place in world.places:
+    for place in spots:
         if place in problem.searched:
             continue
         facts[FactKey(SEARCHED, place)] = False
         condition = Condition(relation=SEARCHED, subject=place, value=True)
-        found = alternatives_for(Subgoal(subgoals[0].goal, condition), facts, world, budget)
+        found = alternatives_for(Subgoal(subgoal.goal, condition), facts, problem.world, budget)
         if isinstance(found, tuple):
             sequences.append(found[0][0])
             conditions.append(condition)

@@ -13,13 +13,14 @@ all robots that can, in parallel. What is found leads to the next revision.
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from itertools import cycle, product
 from math import inf, prod
 
-from fleet.core.actors import carried_at_end, least_loaded
+from fleet.core.actors import carried_at_end
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
+from fleet.core.model.derived import is_located
 from fleet.core.model.world import WorldModel
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, Planner, PlanningProblem
@@ -32,13 +33,15 @@ from fleet.planners.symbolic.action_sequences import (
     exploration_for,
     subgoals_in_order,
 )
-from fleet.planners.symbolic.grounding import Facts
+from fleet.planners.symbolic.instantiation import Facts
 from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
-from keyexpr_schema.facts import AT, FactKey
+from fleet.scheduling.quick_allocation import quick_allocation
 from keyexpr_schema.payloads.plans import Plan
 
-MAX_COMBINATIONS = 64
+MAX_COMBINATIONS = 256
 """Up to this many combinations are all compared; beyond, one sequence is changed at a time."""
+MOST_REFINED, REFINING_NODES = 12, 3000
+"""Of those, how many of the most promising get a better allocation, and how long it is sought."""
 MAX_RESTORATIONS = 2
 """How often what the sequences for later subgoals undid is reached again, where no plan does."""
 
@@ -139,7 +142,7 @@ def _in_time(
 
 def _needs_locating(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
     return any(
-        subject in world.objects and facts.get(FactKey(AT, subject)) is None
+        subject in world.objects and not is_located(subject, facts.get, world)
         for subject in subgoal.condition.subjects
     )
 
@@ -173,6 +176,12 @@ class _Candidate:
     choice: Choice
     allocated: AllocatedPlan
     cost: Cost
+
+    def refined(self) -> _Candidate:
+        """With a better allocation, if a look at all of a small plan's finds one."""
+        checked = self.allocated.checked
+        made = _allocated(self.choice, checked, quick_allocation(checked, REFINING_NODES))
+        return made if made is not None and made.cost < self.cost else self
 
     def verified(self) -> _Candidate | NoPlan:
         """With the cost of the shortest schedule that passes the checker."""
@@ -240,6 +249,12 @@ def _best(
             candidates.append(candidate(choice))
             if problem.budget.over:
                 break
+        candidates.sort(key=_promise)
+        for number, found in enumerate(candidates[:MOST_REFINED]):
+            if problem.budget.over:
+                break
+            if isinstance(found, _Candidate):
+                candidates[number] = found.refined()
         any_valid = False
         for found in sorted(candidates, key=_promise):
             if any_valid and problem.budget.over:
@@ -272,9 +287,15 @@ def _candidate(
     checked = check_plan(_plan(problem, choice, explored), problem.world)
     if isinstance(checked, InvalidPlan):
         return NoPlan(checked.violations[0].sentence, checked.violations)
-    allocation = least_loaded(checked)
+    made = _allocated(choice, checked, quick_allocation(checked))
+    return made or NoPlan("there are fewer robots than the plan needs at the same time")
+
+
+def _allocated(
+    choice: Choice, checked: CheckedPlan, allocation: Mapping[str, str] | None
+) -> _Candidate | None:
     if allocation is None:
-        return NoPlan("there are fewer robots than the plan needs at the same time")
+        return None
     allocated = AllocatedPlan(checked, allocation)
     schedule = next(allocated.schedules(), None)
     cost = (inf, inf) if schedule is None else _cost(schedule, checked)

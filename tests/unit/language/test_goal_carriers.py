@@ -1,0 +1,179 @@
+"""Sentences about what is on, in and at other things, about people, and about what opens."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from fleet.errors import NotUnderstood
+from fleet.language import SkillPhrase, Vocabulary, read_goal, statement_facts
+from keyexpr_schema.payloads.world import Object, Place
+from tests.support.household import carrier, manipulator
+from tests.support.language_house import shown
+
+
+def thing(name: str, *features: str, label: str = "", **more: object) -> Object:
+    kind = name.rstrip("_12").split("_")[-1]
+    given = {"object": name, "kind": kind, "label": label or name.replace("_", " "), **more}
+    return Object(features=features, **given)  # type: ignore[arg-type]
+
+
+THINGS = (
+    thing("kitchen_table", "supports", movable=False, home="kitchen"),
+    thing("coffee_table", "supports", movable=False, home="living_room"),
+    thing("shelf", movable=False, home="living_room"),
+    thing("shelf_board_1", "supports", movable=False, part_of="shelf", label="upper board"),
+    thing("shelf_board_2", "supports", movable=False, part_of="shelf", label="lower board"),
+    thing("fridge", "contains", "openable", movable=False, home="kitchen"),
+    thing("cupboard", "contains", "openable", movable=False, home="kitchen"),
+    thing("box", "contains", "supports"),
+    thing("bowl", "contains"),
+    thing("tray_1", "supports", label="tray", aliases=("serving tray",)),
+    thing("television", "switchable", movable=False, home="living_room"),
+    thing("lamp", "switchable", home="shelf_board_1"),
+    thing("fork"),
+    thing("cup_1", label="first cup", home="cupboard"),
+    thing("cup_2", label="second cup", ordinal=2, home="cupboard"),
+    thing("anna", "person", label="Anna"),
+)
+PHRASES = tuple(
+    SkillPhrase(verb=verb, type=kind, wants=((relation, value),))
+    for verb, kind, relation, value in (
+        ("open", "openable", "is_open", True),
+        ("close", "openable", "is_open", False),
+        ("switch on", "switchable", "is_on", True),
+        ("switch off", "switchable", "is_on", False),
+    )
+)
+WORDS = Vocabulary(
+    places={
+        name: Place(place=name, label=name.replace("_", " ").capitalize())
+        for name in ("kitchen", "living_room", "hallway")
+    },
+    objects={each.object: each for each in THINGS},
+    robots={spec.robot: spec for spec in (manipulator(), carrier())},
+    whereabouts={
+        "cup_1": "kitchen", "cup_2": "kitchen", "kitchen_table": "kitchen", "fridge": "kitchen",
+        "cupboard": "kitchen", "coffee_table": "living_room", "shelf": "living_room",
+        "anna": "living_room", "lamp": "living_room",
+    },
+    rests={"cup_1": "kitchen_table", "cup_2": "fridge", "lamp": "coffee_table"},
+    carriers={
+        "cup_1": ("kitchen_table", "kitchen"),
+        "cup_2": ("fridge", "kitchen"),
+        "lamp": ("coffee_table", "living_room"),
+        "kitchen_table": ("kitchen",),
+        "coffee_table": ("living_room",),
+        "fridge": ("kitchen",),
+        "cupboard": ("kitchen",),
+        "shelf": ("living_room",),
+        "anna": ("living_room",),
+    },
+    skill_phrases=PHRASES,
+)  # fmt: skip
+
+
+def read(text: str, speaker: str | None = None) -> str:
+    return shown(read_goal(text, replace(WORDS, speaker=speaker)))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("Set the lamp on the shelf", "on(lamp) = shelf"),
+        ("Put the lamp on the upper board", "on(lamp) = shelf_board_1"),
+        ("Put the fork in the bowl", "in(fork) = bowl"),
+        ("Put the first cup into the fridge", "in(cup_1) = fridge"),
+        ("Put the fork in the box", "in(fork) = box"),
+        ("Put the fork on the box", "on(fork) = box"),
+        ("Bring the fork to the box", "at(fork) = box"),
+        ("Bring the fork to the kitchen table", "on(fork) = kitchen_table"),
+        ("Put the fork on the table in the living room", "on(fork) = coffee_table"),
+        ("Put the fork on the tray", "on(fork) = tray_1"),
+        ("Put the cup from the fridge on the kitchen table", "on(cup_2) = kitchen_table"),
+        ("Bring the cup in the fridge to the hallway", "at(cup_2) = hallway"),
+        ("Bring the cup on the table in the kitchen to the hallway", "at(cup_1) = hallway"),
+        ("Bring the lamp to the kitchen and put it on the kitchen table",
+         "on(lamp) = kitchen_table"),
+        ("The fork should be in the bowl", "in(fork) = bowl"),
+        ("Make sure that the fork is on the kitchen table", "on(fork) = kitchen_table"),
+        ("Give the first cup to Anna", "at(cup_1) = anna"),
+        ("Give Anna the first cup", "at(cup_1) = anna"),
+        ("Hand the fork over to Anna", "at(fork) = anna"),
+        ("Bring Anna the fork", "at(fork) = anna"),
+        ("Send a robot to Anna", "at(hsr|locobot) = living_room"),
+        ("Go to the fridge", "at(hsr|locobot) = kitchen"),
+        ("Put the lamp back", "on(lamp) = shelf_board_1"),
+        ("Put the cups away", "in(cup_1) = cupboard; in(cup_2) = cupboard"),
+        ("Clear the kitchen table", "in(cup_1) = cupboard"),
+        ("Search the fridge", "searched(fridge)"),
+        ("Look into the cupboard", "searched(cupboard)"),
+        ("Search the coffee table", "searched(living_room)"),
+        ("Look for the fork in the fridge", "searched(fridge); located(fork)"),
+        ("Open the fridge", "is_open(fridge)"),
+        ("Close everything", "is_open(fridge) = False; is_open(cupboard) = False"),
+        ("Switch on the lamp", "is_on(lamp)"),
+        ("Switch the lamp off", "is_on(lamp) = False"),
+        ("Turn on the television", "is_on(television)"),
+        ("Shut the fridge", "is_open(fridge) = False"),
+        ("The fridge should be closed", "is_open(fridge) = False"),
+        ("Make sure that the cupboard is open", "is_open(cupboard)"),
+        ("The lamp should be on", "is_on(lamp)"),
+        ("Put the fork in the fridge and close the fridge",
+         "in(fork) = fridge; is_open(fridge) = False"),
+        ("Put the fork on the tray, then bring the tray to the hallway",
+         "on(fork) = tray_1 > at(tray_1) = hallway"),
+    ],
+)  # fmt: skip
+def test_goals_keep_the_finest_place_that_is_named(text: str, expected: str) -> None:
+    assert read(text) == expected
+
+
+@pytest.mark.parametrize(
+    "text", ["Bring me the fork", "Bring the fork to me", "Give me the fork", "Get me the fork"]
+)
+def test_me_is_the_speaker_of_the_goal(text: str) -> None:
+    assert read(text, "anna") == "at(fork) = anna"
+    with pytest.raises(NotUnderstood):
+        read(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("Put the lamp on the television", "nothing can be put on or in television"),
+        ("Put the fork on the fridge", "nothing can be put on fridge, only in it"),
+        ("Put the bowl in the bowl", "nothing can be on or in itself"),
+        ("Bring the television to the kitchen", "television cannot be moved"),
+        ("Bring Anna to the kitchen", "anna cannot be moved"),
+        ("Give the fork to the bowl", "'bowl' is no robot or person"),
+        ("Open the lamp", "lamp cannot be opened"),
+        ("Switch on the fork", "fork cannot be switched on"),
+        ("Put the fork on the kitchen table and in the bowl", "two places"),
+    ],
+)
+def test_what_cannot_be_is_refused(text: str, reason: str) -> None:
+    with pytest.raises(NotUnderstood) as refused:
+        read(text)
+    assert reason in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("The fork is in the bowl", "at(fork) = bowl"),
+        ("The lamp is on the shelf", "at(lamp) = shelf"),
+        ("There is a fork on the table in the kitchen", "at(fork) = kitchen_table"),
+        ("Anna is in the kitchen", "at(anna) = kitchen"),
+        ("The robot hsr is at the fridge", "at(hsr) = kitchen"),
+        ("The fridge is open", "is_open(fridge) = true"),
+        ("The cupboard is closed and the lamp is on",
+         "is_open(cupboard) = false; is_on(lamp) = true"),
+        ("Anna has the fork", "at(fork) = anna"),
+        ("The fridge contains the first cup", "at(cup_1) = fridge"),
+    ],
+)  # fmt: skip
+def test_statements_keep_the_finest_place_that_is_named(text: str, expected: str) -> None:
+    assert "; ".join(map(str, statement_facts(text, WORDS))) == expected

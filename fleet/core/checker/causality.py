@@ -137,8 +137,7 @@ class Causality:
     def _holds(self, literal: Literal, value: Value) -> bool:
         """Whether a plain literal holds where its variable has that value."""
         return value == literal.value or (
-            value is not None
-            and literal.variable.relation == AT
+            literal.variable.relation == AT
             and holds(literal, lambda v: value if v == literal.variable else None, self._world)
         )
 

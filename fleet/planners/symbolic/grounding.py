@@ -131,9 +131,12 @@ class Grounding:
         for value in dict.fromkeys(values):
             if value != subject:
                 self._want(Literal(key, value))
-        if not (aboard or self._thorough):
-            return
-        around = [*self._around(subject), *(self._carriers if self._thorough else ())]
+        if self._thorough:
+            around = [*self._around(subject), *self._carriers]
+        elif self.skills.writable(key):
+            return  # it can be taken there itself
+        else:
+            around = [*self._around(subject)]
         for carrier in around:  # it comes along with what carries it
             if carrier in self.world.objects and self.skills.writable(FactKey(AT, carrier)):
                 literal = Literal(FactKey(AT, carrier), where)

@@ -222,3 +222,27 @@ def test_a_check_costs_what_the_plan_has() -> None:
     few, many = calls_to_check(60), calls_to_check(250)
     assert many < 6 * few
     assert many < 1_500_000
+
+
+def test_furniture_is_where_it_belongs_unless_somebody_says_otherwise() -> None:
+    skills = skills_from_data(
+        {
+            "skills": {
+                "dust": {
+                    "parameters": {"robot": "robot", "thing": "contains", "place": "place"},
+                    "before": ["at(thing) = place"],
+                    "after": ["dusty(thing) = false"],
+                }
+            }
+        },
+        "here",
+    )
+    fixed = replace(BOX, movable=False, home="kitchen")
+    world = home((replace(manipulator(), skills=("dust",)),))
+    world = changed(world, skills=skills, objects={"box": fixed})
+    here = task("t1", "dust", "a1", thing="box", place="kitchen")
+    there = replace(here, args={**here.args, "place": "hallway"})
+    assert not check_plan(plan(here), world).violations
+    assert [v.code for v in check_plan(plan(there), world).violations] == ["condition-unmet"]
+    moved = world.with_facts({FactKey("at", "box"): "hallway"})
+    assert not check_plan(plan(there), moved).violations

@@ -8,6 +8,7 @@ from __future__ import annotations
 import immutables
 from msgspec.structs import replace
 
+from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.indexes.fact_views import FactValues
 from fleet.core.indexes.fleet_index import M, carrier_in, in_set, rest_in
 from fleet.core.indexes.touches import Part, Touch, Touches
@@ -147,6 +148,9 @@ def touched_carriers(state: State, subject: str, touches: Touches) -> Touches:
 def set_object(state: State, thing: Object) -> State:
     """Keep a thing; what was said to be on or in it was said of where that is."""
     name = thing.object
+    if thing.part_of is not None:
+        whole = Literal(FactKey(AT, name), thing.part_of)
+        state = _without_circle(state, Fact.of(whole, PLANNER_SOURCE, state.time_s)) or state
     state = _part_changed(state, name, thing.part_of)
     return _said_on_known(replace(state, objects=state.objects.set(name, thing)), name)
 

@@ -141,7 +141,7 @@ def test_nothing_is_in_two_places_and_the_newest_word_holds(
         value = values.get(FactKey(AT, name))
         if value is None:
             reached["circle"] += bool(last) and all(f.value is not None for f in last)
-        elif last:
+        elif last:  # of the same moment the finer one, or the last
             assert value in {f.value for f in last}
             reached["finer"] += len({f.value for f in last}) > 1
 
@@ -215,6 +215,8 @@ def test_whatever_the_household_does_things_are_in_one_place_and_follow_their_ca
                 )
             closed = any(is_closed(carrier, facts.get, WORLD) for carrier in around)
             reached["closed"] += closed
+            if action.skill.name == "pick" and action.args["object"] == name:
+                assert not any(is_closed(c, facts.get, WORLD) for c in before[name])
 
 
 @reaches("read", "not read")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from keyexpr_schema.facts import AT, HOLDING, NOTHING, ON, FactKey, Literal, Value
+from keyexpr_schema.facts import AT, HOLDING, IS_OPEN, NOTHING, ON, FactKey, Literal, Value
 from keyexpr_schema.payloads.motions import (
     Detection,
     Motion,
@@ -96,21 +96,30 @@ class SkillContext:
         return outcome
 
     async def look(self) -> tuple[Detection, ...]:
-        """Look around. What is seen elsewhere than the facts say, or on another support, is a fact.
+        """Look around. What is seen elsewhere than the facts say, or on another support, or in
+        another state, is a fact.
 
         Raises:
             SkillFailed: the camera gave nothing.
         """
         seen = (await self.do(MotionKind.LOOK)).detections
         for detection in seen:
+            name = detection.object
+            for state, value in detection.states.items():
+                if self.known(state, name) != value:
+                    self.observe(state, name, value)
+            if not self.world.moves(name):
+                continue
             where = self.world.whereabouts(detection)
-            if where is not None and self._known(detection.object) != where:
-                self.observe(AT, detection.object, where)
-            # In a basket it is at the robot, which says all; `on` is of furniture and the floor.
-            if where in self.world.places and self._known(detection.object, ON) != (
-                detection.support
-            ):
-                self.observe(ON, detection.object, detection.support)
+            if where is not None and self.known(AT, name) != where:
+                self.observe(AT, name, where)
+            # On or in a thing or in a basket it is at that, which says all; `on` is of furniture
+            # that is no thing and of the floor.
+            if where in self.world.places:
+                if self.known(ON, name) != detection.support:
+                    self.observe(ON, name, detection.support)
+            elif where is not None and self.known(ON, name) is not None:
+                self.observe(ON, name, None)
         return seen
 
     async def holding(self) -> str | None:
@@ -119,7 +128,7 @@ class SkillContext:
         self.observe(HOLDING, self.robot, NOTHING if held is None else held)
         if held is not None:
             self.observe(AT, held, self.robot)
-            if self._known(held, ON) is not None:
+            if self.known(ON, held) is not None:
                 self.observe(ON, held, None)
         return held
 
@@ -139,6 +148,18 @@ class SkillContext:
         self.observe(AT, self.robot, place)
         return senses
 
-    def _known(self, object: str, relation: str = AT) -> Value:
-        fact = self._observed.get(FactKey(relation, object))
-        return fact.value if fact is not None else self.world.value_of(relation, object)
+    def known(self, relation: str, subject: str) -> Value:
+        """What this attempt has observed of `relation(subject)`, else what the facts say."""
+        fact = self._observed.get(FactKey(relation, subject))
+        return fact.value if fact is not None else self.world.value_of(relation, subject)
+
+    def closed_around(self, object: str) -> str | None:
+        """The closed thing that an object is in, by what is known; `None`: nothing is closed."""
+        return next(
+            (
+                carrier
+                for carrier in self.world.carriers(object)
+                if self.world.closed(carrier) and self.known(IS_OPEN, carrier) is not True
+            ),
+            None,
+        )

@@ -6,11 +6,11 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
-from keyexpr_schema.facts import AT, FactKey, Value
+from keyexpr_schema.facts import AT, IS_OPEN, FactKey, Value
 from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, ROBOT_SPEC, ROBOT_STATE
 from keyexpr_schema.payloads.motions import Detection
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
-from keyexpr_schema.payloads.world import Fact, Object, Place
+from keyexpr_schema.payloads.world import Fact, Feature, Object, Place
 from keyexpr_schema.transport.session import Change
 
 FLOOR = "floor"
@@ -67,12 +67,59 @@ class WorldCache:
         """The known objects of which the facts say that they are at `place`, sorted."""
         return tuple(sorted(o for o in self.objects if self.value_of(AT, o) == place))
 
+    def visible_in(self, place: str) -> tuple[str, ...]:
+        """The objects that should be seen in a place: by the facts they are there, in nothing that
+        is closed and in no robot's hand or basket."""
+        return tuple(
+            sorted(
+                name
+                for name in self.objects
+                if self.moves(name)
+                and self.place_of(_word(self.value_of(AT, name))) == place
+                and not any(self.closed(c) for c in self.carriers(name))
+            )
+        )
+
+    def moves(self, thing: str) -> bool:
+        """Whether a thing's whereabouts are to be observed: of furniture they are known."""
+        found = self.objects.get(thing)
+        return found is None or found.movable or found.is_a(Feature.PERSON)
+
+    def carriers(self, thing: str) -> tuple[str, ...]:
+        """What carries a thing, by the facts: directly first, and the wholes of parts."""
+        found: list[str] = []
+        at: str | None = thing
+        while at is not None and at in self.objects and at not in found[:-1]:
+            about = self.objects[at]
+            known = _word(self.value_of(AT, at))
+            at = about.part_of or known or (None if about.movable else about.home)
+            if at is not None:
+                found.append(at)
+        return tuple(found)
+
+    def closed(self, thing: str) -> bool:
+        """Whether a thing opens, and is not known to be open."""
+        about = self.objects.get(thing)
+        opens = about is not None and about.is_a(Feature.OPENABLE)
+        return opens and self.value_of(IS_OPEN, thing) is not True
+
+    def place_of(self, where: str | None) -> str | None:
+        """The place where something is that is at `where`: a place, or a thing in one. A robot's
+        basket is where it is; `None`: unknown."""
+        if where is None or where in self.places or where in self.specs:
+            return where
+        found = self.carriers(where)
+        return found[-1] if found and found[-1] in {*self.places, *self.specs} else None
+
     def whereabouts(self, seen: Detection) -> str | None:
         """The value of `at(object)` that a detection shows.
 
-        That is the place where the object lies on floor or furniture, or the robot in whose
-        basket it lies; `None` if the detection does not show it (in a hand, outside all places).
+        That is the thing that it is on or in, else the place where it lies on floor or furniture,
+        or the robot in whose basket it lies; `None` if the detection does not show it (in a hand,
+        outside all places).
         """
+        if seen.support in self.objects:
+            return seen.support
         if seen.support == FLOOR:
             if seen.place is not None:
                 return seen.place
@@ -82,6 +129,10 @@ class WorldCache:
             if any(surface.surface == seen.support for surface in place.surfaces):
                 return place.place
         return seen.support if seen.support in self.specs else None
+
+
+def _word(value: Value) -> str | None:
+    return value if isinstance(value, str) else None
 
 
 def _put(table: dict[Any, Any], name: object, value: object | None) -> None:

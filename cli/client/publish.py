@@ -26,6 +26,7 @@ from keyexpr_schema.payloads.goals import Goal, GoalAddress
 from keyexpr_schema.payloads.world import (
     Fact,
     FactAddress,
+    Feature,
     Statement,
     StatementAddress,
 )
@@ -73,6 +74,7 @@ async def put_fact(session: Session, relation: str, subject: str, written: str) 
 
     Raises:
         Unknown: `at` of something that is no object or robot, or of a place that is none.
+        BadArgument: something would be at itself.
     """
     value = parse_value(written)
     if relation == AT:
@@ -82,7 +84,9 @@ async def put_fact(session: Session, relation: str, subject: str, written: str) 
         check_known("object or robot", subject, [*objects, *robots], how)
         if value is not None:
             places = [a.place for a in await session.list(PLACE)]
-            check_known("place or robot", written, [*places, *robots], how)
+            check_known("place, object or robot", written, [*places, *objects, *robots], how)
+            if written == subject:
+                raise BadArgument(f"{subject} cannot be on or in itself")
     fact = Fact(
         subject=subject,
         relation=relation,
@@ -117,14 +121,20 @@ async def put_goal(
     name: str | None,
     priority: int = 0,
     within_s: float | None = None,
+    speaker: str | None = None,
 ) -> Goal:
     """Store a goal, confirmed, after all that were given before it; due `within_s` from now [s].
 
     Raises:
         BadArgument: it has no words, or there is a goal of that name.
+        Unknown: `speaker` is no person in the world.
     """
     if not text.strip():
         raise BadArgument("say what you want, such as “Bring the first cup to the hallway.”")
+    if speaker is not None:
+        things = (await session.list(OBJECT)).values()
+        people = [thing.object for thing in things if thing.is_a(Feature.PERSON)]
+        check_known("person", speaker, people, "declare people in the world file")
     stored = {address.goal: spec for address, spec in (await session.list(GOAL_SPEC)).items()}
     ended = [address.goal for address in await session.list(GOAL_STATUS)]
     taken = {*stored, *ended}
@@ -139,6 +149,7 @@ async def put_goal(
             due_s=None if within_s is None else said_s + within_s,
             ordinal=ordinal,
             said_s=said_s,
+            speaker=speaker,
         )
         address = GoalAddress(spec.goal)
         if spec.goal not in stored and await session.create(GOAL_SPEC, address, spec):

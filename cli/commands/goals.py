@@ -37,6 +37,12 @@ async def add(
             help="When it should be done, from now; plans keep to that if they can.",
         ),
     ] = None,
+    speaker: Annotated[
+        str | None,
+        typer.Option(
+            "--speaker", metavar="PERSON", help='Who says it, of the people in the world: "me".'
+        ),
+    ] = None,
     plan: Annotated[
         bool, typer.Option("--plan", help="Have it planned and carried out at once.")
     ] = False,
@@ -62,7 +68,7 @@ async def add(
                 "no planner is running, so the goal was not stored; start one with "
                 "`robotctl planner`, or leave --plan out"
             )
-        spec = await put_goal(session, text, name, priority, within_s)
+        spec = await put_goal(session, text, name, priority, within_s, speaker)
         if not (wait or plan) and not await planner_alive(session):
             call.show(
                 GoalRow(goal=spec.goal, spec=spec, status=None),

@@ -21,6 +21,7 @@ from keyexpr_schema.payloads.goals import GoalState, GoalStatus
 from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.files.mission_file import Mission, load_mission
+from sim.files.world_payloads import object_payloads
 
 if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Change
@@ -129,7 +130,8 @@ class Demo:
         beliefs = {
             thing: fact.value for (relation, thing), fact in view.facts.items() if relation == AT
         }
-        verdicts = goal_verdicts(self._statuses(), view.truths, places, beliefs)
+        objects = {thing.object: thing for thing in object_payloads(self.mission.world)}
+        verdicts = goal_verdicts(self._statuses(), view.truths, places, beliefs, objects)
         records = list(view.tasks.values())
         makespan_s, busy_s, idle_s = times(records, robots)
         recording = self.options.out / RECORDING

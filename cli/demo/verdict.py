@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 import msgspec
 
-from keyexpr_schema.facts import AT, HELD, LOCATED, Value
+from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, Value, render_value
 from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
 from keyexpr_schema.payloads.simulation import Truth
+from keyexpr_schema.payloads.world import Object
 
 
 class Verdict(str, Enum):
@@ -49,17 +50,21 @@ def goal_verdicts(
     truths: Mapping[str, Truth],
     robot_places: Mapping[str, str | None],
     beliefs: Mapping[str, Value] = {},
+    objects: Mapping[str, Object] = {},
 ) -> tuple[GoalVerdict, ...]:
     """A verdict on every goal, in the order of `goals`.
 
     `robot_places` says which place each robot really stands in (`None`: in none), `beliefs` where
     the fleet takes each thing to be. `at(object)` holds when the object's truth is that place,
-    settled and in nobody's hand; lying in a robot's basket counts, as the goal's definition says.
+    settled and in nobody's hand; lying in a robot's basket counts, as the goal's definition says,
+    and so does being on or in what is there. `at`, `on` and `in` a thing, a part of it or a person
+    hold when that carries the object. States (`is_open`, `is_on`, …) are as the truth says;
+    `objects` say what is part of what.
     `at(robot)` holds when the robot stands there, `held(object)` when a hand really holds it, and
     `located(object)` when the fleet takes it to be where it really is. Nothing else can be seen by
     the physics. Of several subjects one is enough. A goal with no conditions is not judged either.
     """
-    seen = _Seen(truths, robot_places, beliefs)
+    seen = _Seen(truths, robot_places, beliefs, objects)
     return tuple(_goal_verdict(status, seen) for status in goals.values())
 
 
@@ -67,6 +72,24 @@ class _Seen(NamedTuple):
     truths: Mapping[str, Truth]
     robot_places: Mapping[str, str | None]
     beliefs: Mapping[str, Value]
+    objects: Mapping[str, Object]
+
+    def carriers(self, thing: str) -> tuple[str, ...]:
+        """What carries a thing directly and indirectly, and the wholes that those are part of."""
+        found: list[str] = []
+        at: str | None = thing
+        while at is not None and at not in found[:-1]:
+            truth, about = self.truths.get(at), self.objects.get(at)
+            at = about.part_of if about and about.part_of else truth.support if truth else None
+            if at is not None:
+                found.append(at)
+        return tuple(found)
+
+    def root(self, thing: str) -> Truth:
+        """The truth of the outermost object that carries a thing: it may be in a hand."""
+        carriers = [self.truths[c] for c in self.carriers(thing) if c in self.truths]
+        held = [truth for truth in carriers if truth.held_by is not None]
+        return held[0] if held else self.truths[thing]
 
 
 def all_agreed(verdicts: tuple[GoalVerdict, ...]) -> bool:
@@ -116,8 +139,13 @@ def _condition(condition: Condition, seen: _Seen) -> ConditionVerdict:
 
 def _for_subject(condition: Condition, subject: str, seen: _Seen) -> tuple[Verdict, str]:
     relation, wanted = condition.relation, condition.value
-    if relation == AT and subject in seen.truths:
-        return _object_at(seen.truths[subject], wanted)
+    if relation in (AT, ON, IN) and subject in seen.truths:
+        if relation == AT and wanted not in seen.objects:
+            return _object_at(seen.truths[subject], seen.root(subject), wanted)
+        return _carried(seen.truths[subject], seen, wanted)
+    if subject in seen.truths and relation in seen.truths[subject].states:
+        value = seen.truths[subject].states[relation]
+        return _holds(value == wanted), f"{relation}({subject}) is {render_value(value)}"
     if relation == AT and subject in seen.robot_places:
         place = seen.robot_places[subject]
         aim = "" if place == wanted else f", not in {wanted}"
@@ -143,17 +171,27 @@ def _located(truth: Truth, seen: _Seen) -> tuple[Verdict, str]:
         return Verdict.FAILS, f"{truth.object} lies in {where}, and the fleet does not know where"
     name = str(belief)
     place = seen.robot_places.get(name, name)
-    right = place == truth.place
+    right = place == truth.place or name in seen.carriers(truth.object)
     rest = "as the fleet says" if right else f"and the fleet says in {place}"
     return _holds(right), f"{truth.object} is in {where}, {rest}"
 
 
-def _object_at(truth: Truth, wanted: object) -> tuple[Verdict, str]:
-    where = f"in {truth.place}" if truth.place else "in no known place"
+def _carried(truth: Truth, seen: _Seen, wanted: object) -> tuple[Verdict, str]:
+    """Whether a thing, or a part of it, or a person carries an object."""
+    if not truth.settled:
+        return Verdict.FAILS, f"{truth.object} has not come to rest"
     if truth.held_by is not None:
+        return Verdict.FAILS, f"{truth.object} is still in the hand of {truth.held_by}"
+    at = truth.support or "nothing"
+    return _holds(wanted in seen.carriers(truth.object)), f"{truth.object} is at {at}"
+
+
+def _object_at(truth: Truth, root: Truth, wanted: object) -> tuple[Verdict, str]:
+    where = f"in {truth.place}" if truth.place else "in no known place"
+    if root.held_by is not None:
         return (
             Verdict.FAILS,
-            f"{truth.object} is {where} but still in the hand of {truth.held_by}",
+            f"{truth.object} is {where} but still in the hand of {root.held_by}",
         )
     if not truth.settled:
         return Verdict.FAILS, f"{truth.object} is {where} but has not come to rest"

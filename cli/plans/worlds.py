@@ -56,10 +56,11 @@ def world_of_files(
     where = [*(place.place for place in places), *(spec.robot for spec in specs)]
     known = [parse_fact(fact) for fact in facts]
     for fact in known:
-        subjects = [*where, *(thing.object for thing in objects)]
+        things = [thing.object for thing in objects]
+        subjects = [*where, *things]
         check_known("place, object or robot", fact.subject, subjects, "name it in a file")
         if fact.relation == AT and fact.value is not None:
-            check_known("place or robot", str(fact.value), where, "name it in a file")
+            check_known("place, object or robot", str(fact.value), subjects, "name it in a file")
     return WorldModel.of(skills, places, objects, specs, [*_empty_hands(specs), *known])
 
 

@@ -54,6 +54,8 @@ def goal_page(row: GoalRow) -> Group:
     lines = [Text.assemble((row.goal, "bold"), "  ", (state, STATE_STYLE.get(state, "")))]
     if row.spec is not None:
         lines.append(Text(f"wanted      “{row.spec.text}”"))
+        if row.spec.speaker is not None:
+            lines.append(Text(f"said by     {row.spec.speaker}"))
         lines.append(Text(f"priority    {row.spec.priority}"))
         if row.spec.due_s is not None:
             lines.append(Text(f"due         {seconds(row.spec.due_s)} on the fleet's clock"))

@@ -46,7 +46,7 @@ async def _find(ctx: SkillContext, object: str, place: str) -> Detection:
         async for seen in every:
             if (found := seen.get(object)) is not None:
                 where = ctx.world.whereabouts(found)
-                if where in (place, None):
+                if ctx.world.place_of(where) in (place, None):
                     return found
                 raise SkillFailed(
                     f"{object} is at {where}, not in {place}",
@@ -55,6 +55,9 @@ async def _find(ctx: SkillContext, object: str, place: str) -> Detection:
                 )
             if viewing.complete and viewing.looks >= LEAST_LOOKS:
                 break
+    closed = ctx.closed_around(object)
+    if closed is not None:
+        raise SkillFailed(f"{object} is in {closed}, which is closed", retryable=False)
     raise SkillFailed(
         f"{object} is not to be seen in {place}",
         retryable=False,

@@ -37,21 +37,24 @@ async def place(ctx: SkillContext, object: str, place: str) -> None:
     if seen is None:
         raise SkillFailed(f"{object} was put down in {place} but is not to be seen there now")
     where = ctx.world.whereabouts(seen)
-    if where != place:
+    if ctx.world.place_of(where) != place:
         raise SkillFailed(
             f"{object} was put down in {place} but lies in {where or 'no place'}", retryable=False
         )
     off_m = dist(seen.point_m, spot)
     if off_m > NEAR_M:
         ctx.log(f"{object} lies {off_m:.2f} m from where it was put, still in {place}")
-    ctx.observe(AT, object, place)
+    ctx.observe(AT, object, where)
 
 
 async def _lies_there_already(ctx: SkillContext, object: str, place: str, held: str | None) -> None:
     """Done if an earlier try put the object down; a failure for good if it is not in the hand."""
     for seen in await ctx.look():
-        if seen.object == object and ctx.world.whereabouts(seen) == place:
-            ctx.observe(AT, object, place)
+        if seen.object != object:
+            continue
+        where = ctx.world.whereabouts(seen)
+        if ctx.world.place_of(where) == place:
+            ctx.observe(AT, object, where)
             return
     raise SkillFailed(
         f"{ctx.robot} holds {held or NOTHING}, not {object}, so it cannot put it down in {place}",

@@ -38,7 +38,7 @@ async def place_on_robot(ctx: SkillContext, object: str, carrier: str, place: st
             retryable=False,
         )
     await ctx.be_in(place)
-    await _stand_beside(ctx, carrier, place)
+    await stand_beside(ctx, carrier, place)
     await ctx.do(MotionKind.RELEASE_IN_BASKET, object=object, robot=carrier)
     still = await ctx.holding()
     await ctx.do(MotionKind.STOW)
@@ -49,13 +49,17 @@ async def place_on_robot(ctx: SkillContext, object: str, carrier: str, place: st
     ctx.observe(AT, object, carrier)
 
 
-async def _stand_beside(ctx: SkillContext, carrier: str, place: str) -> None:
-    """Stand where the hand reaches over the carrier."""
+async def stand_beside(ctx: SkillContext, carrier: str, place: str) -> PointM:
+    """Stand where the hand reaches over the carrier; where that stands.
+
+    Raises:
+        SkillFailed: it is not there, or does not stand still.
+    """
     for _ in range(MOST_APPROACHES):
         point = await _stands_at(ctx, carrier, place)
         await ctx.do(MotionKind.APPROACH, robot=carrier, point_m=point)
         if dist(point, await _stands_at(ctx, carrier, place)) <= STOOD_STILL_M:
-            return
+            return point
         ctx.log(f"{carrier} has moved: goes after it")
     raise SkillFailed(f"{carrier} does not stand still in {place}")
 

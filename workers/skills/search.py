@@ -20,11 +20,13 @@ async def search(ctx: SkillContext, place: str) -> None:
     """
     await ctx.be_in(place)
     viewing = Viewing.of(ctx.world.places[place], ctx.spec)
-    expected = set(ctx.world.objects_at(place))
+    expected = set(ctx.world.visible_in(place))
     found: dict[str, str | None] = {}
     async with aclosing(looks(ctx, viewing)) as every:
         async for seen in every:
-            found.update((o, ctx.world.whereabouts(d)) for o, d in seen.items())
+            found.update(
+                (o, ctx.world.whereabouts(d)) for o, d in seen.items() if ctx.world.moves(o)
+            )
             if viewing.complete:
                 break
     for thing, where in found.items():

@@ -139,7 +139,7 @@ def holds(literal: Literal, value_of: ValueOf, world: Inventory, *, aboard: bool
     """
     (relation, subject), wanted = literal
     if relation == LOCATED:
-        return (_carrier(subject, value_of, world) is not None) is wanted
+        return is_located(subject, value_of, world) is wanted
     if relation == HELD:
         return (_holder(subject, value_of, world) is not None) is wanted
     if relation == REACHABLE:
@@ -149,6 +149,11 @@ def holds(literal: Literal, value_of: ValueOf, world: Inventory, *, aboard: bool
     if relation == AT and isinstance(wanted, str):
         return wanted in carriers(subject, value_of, world, aboard=aboard)
     return value_of(literal.variable) == wanted
+
+
+def is_located(subject: str, value_of: ValueOf, world: Inventory) -> bool:
+    """Whether it is known what carries it."""
+    return _carrier(subject, value_of, world) is not None
 
 
 def _holder(subject: str, value_of: ValueOf, world: Inventory) -> str | None:

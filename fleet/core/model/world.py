@@ -9,11 +9,11 @@ from math import inf
 
 import msgspec
 
-from fleet.core.model.derived import Inventory, holds
+from fleet.core.model.derived import Inventory, holds, written
 from fleet.core.model.durations import only_moves, pace, work_s
 from fleet.core.model.parameter_types import ParameterType, names_of, parse_type
 from fleet.core.model.skills import Action, SkillModel
-from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Literal, Value
+from keyexpr_schema.facts import AT, HOLDING, IN, NOTHING, ON, FactKey, Literal, Value
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -73,17 +73,23 @@ class WorldModel:
         available: Iterable[str] | None = None,
         durations: Mapping[str, Durations] | None = None,
     ) -> WorldModel:
-        """A model from payloads; without `available` every robot is taken to be connected."""
+        """A model from payloads; without `available` every robot is taken to be connected.
+
+        Of several facts about where a thing is, at a place, on or in a thing, the newest counts.
+        """
         specs = {spec.robot: spec for spec in robots}
-        return cls(
+        world = cls(
             skills=skills,
             places={place.place: place for place in places},
             objects={thing.object: thing for thing in objects},
             robots=specs,
             available=frozenset(specs if available is None else available),
-            facts={fact.key: fact.value for fact in facts},
             durations=durations or {},
         )
+        # One that does not say when it was said is said now; of the same moment the finer one.
+        said = sorted(facts, key=lambda f: (f.time_s == 0.0, f.time_s, f.relation in (ON, IN)))
+        literals = (written(fact.literal, world) for fact in said)
+        return replace(world, facts={literal.variable: literal.value for literal in literals})
 
     def value(self, relation: str, subject: str) -> Value:
         """The believed value of a variable; `None` is unknown."""

@@ -11,13 +11,14 @@ from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
 from fleet.llm.quoting import cleaned
 from fleet.llm.structured_output import StructuredAnswer, read_answer, schema_of
 from fleet.planners.llm.prompt_text import vocabulary_text
-from keyexpr_schema.facts import HELD, LOCATED
+from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, render_value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Violation
 
 MAX_CONDITIONS = 100
 DERIVED = {LOCATED: "it is known where the object is", HELD: "a hand holds the object"}
+READINGS_OF_AT = {ON: "it is on that thing", IN: "it is in that thing"}
 """Relations that follow from others; `keyexpr_schema.payloads.goals.Condition` says how."""
 
 Stages = tuple[tuple[Condition, ...], ...]
@@ -160,10 +161,10 @@ def _contradictions(number: int, stage: tuple[ConditionAnswer, ...]) -> list[Vio
 def _form(relation: str, signature: _Signature) -> str:
     """What a condition on the relation looks like."""
     forms = " or ".join(
-        f"{relation}({subject}) = {str(value).lower() if value is True else value}"
+        f"{relation}({subject}) = {render_value(value)}"
         for subject, value in sorted(signature, key=str)
     )
-    about = DERIVED.get(relation)
+    about = DERIVED.get(relation) or READINGS_OF_AT.get(relation)
     return forms + (f": {about}" if about else "")
 
 
@@ -174,11 +175,13 @@ def _signatures(skills: Mapping[str, SkillModel]) -> dict[str, _Signature]:
             if isinstance(value, str):
                 # `holding = nothing` is a word; `at = to` a parameter of some type.
                 values: tuple[str | bool, ...] = _bases(skill, value) or (value,)
-            elif value is True:
-                values = (True,)
+            elif isinstance(value, bool):
+                values = (value,)
             else:
                 continue
             types.setdefault(relation, set()).update(product(_bases(skill, subject), values))
+    if ("object", "object") in types.get(AT, ()):
+        types |= {relation: {("object", "object")} for relation in READINGS_OF_AT}
     for relation in DERIVED:
         types[relation] = {("object", True)}
     return dict(sorted(types.items()))

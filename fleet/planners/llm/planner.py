@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan
+from fleet.core.model.derived import is_located
 from fleet.core.model.world import WorldModel
 from fleet.llm.budget import Budget
 from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
@@ -22,7 +23,6 @@ from fleet.planners.llm.candidate import (
     world_after,
 )
 from fleet.planners.llm.prompt_text import problem_text, skills_text, team_skills
-from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan
 
@@ -154,7 +154,7 @@ def _not_located(goals: Sequence[Goal], world: WorldModel) -> str | None:
     for goal in goals:
         for condition in goal.conditions:
             things = [subject for subject in condition.subjects if subject in world.objects]
-            if things and all(world.value(AT, thing) is None for thing in things):
+            if things and not any(is_located(thing, world.facts.get, world) for thing in things):
                 return " or ".join(things)
     return None
 

@@ -11,7 +11,7 @@ from fleet.language import Vocabulary
 from fleet.llm.quoting import fenced
 from keyexpr_schema.facts import AT, Literal
 from keyexpr_schema.payloads.goals import Condition, Goal
-from keyexpr_schema.payloads.world import Place
+from keyexpr_schema.payloads.world import Object, Place
 
 
 def skills_text(skills: Iterable[SkillModel]) -> str:
@@ -58,7 +58,12 @@ def problem_text(world: WorldModel, goals: Iterable[Goal], keep: Iterable[Condit
         for name in world.team
     ]
     objects = [
-        {**_names(thing.label, thing.aliases), "object": name, "mass_kg": thing.mass_kg}
+        {
+            **_names(thing.label, thing.aliases),
+            "object": name,
+            "mass_kg": thing.mass_kg,
+            **_features(thing),
+        }
         for name, thing in world.objects.items()
     ]
     facts = [
@@ -93,7 +98,8 @@ def vocabulary_text(text: str, vocabulary: Vocabulary) -> str:
                     "object": name,
                     "kind": thing.kind,
                     "ordinal": thing.ordinal,
-                    "at": vocabulary.whereabouts.get(name, "unknown"),
+                    "at": _at(name, vocabulary),
+                    **_features(thing),
                 }
                 for name, thing in vocabulary.objects.items()
             ],
@@ -103,6 +109,26 @@ def vocabulary_text(text: str, vocabulary: Vocabulary) -> str:
             "sentence": text,
         }
     )
+
+
+def _at(name: str, vocabulary: Vocabulary) -> str:
+    """What carries a thing, as finely as is known."""
+    around = vocabulary.carriers.get(name) or (vocabulary.whereabouts.get(name, "unknown"),)
+    return around[0]
+
+
+def _features(thing: Object) -> dict[str, Any]:
+    """What can be done with a thing, where anything is said of that."""
+    told: dict[str, Any] = {}
+    if not thing.movable:
+        told["movable"] = False
+    if thing.features:
+        told["features"] = list(thing.features)
+    if thing.part_of is not None:
+        told["part_of"] = thing.part_of
+    if thing.room is not None:
+        told["room"] = thing.room
+    return told
 
 
 def _places(places: Mapping[str, Place]) -> list[dict[str, Any]]:

@@ -1,8 +1,7 @@
-"""A subgoal as a finite-domain task: variables with numbered values, and operators on them.
+"""A goal as a finite-domain task: variables with numbered values, and operators on them.
 
-A state is one number for each variable: that of the fact (variable and value) that holds. Robots
-that can drive are moved by the operators that need them somewhere. What a goal reads is not always
-a fact: derived literals are *readings*, evaluated on the state by the rules of the model.
+A state is one number for each variable: that of the fact that holds. Robots that can drive are
+moved by the operators that need them somewhere. What no action changes is folded in.
 """
 
 from __future__ import annotations
@@ -10,24 +9,32 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice, product
 
+from fleet.core.model import derived
+from fleet.core.model.formulas.evaluation import conjuncts, evaluate, expanded, is_number, number
+from fleet.core.model.formulas.nodes import (
+    TRUE,
+    ConditionalEffect,
+    grounded_effect,
+)
 from fleet.core.model.skills import Action
-from fleet.core.model.world import WorldModel, known_value, room_left
-from fleet.planners.symbolic.grounding import Facts
-from fleet.planners.symbolic.readings import holds, is_derived
+from fleet.core.model.world import WorldModel, room_left
+from fleet.planners.symbolic.instantiation import Facts
+from fleet.planners.symbolic.nodes import Nodes, Stands, State, watch_lists
 from fleet.planners.symbolic.travel import Moves, Travel
-from keyexpr_schema.facts import AT, HELD, HOLDING, LOCATED, FactKey, Literal, Value
+from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
 
-State = tuple[int, ...]
-Stands = tuple[tuple[str, str], ...]
-"""Robots, each with the place where it must be."""
+MAX_GOAL_WAYS = 512
+"""Combinations of ways looked at in which all parts of a goal can hold at once."""
 
 
 @dataclass(frozen=True, slots=True)
 class Operator:
-    """An action: facts that it needs, robots that have to be somewhere, facts that it makes true.
+    """An action: nodes that it needs, robots that have to be somewhere, facts that it makes true.
 
-    `cost_s` is without the ways of robots.
+    `cost_s` is without the ways of robots. `conditional` effects come on top of what it `writes`;
+    `may_write` are the nodes that those can make true.
     """
 
     action: Action
@@ -35,31 +42,14 @@ class Operator:
     stands: Stands
     writes: tuple[int, ...]
     cost_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class Axiom:
-    """Facts, or readings, that make a reading hold where these robots stand."""
-
-    needs: tuple[int, ...]
-    stands: Stands
-    reading: int
-
-
-@dataclass(frozen=True, slots=True)
-class Ride:
-    """That a thing is with a robot and not in its hand: a node, and the facts that decide it."""
-
-    node: int
-    at_robot: int
-    in_hand: int | None
+    conditional: tuple[ConditionalEffect, ...] = ()
+    may_write: tuple[int, ...] = ()
 
 
 class FiniteDomainTask:
-    """Variables, facts, operators and a goal; what no action changes is folded in.
+    """Operators and a goal over `nodes`.
 
-    Numbers of facts and of readings are of one kind (`nodes`). `impossible` names a literal of the
-    goal that no operator touches and that does not hold.
+    `impossible` is a part of the goal that no operator touches and that does not hold.
     """
 
     def __init__(
@@ -73,299 +63,256 @@ class FiniteDomainTask:
         free: Collection[str],
     ) -> None:
         self.world = world
-        self.start = start
         self.goal = goal
         self.travel = travel
-        self.robots = tuple(robots)
-        self._free = [robot for robot in robots if robot in free]
-        written = {literal.variable for action in actions for literal in action.after}
-        self.variables = [FactKey(AT, robot) for robot in self._free]
-        self.variables += sorted(written - set(self.variables))
-        self.position = {robot: number for number, robot in enumerate(self._free)}
-        self._number = {variable: number for number, variable in enumerate(self.variables)}
-        self._facts: dict[tuple[int, Value], int] = {}
-        self.variable_of: list[int] = []
-        self.value_of: list[Value] = []
-        self.initial: State = tuple(
-            self.fact(number, self._initial(variable))
-            for number, variable in enumerate(self.variables)
-        )
-        self.operators = [made for action in actions if (made := self._operator(action))]
-        self.readings: list[Literal] = []
-        self.axioms: list[Axiom] = []
-        self.rides: list[Ride] = []
-        self.rides_by: dict[int, list[int]] = defaultdict(list)
-        """By operator: the rides that it makes true."""
-        self._node: dict[Literal, int] = {}
+        effects = [tuple(_each(effect, world) for effect in a.conditional) for a in actions]
+        conditional = [tuple(row for rows in of for row in rows) for of in effects]
+        changed = {
+            derived.written(literal, world).variable
+            for action in actions
+            for literal in action.after
+        }
+        changed |= {effect.variable for of in conditional for effect in of}
+        counted = {effect.variable for of in conditional for effect in of if effect.add is not None}
+        able = [robot for robot in robots if robot in free]
+        self.nodes = Nodes(world, start, able, changed, counted, travel)
+        self.initial = self.nodes.initial
+        self.position = self.nodes.position
+        written = [self._written(a, of) for a, of in zip(actions, conditional, strict=True)]
+        rows = zip(actions, conditional, written, strict=True)
+        self.operators = [made for row in rows if (made := self._operator(*row))]
         self.impossible: Literal | None = None
         self.goal_needs, self.goal_stands = self._goal()
+        self._count_rides()
         self._room = {
             carrier: self._room_beside(carrier)
             for operator in self.operators
             for carrier in operator.action.space_in
         }
         self._things = [
-            (number, variable.subject)
-            for number, variable in enumerate(self.variables)
+            (v, variable.subject)
+            for v, variable in enumerate(self.nodes.variables)
             if variable.relation == AT and variable.subject in world.objects
         ]
-        self._watched = self._watch_lists()
-
-    def fact(self, variable: int, value: Value) -> int:
-        """The number of a fact."""
-        key = variable, value
-        if key not in self._facts:
-            self._facts[key] = len(self.variable_of)
-            self.variable_of.append(variable)
-            self.value_of.append(value)
-        return self._facts[key]
-
-    @property
-    def nodes(self) -> int:
-        """How many facts and readings there are."""
-        return len(self.variable_of)
-
-    def true_nodes(self, state: State) -> list[int]:
-        """The facts of a state, and the rides that they come to."""
-        found = list(state)
-        for ride in self.rides:
-            if state[self.variable_of[ride.at_robot]] == ride.at_robot and (
-                ride.in_hand is None or state[self.variable_of[ride.in_hand]] != ride.in_hand
-            ):
-                found.append(ride.node)
-        return found
+        self._watched = watch_lists(self.nodes, [operator.needs for operator in self.operators])
 
     def facts(self, state: State) -> Facts:
         """All facts that hold in a state."""
-        values = {self.variables[v]: self.value_of[fact] for v, fact in enumerate(state)}
-        return {**self.start, **values}
+        nodes = self.nodes
+        values = {nodes.variables[v]: nodes.value_of[fact] for v, fact in enumerate(state)}
+        return {**nodes.start, **values}
 
     def where(self, state: State, robot: str) -> Value:
         """Where a robot that can drive is; `None` if that is still open."""
-        return self.value_of[state[self.position[robot]]]
+        return self.nodes.value_of[state[self.position[robot]]]
 
     def moves_s(self, state: State, moves: Mapping[str, str]) -> float:
         """What it costs to bring robots where they have to be."""
-        cost_s = self.travel.cost_s
-        position, value_of = self.position, self.value_of
-        return sum(
-            cost_s(robot, value_of[state[position[robot]]], place) for robot, place in moves.items()
-        )
+        way_s = self.travel.way_s
+        return sum(way_s[robot, self.where(state, robot), moves[robot]] for robot in moves)
 
     def moved(self, state: State, moves: Moves) -> State:
         """The state once robots have gone where they have to be."""
         values = list(state)
         for robot, place in moves.items():
             here = self.position[robot]
-            values[here] = self.fact(here, place)
+            values[here] = self.nodes.fact(here, place)
         return tuple(values)
 
     def successors(self, state: State) -> Iterator[tuple[int, Moves, State]]:
         """Every operator that can be done, the ways of robots to it, and the state after it."""
-        variable_of, operators = self.variable_of, self.operators
+        nodes = self.nodes
+        variable_of = nodes.variable_of
+        known: dict[int, Sequence[Stands]] = {}
         for fact in (*state, -1):
-            for number in self._watched.get(fact, ()):
-                operator = operators[number]
-                if any(state[variable_of[need]] != need for need in operator.needs):
+            for number_ in self._watched.get(fact, ()):
+                operator = self.operators[number_]
+                stands: Stands | None = operator.stands
+                for need in operator.needs:
+                    if variable_of[need] >= 0:
+                        if state[variable_of[need]] != need:
+                            stands = None
+                            break
+                        continue
+                    if need not in known:
+                        known[need] = nodes.stands_for(need, state)
+                    stands = _compatible(stands or (), known[need])
+                    if stands is None:
+                        break
+                if stands is None or not self._has_room(operator.action, state):
                     continue
-                if operator.action.space_in and not self._has_room(operator.action, state):
-                    continue
-                values = list(state)
-                moves: Moves = {}
-                for robot, place in operator.stands:
-                    here = self.position[robot]
-                    if self.value_of[state[here]] != place:
-                        moves[robot] = place
-                        values[here] = self.fact(here, place)
+                moves = {r: place for r, place in stands if self.where(state, r) != place}
+                values = list(self.moved(state, moves) if moves else state)
+                there = tuple(values) if operator.conditional else state
                 for written in operator.writes:
                     values[variable_of[written]] = written
-                yield number, moves, tuple(values)
+                for effect in operator.conditional:
+                    self._apply(effect, there, values)
+                yield number_, moves, tuple(values)
 
     def moves_to_goal(self, state: State) -> Moves | None:
         """Robots that only have to go somewhere for the goal to hold; `None` if it takes more."""
-        for need in self.goal_needs:
-            variable = self.variable_of[need]
-            if variable >= 0 and state[variable] != need:
-                return None
-        moves: Moves = {}
-        for robot, place in self.goal_stands:
-            if self.where(state, robot) != place:
-                moves[robot] = place
-        for literal in self.readings:
-            found = self._moves_for(literal, state, moves)
-            if found is None:
-                return None
-            moves = found
-        if len(self.goal) > 1 and not all(
-            self._holds(literal, state, moves) for literal in self.goal
-        ):
+        options = [self.nodes.stands_for(need, state) for need in self.goal_needs]
+        if not all(options):
             return None
-        return moves
+        best: Moves | None = None
+        for chosen in islice(product(*options), MAX_GOAL_WAYS):
+            stands = _merged((self.goal_stands, *chosen))
+            if stands is None:
+                continue
+            moves = {r: place for r, place in stands if self.where(state, r) != place}
+            if best is not None and self.moves_s(state, moves) >= self.moves_s(state, best):
+                continue
+            value_of = self.nodes.values(self.moved(state, moves))
+            if all(
+                derived.holds(literal, value_of, self.world, aboard=True) for literal in self.goal
+            ):
+                best = moves
+        return best
 
-    def _moves_for(self, literal: Literal, state: State, moves: Moves) -> Moves | None:
-        if self._holds(literal, state, moves):
-            return moves
-        if literal.variable.relation != AT or not isinstance(literal.value, str):
-            return None
-        for robot in self._free:
-            if robot not in moves and literal.value in self.world.places:
-                more = {**moves, robot: literal.value}
-                if self._holds(literal, state, more):
-                    return more
-        return None
+    def _apply(self, effect: ConditionalEffect, state: State, values: list[int]) -> None:
+        """A conditional effect, judged by the state before."""
+        value_of = self.nodes.values(state)
+        if effect.when != TRUE and not evaluate(effect.when, value_of, self.world):
+            return
+        v = self.nodes.number[effect.variable]
+        value = effect.value
+        if effect.add is not None:
+            old, more = value_of(effect.variable), number(effect.add, value_of, self.world)
+            if isinstance(old, int | float) and isinstance(more, int | float) and is_number(old):
+                value = old + more
+        values[v] = self.nodes.fact(v, value)
 
-    def _holds(self, literal: Literal, state: State, moves: Moves) -> bool:
-        def value_of(key: FactKey) -> Value:
-            if moves and key.relation == AT and key.subject in moves:
-                return moves[key.subject]
-            number = self._number.get(key)
-            if number is None:
-                return known_value(key, self.start, self.world)
-            return self.value_of[state[number]]
+    def _written(
+        self, action: Action, conditional: Sequence[ConditionalEffect]
+    ) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """The facts that an action makes true, and those that it may."""
+        literals = [derived.written(literal, self.world) for literal in action.after]
+        may = [
+            Literal(effect.variable, effect.value) for effect in conditional if effect.add is None
+        ]
+        number_, fact = self.nodes.number, self.nodes.fact
+        return (
+            tuple(fact(number_[variable], value) for variable, value in literals),
+            tuple(fact(number_[variable], value) for variable, value in may),
+        )
 
-        return holds(literal, value_of, self.world)
-
-    def _initial(self, variable: FactKey) -> Value:
-        if variable.relation == AT and variable.subject in self.position:
-            return self.start.get(variable)
-        return known_value(variable, self.start, self.world)
-
-    def _operator(self, action: Action) -> Operator | None:
+    def _operator(
+        self,
+        action: Action,
+        conditional: tuple[ConditionalEffect, ...],
+        written: tuple[tuple[int, ...], tuple[int, ...]],
+    ) -> Operator | None:
         """The action without what always holds; `None` if something never does."""
-        needs: list[int] = []
         stands: dict[str, str] = {}
-        for variable, value in action.before:
-            if variable.relation == AT and variable.subject in self.position:
-                if (
-                    not isinstance(value, str)
-                    or stands.setdefault(variable.subject, value) != value
-                ):
+        nodes: list[int | bool] = []
+        rest: list[Literal] = []
+        for literal in action.before:
+            robot, place = literal.variable.subject, literal.value
+            if literal.variable.relation == AT and robot in self.position:
+                if not isinstance(place, str) or stands.setdefault(robot, place) != place:
                     return None
-                if self.travel.action(variable.subject, value) is None:
+                if self.travel.action(robot, place) is None:
                     return None
-            elif variable in self._number:
-                needs.append(self.fact(self._number[variable], value))
-            elif known_value(variable, self.start, self.world) != value:
-                return None
-        writes = tuple(self.fact(self._number[key], value) for key, value in action.after)
+            else:
+                rest.append(literal)
+        there = set(stands.values())
+        for literal in rest:
+            innermost = literal.value in there
+            nodes.append(self.nodes.literal(literal, aboard=False, innermost=innermost))
+        for condition in action.conditions:
+            for part in conjuncts(expanded(condition, self.world)):
+                nodes.append(self.nodes.formula(part))
+        if any(node is False for node in nodes):
+            return None
+        needs = tuple(dict.fromkeys(node for node in nodes if node is not True))
         cost_s = self.world.work_s(action.actor, action.skill)
-        return Operator(action, tuple(needs), tuple(stands.items()), writes, cost_s)
+        writes, may_write = written
+        return Operator(
+            action, needs, tuple(stands.items()), writes, cost_s, conditional, may_write
+        )
 
     def _goal(self) -> tuple[tuple[int, ...], Stands]:
         needs: list[int] = []
         stands: list[tuple[str, str]] = []
         for literal in self.goal:
-            variable, value = literal
+            variable, place = literal
             if variable.relation == AT and variable.subject in self.position:
-                place = str(value)
-                if self.travel.action(variable.subject, place) is None:
+                if self.travel.action(variable.subject, str(place)) is None:
                     self.impossible = literal
-                stands.append((variable.subject, place))
-            elif is_derived(literal, self.world):
-                self.readings.append(literal)
-                needs.append(self._reading(literal))
-            elif variable in self._number:
-                needs.append(self.fact(self._number[variable], value))
-            elif known_value(variable, self.start, self.world) != value:
+                stands.append((variable.subject, str(place)))
+                continue
+            node = self.nodes.literal(literal, aboard=True, innermost=False)
+            if node is False:
                 self.impossible = literal
+            elif node is not True:
+                needs.append(node)
         return tuple(needs), tuple(stands)
 
-    def _reading(self, literal: Literal) -> int:
-        """The node of a derived literal, with axioms for all that can make it hold."""
-        if literal in self._node:
-            return self._node[literal]
-        node = self._node[literal] = len(self.variable_of)
-        self.variable_of.append(-1)
-        self.value_of.append(None)
-        (relation, subject), wanted = literal
-        where = self._number.get(FactKey(AT, subject))
-        if where is None:
-            if holds(literal, lambda key: known_value(key, self.start, self.world), self.world):
-                self.axioms.append(Axiom((), (), node))
-            elif relation == AT:
-                carrier = self.start.get(FactKey(AT, subject))
-                if self.start.get(FactKey(HOLDING, str(carrier))) != subject:
-                    self._comes_with(node, literal, (), carrier)
-            return node
-        for (variable, value), fact in list(self._facts.items()):
-            if variable == where:
-                if relation == LOCATED:
-                    if (value is not None) is wanted:
-                        self.axioms.append(Axiom((fact,), (), node))
-                elif relation == HELD:
-                    hand = self._number.get(FactKey(HOLDING, str(value)))
-                    if wanted and hand is not None:
-                        both = fact, self.fact(hand, subject)
-                        self.axioms.append(Axiom(both, (), node))
-                    elif not wanted:
-                        self.axioms.append(Axiom((fact,), (), node))
-                elif value == wanted:
-                    self.axioms.append(Axiom((fact,), (), node))
-                elif value in self.robots:
-                    self._comes_with(node, literal, (self._ride(fact),), value)
-        return node
-
-    def _ride(self, at_robot: int) -> int:
-        """The node that says that a thing is with a robot, and not in its hand."""
-        subject = self.variables[self.variable_of[at_robot]].subject
-        hand = self._number.get(FactKey(HOLDING, str(self.value_of[at_robot])))
-        in_hand = None if hand is None else self.fact(hand, subject)
-        node = len(self.variable_of)
-        self.variable_of.append(-1)
-        self.value_of.append(None)
-        self.rides.append(Ride(node, at_robot, in_hand))
-        for number, operator in enumerate(self.operators):
-            of = {self.variable_of[written]: written for written in operator.writes}
-            comes = of.get(self.variable_of[at_robot]) == at_robot
-            stays = comes or self.variable_of[at_robot] not in of
-            kept = in_hand is None or of.get(self.variable_of[in_hand], in_hand) == in_hand
-            opens = in_hand in operator.needs and not kept
-            if (comes and in_hand not in operator.writes) or (stays and opens):
-                self.rides_by[number].append(node)
-        return node
-
-    def _comes_with(
-        self, node: int, literal: Literal, needs: tuple[int, ...], carrier: Value
-    ) -> None:
-        """The subject comes where its carrier does."""
-        if carrier in self.robots and isinstance(literal.value, str):
-            if carrier in self.position:
-                if self.travel.action(carrier, literal.value) is not None:
-                    self.axioms.append(Axiom(needs, ((carrier, literal.value),), node))
-            elif self.start.get(FactKey(AT, str(carrier))) == literal.value:
-                self.axioms.append(Axiom(needs, (), node))
+    def _count_rides(self) -> None:
+        """What each operator makes true besides facts: rides, and formulas that it may decide."""
+        nodes = self.nodes
+        self.also: dict[int, list[int]] = defaultdict(list)
+        for n, operator in enumerate(self.operators):
+            self.also[n] += operator.may_write
+            of = {nodes.variable_of[written]: written for written in operator.writes}
+            for ride in nodes.rides.values():
+                hand, at = nodes.variable_of[ride.in_hand], nodes.variable_of[ride.at_robot]
+                comes = of.get(at) == ride.at_robot and of.get(hand) != ride.in_hand
+                opens = (
+                    ride.in_hand in operator.needs and of.get(hand, ride.in_hand) != ride.in_hand
+                )
+                if comes or (opens and at not in of):
+                    self.also[n].append(ride.node)
+            changed = {nodes.variables[v] for v in of}
+            changed |= {effect.variable for effect in operator.conditional}
+            changed |= {FactKey(AT, robot) for robot, _ in operator.stands}
+            for opaque in nodes.opaque.values():
+                if not changed.isdisjoint(opaque.variables):
+                    self.also[n].append(opaque.node)
 
     def _room_beside(self, carrier: str) -> float:
-        """Room in a basket, without the things that move in this task."""
-        moving = {
-            variable
-            for variable in self.variables
-            if variable.relation == AT and variable.subject in self.world.objects
-        }
-        beside = {key: value for key, value in self.start.items() if key not in moving}
+        """Room in or on a carrier, without the things that move in this task."""
+        moving = {v for v in self.nodes.variables if v.relation == AT}
+        moving = {v for v in moving if v.subject in self.world.objects}
+        start = self.nodes.start
+        beside = {key: value for key, value in start.items() if key not in moving}
         return room_left(carrier, beside, self.world)
 
     def _has_room(self, action: Action, state: State) -> bool:
         for carrier in action.space_in:
-            hand = self._number.get(FactKey(HOLDING, carrier))
-            held = self.start.get(FactKey(HOLDING, carrier))
-            held = held if hand is None else self.value_of[state[hand]]
-            inside = sum(
-                1
-                for number, thing in self._things
-                if self.value_of[state[number]] == carrier and held != thing
-            )
-            if inside >= self._room[carrier]:
+            held = self.nodes.values(state)(FactKey(HOLDING, carrier))
+            there = (t for v, t in self._things if self.nodes.value_of[state[v]] == carrier)
+            if sum(1 for thing in there if thing != held) >= self._room[carrier]:
                 return False
         return True
 
-    def _watch_lists(self) -> dict[int, list[int]]:
-        """Operators by the rarest of the facts that they need; -1: those that need none."""
-        uses: dict[int, int] = defaultdict(int)
-        for operator in self.operators:
-            for need in operator.needs:
-                uses[need] += 1
-        watched: dict[int, list[int]] = defaultdict(list)
-        for number, operator in enumerate(self.operators):
-            watched[min(operator.needs, key=lambda need: uses[need], default=-1)].append(number)
-        return watched
+
+def _each(effect: ConditionalEffect, world: WorldModel) -> Iterator[ConditionalEffect]:
+    """A conditional effect for each of the names that it speaks of."""
+    names = [world.of_type(kind) for _, kind in effect.each]
+    for chosen in product(*names):
+        args = {name: each for (name, _), each in zip(effect.each, chosen, strict=True)}
+        one = grounded_effect(effect, args)
+        literal = derived.written(Literal(one.variable, one.value), world)
+        yield ConditionalEffect(literal.variable, literal.value, one.add, one.when)
+
+
+def _merged(parts: Sequence[Stands]) -> Stands | None:
+    """All of them at once; `None` if a robot would have to be in two places."""
+    stands: dict[str, str] = {}
+    for part in parts:
+        for robot, place in part:
+            if stands.setdefault(robot, place) != place:
+                return None
+    return tuple(stands.items())
+
+
+def _compatible(stands: Stands, options: Sequence[Stands]) -> Stands | None:
+    """`stands` with the first of the options that does not contradict them."""
+    for option in options:
+        if not option:
+            return stands
+        if (merged := _merged((stands, option))) is not None:
+            return merged
+    return None

@@ -17,21 +17,24 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass, field, replace
 
 from fleet.core.checker.plan_checker import CheckedPlan
-from fleet.core.model.world import WorldModel
+from fleet.core.model.derived import is_located
+from fleet.core.model.world import WorldModel, condition_holds
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, Planner, PlanningProblem
 from fleet.planners.symbolic.action_sequences import (
+    GaveUp,
+    Impossible,
     Subgoal,
     alternatives_for,
     exploration_for,
     subgoals_in_order,
 )
 from fleet.planners.symbolic.choosing import Choice, choose
-from fleet.planners.symbolic.grounding import Facts
-from keyexpr_schema.facts import AT, FactKey
+from fleet.planners.symbolic.instantiation import Facts
 
 MAX_RESTORATIONS = 2
 """How often what the sequences for later subgoals undid is reached again, where no plan does."""
+
 SEARCH_SHARE = 0.6
 """Of the time for planning, how much the search for sequences has; choosing takes the rest."""
 
@@ -43,6 +46,30 @@ class SymbolicPlanner(Planner):
     strategies = (BIG_DAG, PER_GOAL, MONOLITHIC)
 
     def _solve(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
+        made = self._one_by_one(problem)
+        if isinstance(made, CheckedPlan) or made.postponed:
+            return made
+        if not any(len(goal.conditions) > 1 for goal in problem.goals):
+            return made
+        together = self._each_goal_at_once(problem)
+        return together if isinstance(together, CheckedPlan) or together.postponed else made
+
+    def _each_goal_at_once(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
+        """All conditions of a goal in one search: what one of them leaves in a hand is there for
+        the next, and what is undone on the way is made true again.
+        """
+        reached = _Reached(problem, dict(problem.world.facts), problem.budget.until(SEARCH_SHARE))
+        for goal in problem.goals:
+            if all(condition_holds(reached.facts, c, problem.world) for c in goal.conditions):
+                continue
+            first, *others = goal.conditions
+            if not reached.add(Subgoal(goal.goal, first, tuple(others))):
+                failure = reached.failure
+                return NoPlan(failure.reason, postponed=isinstance(failure, GaveUp))
+        return choose(problem, reached.options, None)
+
+    def _one_by_one(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
+        """One search for each condition of each goal."""
         world = problem.world
         searching = problem.budget.until(SEARCH_SHARE)
         reached = _Reached(problem, dict(world.facts), searching)
@@ -51,12 +78,14 @@ class SymbolicPlanner(Planner):
         for subgoal in subgoals_in_order(problem, world.facts):
             if not searching.over and reached.add(subgoal):
                 continue
-            if searching.over:
+            if searching.over or isinstance(reached.failure, GaveUp):
                 late.add(subgoal.goal)
             elif _needs_locating(subgoal, reached.facts, world):
                 unlocated.append(subgoal)
             else:
-                return NoPlan(_no_way(subgoal, world))
+                return NoPlan(_no_way(subgoal, reached.failure, world))
+        if late and len(problem.goals) == 1 and isinstance(reached.failure, GaveUp):
+            return NoPlan(reached.failure.reason, postponed=True)
         if late:
             return _in_time(problem, reached.options, unlocated, late)
         explored = exploration_for(unlocated, problem, searching) if unlocated else None
@@ -90,12 +119,14 @@ class _Reached:
     budget: TimeBudget
     options: list[Choice] = field(default_factory=list)
     settled: set[str] = field(default_factory=set)
+    failure: Impossible | GaveUp = field(default_factory=lambda: Impossible("nothing was sought"))
 
     def add(self, subgoal: Subgoal) -> bool:
         """Find sequences that reach one more subgoal; whether there are any."""
         settled = frozenset(self.settled)
         found = alternatives_for(subgoal, self.facts, self.problem.world, self.budget, settled)
         if not isinstance(found, tuple):
+            self.failure = found
             return False
         sequences, self.facts = found
         self.options.append(sequences)
@@ -125,16 +156,16 @@ def _in_time(
 
 def _needs_locating(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
     return any(
-        subject in world.objects and facts.get(FactKey(AT, subject)) is None
+        subject in world.objects and not is_located(subject, facts.get, world)
         for subject in subgoal.condition.subjects
     )
 
 
-def _no_way(subgoal: Subgoal, world: WorldModel) -> str:
+def _no_way(subgoal: Subgoal, why: Impossible | GaveUp, world: WorldModel) -> str:
     failed = (f"; {known.robot} cannot {known.skill}: {known.reason}" for known in world.hopeless)
     return (
         f"no sequence of skills of the connected robots ({', '.join(world.team)}) "
-        f"leads to {subgoal.condition}{''.join(failed)}"
+        f"leads to {subgoal}: {why.reason}{''.join(failed)}"
     )
 
 

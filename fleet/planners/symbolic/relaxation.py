@@ -10,13 +10,13 @@ by other places between.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from math import inf
 from typing import NamedTuple
 
-from fleet.planners.symbolic.finite_domain import FiniteDomainTask, Operator, Stands, State
+from fleet.planners.symbolic.finite_domain import FiniteDomainTask
+from fleet.planners.symbolic.nodes import Stands, State
 from keyexpr_schema.facts import Value
 
 
@@ -44,21 +44,31 @@ class Estimate:
     steps: tuple[int, ...]
 
 
+MAX_LABELS = 3
+"""Ways remembered for each fact: the cheapest, and others that leave robots somewhere else."""
 _NOBODY: frozenset[str] = frozenset()
 
 
 class Relaxation:
-    """The relaxed task; `additive` sums up what an operator needs (h_add), else h_max."""
+    """The relaxed task; `additive` sums up what an operator needs (h_add), else h_max. `labels` are
+    the ways remembered for each node: with one only, it is quick, and may overestimate.
+    """
 
-    def __init__(self, task: FiniteDomainTask, additive: bool) -> None:
+    def __init__(self, task: FiniteDomainTask, additive: bool, labels: int = MAX_LABELS) -> None:
         self._task = task
         self._additive = additive
+        self._most_labels = labels
+        self._costs = [operator.cost_s for operator in task.operators]
         self._operators = len(task.operators)
         rows: list[tuple[tuple[int, ...], Stands, tuple[int, ...]]] = [
-            (operator.needs, operator.stands, (*operator.writes, *task.rides_by.get(number, ())))
+            (operator.needs, operator.stands, (*operator.writes, *task.also.get(number, ())))
             for number, operator in enumerate(task.operators)
         ]
-        rows += [(axiom.needs, axiom.stands, (axiom.reading,)) for axiom in task.axioms]
+        rows += [
+            (axiom.needs, axiom.stands, (axiom.reading,))
+            for axioms in task.nodes.axioms.values()
+            for axiom in axioms
+        ]
         self._goal = len(rows)
         rows.append((task.goal_needs, task.goal_stands, ()))
         self._needs = [tuple(set(needs)) for needs, _, _ in rows]
@@ -94,9 +104,9 @@ class Relaxation:
         return Estimate(reached.cost_s, frozenset(first), tuple(reversed(steps)))
 
     def _explored(self, state: State, charge_s: list[float]) -> Label | None:
-        """Dijkstra's search over facts, up to the goal."""
-        task = self._task
-        cost_s, value_of = task.travel.cost_s, task.value_of
+        """Dijkstra's search over nodes, up to the goal."""
+        task, most = self._task, self._most_labels
+        way_s, value_of = task.travel.way_s, task.nodes.value_of
         here = {robot: value_of[state[v]] for robot, v in task.position.items()}
         labels: dict[int, list[Label]] = {}
         open_ = self._open.copy()
@@ -104,25 +114,25 @@ class Relaxation:
         holds = Label(0.0, (), _NOBODY, -1, ())
         # Ties are broken by a number that is unique, so that labels are never compared.
         queue: list[tuple[float, int, int, Label]] = [
-            (0.0, ticket, node, holds) for ticket, node in enumerate(task.true_nodes(state))
+            (0.0, ticket, node, holds) for ticket, node in enumerate(task.nodes.true_nodes(state))
         ]
         ticket = len(queue)
         ready = self._free_of_needs
-        writes_of, used_by = self._writes, self._used_by
+        goal, writes_of, used_by = self._goal, self._writes, self._used_by
         while True:
             for number in ready:
-                label = self._label(number, labels, here, cost_s, charge_s)
-                if label.cost_s >= done_s.get(number, inf):
+                label = self._label(number, labels, here, way_s, charge_s)
+                cost_s = label.cost_s
+                if cost_s >= done_s.get(number, inf):
                     continue
-                done_s[number] = label.cost_s
-                if number == self._goal:
-                    ticket += 1
-                    heappush(queue, (label.cost_s, ticket, -1, label))
+                done_s[number] = cost_s
+                ticket += 1
+                if number == goal:
+                    heappush(queue, (cost_s, ticket, -1, label))
                 for node in writes_of[number]:
                     known = labels.get(node)
-                    if known is None or not _dominated(label, known, cost_s):
-                        ticket += 1
-                        heappush(queue, (label.cost_s, ticket, node, label))
+                    if known is None or (len(known) < most and not _dominated(label, known, way_s)):
+                        heappush(queue, (cost_s, ticket, node, label))
             if not queue:
                 return None
             _, _, node, label = heappop(queue)
@@ -136,7 +146,7 @@ class Relaxation:
                     open_[number] -= 1
                     if open_[number] == 0:
                         ready.append(number)
-            elif not _dominated(label, known, cost_s):
+            elif len(known) < most and not _dominated(label, known, way_s):
                 known.append(label)
                 ready = [number for number in used_by.get(node, ()) if open_[number] == 0]
 
@@ -145,88 +155,55 @@ class Relaxation:
         number: int,
         labels: dict[int, list[Label]],
         here: dict[str, Value],
-        cost_s: Callable[[str, Value, str], float],
+        way_s: dict[tuple[str, Value, str], float],
         charge_s: list[float],
     ) -> Label:
-        """The cheapest way to do an operator, from what is known of the facts that it needs."""
-        stands, robots = self._stands[number], self._robots[number]
-        own_s = 0.0
-        if number < self._operators:
-            own_s = self._task.operators[number].cost_s + charge_s[number]
-        causes: list[Label] = []
-        from_here = {robot: cost_s(robot, here[robot], place) for robot, place in stands}
-        total_s, dearest_s, involved = 0.0, sum(from_here.values()), _NOBODY
+        """The cheapest way to do an operator, from what is known of the nodes that it needs."""
+        stands = self._stands[number]
+        dearest_s, involved, causes = 0.0, _NOBODY, []
+        for robot, place in stands:
+            dearest_s += way_s[robot, here[robot], place]
         for need in self._needs[number]:
             best, best_s = None, inf
             for label in labels[need]:
-                if label.cost_s >= best_s:
+                spent_s = label.cost_s
+                if spent_s >= best_s:
                     continue
-                at = dict(label.stands)
-                way_s = 0.0
                 for robot, place in stands:
-                    if robot in at:
-                        way_s += cost_s(robot, at[robot], place)
-                    elif robot not in label.robots:
-                        way_s += from_here[robot]
-                if best is None or label.cost_s + way_s < best_s:
-                    best, best_s = label, label.cost_s + way_s
+                    if robot in label.robots:
+                        for other, stood in label.stands:
+                            if other == robot:
+                                spent_s += way_s[robot, stood, place]
+                    else:
+                        spent_s += way_s[robot, here[robot], place]
+                if best is None or spent_s < best_s:
+                    best, best_s = label, spent_s
             assert best is not None
             causes.append(best)
-            total_s += best_s
             if best_s >= dearest_s:
                 dearest_s, involved = best_s, best.robots
         if self._additive and len(causes) > 1:
             # The ways of its robots are counted once, with the dearest.
-            total_s = sum(cause.cost_s for cause in causes)
-            total_s += max(0.0, dearest_s - max(cause.cost_s for cause in causes))
+            spent = [cause.cost_s for cause in causes]
+            dearest_s = sum(spent) + max(0.0, dearest_s - max(spent))
             involved = _NOBODY.union(*(cause.robots for cause in causes))
-            dearest_s = total_s
-        return Label(dearest_s + own_s, stands, involved | robots, number, tuple(causes))
+        if number < self._operators:
+            dearest_s += self._costs[number] + charge_s[number]
+        return Label(dearest_s, stands, involved | self._robots[number], number, tuple(causes))
 
 
 def _dominated(
-    label: Label, known: list[Label], cost_s: Callable[[str, Value, str], float]
+    label: Label, known: list[Label], way_s: dict[tuple[str, Value, str], float]
 ) -> bool:
     """Whether one of the known ways is as good, wherever its robots have to go next."""
     for other in known:
-        if other.cost_s > label.cost_s:
+        spent_s = other.cost_s
+        if spent_s > label.cost_s:
             continue
-        at = dict(other.stands)
-        way_s = sum(cost_s(robot, at[robot], place) for robot, place in label.stands if robot in at)
-        if other.cost_s + way_s <= label.cost_s:
+        for robot, place in label.stands:
+            for same, stood in other.stands:
+                if same == robot:
+                    spent_s += way_s[robot, stood, place]
+        if spent_s <= label.cost_s:
             return True
     return False
-
-
-def reachable_operators(task: FiniteDomainTask) -> tuple[list[Operator], set[int]]:
-    """The operators that can ever be done as if nothing ceased to hold, and the facts and readings
-    that can be true then.
-    """
-    rows = [
-        (operator.needs, (*operator.writes, *task.rides_by.get(number, ())))
-        for number, operator in enumerate(task.operators)
-    ]
-    rows += [(a.needs, (a.reading,)) for a in task.axioms]
-    open_ = [len(set(needs)) for needs, _ in rows]
-    used_by: dict[int, list[int]] = defaultdict(list)
-    for number, (needs, _) in enumerate(rows):
-        for need in set(needs):
-            used_by[need].append(number)
-    todo = task.true_nodes(task.initial)
-    true = set(todo)
-    ready = [number for number, left in enumerate(open_) if left == 0]
-    done: set[int] = set()
-    while todo or ready:
-        for number in ready:
-            done.add(number)
-            for node in rows[number][1]:
-                if node not in true:
-                    true.add(node)
-                    todo.append(node)
-        ready = []
-        if todo:
-            for number in used_by.get(todo.pop(), ()):
-                open_[number] -= 1
-                if open_[number] == 0:
-                    ready.append(number)
-    return [task.operators[n] for n in sorted(done) if n < len(task.operators)], true

@@ -14,15 +14,18 @@ from math import inf
 
 from fleet.core.model.skills import Action
 from fleet.jobshop.time_budget import TimeBudget
-from fleet.planners.symbolic.finite_domain import FiniteDomainTask, State
-from fleet.planners.symbolic.grounding import Facts
+from fleet.planners.symbolic.finite_domain import FiniteDomainTask
+from fleet.planners.symbolic.instantiation import Facts
+from fleet.planners.symbolic.nodes import State
 from fleet.planners.symbolic.relaxation import Estimate, Relaxation
 from fleet.planners.symbolic.travel import Moves
 
-FIRST_STATES = 400
+FIRST_STATES = 200
 """States that A* looks at before a greedy search is tried."""
-IMPROVING_STATES = 2_000
+IMPROVING_STATES = 600
 """States that A* looks at in all where there is a sequence already."""
+OTHER_STATES = 15
+"""States looked at for another sequence that uses other actions."""
 MAX_STATES = 1_000_000
 """States looked at before a search gives up even with time left: about a gigabyte of them."""
 GREED = 5.0
@@ -175,7 +178,7 @@ class Solver:
     def __init__(self, task: FiniteDomainTask) -> None:
         self.task = task
         self._careful = Relaxation(task, additive=False)
-        self._greedy: Relaxation | None = None
+        self._quick: Relaxation | None = None
 
     def least_s(self) -> float:
         """At least what a sequence costs [s]; infinite where the goal is out of reach."""
@@ -183,21 +186,16 @@ class Solver:
         return self._careful.estimate(self.task.initial, nothing).cost_s
 
     def solve(
-        self, charge_s: list[float], budget: TimeBudget, thorough: bool = True
+        self, charge_s: list[float], budget: TimeBudget
     ) -> Solution | Unreachable | Unfinished:
-        """The cheapest sequence, or with little time a cheap one; not `thorough`: without a long
-        search for any.
-        """
+        """The cheapest sequence, or with little time a cheap one."""
         careful = Search(self.task, self._careful, charge_s, 1.0)
         found = careful.run(budget, FIRST_STATES)
         if found is True:
             return Unreachable()
         if found:
             return found
-        if not thorough:
-            return _unfinished(careful, self.task)
-        self._greedy = self._greedy or Relaxation(self.task, additive=True)
-        greedy = Search(self.task, self._greedy, charge_s, GREED)
+        greedy = Search(self.task, Relaxation(self.task, additive=True), charge_s, GREED)
         any_found = greedy.run(budget, MAX_STATES)
         if any_found is True:
             return Unreachable()
@@ -207,6 +205,12 @@ class Solver:
         better = careful.run(budget, IMPROVING_STATES, spent_s)
         return better if isinstance(better, Solution) else any_found
 
+    def another(self, charge_s: list[float], budget: TimeBudget) -> Solution | None:
+        """A cheap sequence with other charges, if one is found quickly."""
+        self._quick = self._quick or Relaxation(self.task, additive=False, labels=1)
+        found = Search(self.task, self._quick, charge_s, 1.0).run(budget, OTHER_STATES)
+        return found if isinstance(found, Solution) else None
+
     def _charges(self, found: Solution, charge_s: list[float]) -> Iterator[float]:
         numbers = {id(operator.action): n for n, operator in enumerate(self.task.operators)}
         for action in found.actions:
@@ -214,7 +218,7 @@ class Solver:
                 yield charge_s[number]
             else:
                 key = action.actor, str(action.after[0].value)
-                yield self.task.travel.charge_s.get(key, 0.0)
+                yield self.task.travel.charges_s.get(key, 0.0)
 
 
 def _unfinished(search: Search, task: FiniteDomainTask) -> Unfinished:

@@ -7,7 +7,7 @@ those that it needs, and what they cost.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from functools import cache
 from math import inf
 
@@ -32,17 +32,33 @@ def only_drives(skill: SkillModel) -> bool:
     )
 
 
+class _Ways(dict[tuple[str, Value, str], float]):
+    """Costs of ways that were asked for."""
+
+    def __init__(self, way_s: Callable[[str, Value, str], float]) -> None:
+        super().__init__()
+        self._way_s = way_s
+
+    def __missing__(self, key: tuple[str, Value, str]) -> float:
+        self[key] = found = self._way_s(*key)
+        return found
+
+
 class Travel:
     """What it takes each robot to get from one place to another, by the best skill for it.
 
-    `charge_s` are extra costs of a robot's way to a place.
+    `way_s[robot, origin, target]` is in seconds, charges included; nothing where it is there
+    already. With no `origin` it is open where the robot begins: it has to be sent, from where it
+    stands.
     """
 
     def __init__(self, world: WorldModel, facts: dict[FactKey, Value]) -> None:
         self._world = world
         self._facts = facts
         self._skills = [skill for skill in world.skills.values() if only_drives(skill)]
-        self.charge_s: dict[tuple[str, str], float] = {}
+        self.charges_s: dict[tuple[str, str], float] = {}
+        """What a robot's way to a place costs more."""
+        self.way_s = _Ways(self._way_s)
         self.action = cache(self._action)
         self.time_s = cache(self._time_s)
 
@@ -54,15 +70,15 @@ class Travel:
             if any(self.action(robot, place) is not None for place in self._world.places)
         )
 
-    def cost_s(self, robot: str, origin: Value, target: str) -> float:
-        """Seconds from `origin` to `target`, charges included; nothing where it is there already.
+    def charge(self, robot: str, place: str, charge_s: float) -> None:
+        """Make a robot's way to a place cost so much more."""
+        self.charges_s[robot, place] = self.charges_s.get((robot, place), 0.0) + charge_s
+        self.way_s.clear()
 
-        With no `origin` it is open where the robot begins: it has to be sent, from where it stands.
-        """
+    def _way_s(self, robot: str, origin: Value, target: str) -> float:
         if origin == target:
             return 0.0
-        charge_s = self.charge_s.get((robot, target), 0.0) if self.charge_s else 0.0
-        return self.time_s(robot, origin, target) + charge_s
+        return self.time_s(robot, origin, target) + self.charges_s.get((robot, target), 0.0)
 
     def _time_s(self, robot: str, origin: Value, target: str) -> float:
         action = self.action(robot, target)

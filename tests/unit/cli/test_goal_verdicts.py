@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from msgspec.structs import replace
 
 from cli.demo.verdict import GoalVerdict, Verdict, all_agreed, goal_verdicts
 from keyexpr_schema.payloads.goals import Condition, GoalState, GoalStatus
 from keyexpr_schema.payloads.simulation import Truth
+from keyexpr_schema.payloads.world import Object
 
 
 def status(
@@ -160,3 +162,47 @@ def test_what_is_found_is_where_the_fleet_says(told: str | None, agreed: bool) -
     )
     assert said.agreed is agreed
     assert said.physics is not Verdict.NOT_JUDGED
+
+
+def thing(name: str, part_of: str | None = None) -> Object:
+    return Object(object=name, kind="thing", label=name, movable=False, part_of=part_of)
+
+
+@pytest.mark.parametrize(
+    ("relation", "value", "holds"),
+    [
+        ("at", "bowl", True),
+        ("in", "bowl", True),
+        ("on", "shelf", True),
+        ("on", "table", False),
+        ("at", "hallway", True),
+        ("temperature", "hot", True),
+        ("temperature", "cold", False),
+    ],
+)
+def test_what_carries_a_thing_and_how_it_is_are_judged(
+    relation: str, value: str, holds: bool
+) -> None:
+    truths = {
+        "cup_1": replace(truth(support="bowl"), states={"temperature": "hot"}),
+        "bowl": replace(truth(support="board"), object="bowl"),
+    }
+    objects = {name: thing(name) for name in ("bowl", "shelf", "table")}
+    objects["board"] = thing("board", part_of="shelf")
+    goal = GoalStatus(
+        goal="g",
+        state=GoalState.REACHED,
+        conditions=(Condition(relation=relation, subject="cup_1", value=value),),
+    )
+    (said,) = goal_verdicts({"g": goal}, truths, {}, {}, objects)
+    assert said.agreed is holds
+
+
+def test_what_is_in_a_bowl_in_a_hand_is_still_in_a_hand() -> None:
+    truths = {
+        "cup_1": truth(support="bowl"),
+        "bowl": replace(truth(support=None, held_by="hsr"), object="bowl"),
+    }
+    (said,) = goal_verdicts({"g": status()}, truths, {}, {}, {"bowl": thing("bowl")})
+    assert "still in the hand of hsr" in said.sentence
+    assert not said.agreed

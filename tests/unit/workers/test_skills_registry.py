@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import pytest
+import yaml
 
+from keyexpr_schema.config_files import config_file
 from keyexpr_schema.keyspace import OBJECT, PLACE, ROBOT_SPEC
 from keyexpr_schema.payloads.robots import RobotAddress, RobotSpec
 from keyexpr_schema.payloads.world import Object, ObjectAddress, Place, PlaceAddress
@@ -71,12 +73,9 @@ def test_wrong_arguments_are_told_apart(
 
 
 def test_the_household_skills_have_the_names_that_planners_use() -> None:
-    assert {s.name: tuple(s.parameters) for s in HOUSEHOLD} == {
-        "navigate": ("to",),
-        "search": ("place",),
-        "pick": ("object", "place"),
-        "place": ("object", "place"),
-        "place_on_robot": ("object", "carrier", "place"),
+    raw = yaml.safe_load(config_file("skills", "household").read_text())["skills"]
+    assert {one.name: ["robot", *one.parameters] for one in HOUSEHOLD} == {
+        name: list(entry["parameters"]) for name, entry in raw.items()
     }
 
 

@@ -8,7 +8,7 @@ from fleet.core.model.derived import holds, read_by, written
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import AT, HOLDING, IS_OPEN, FactKey, Literal, Value, parse_literal
 from keyexpr_schema.payloads.robots import RobotSpec
-from keyexpr_schema.payloads.world import Object, Place
+from keyexpr_schema.payloads.world import Fact, Object, Place
 
 
 def thing(name: str, *features: str, part_of: str | None = None, **more: object) -> Object:
@@ -155,3 +155,25 @@ def test_what_a_literal_may_read():
     values[FactKey(AT, "bowl")] = {"drawer"}
     assert "is_open(drawer)" in read("reachable(fork) = true")
     assert read("on(cup) = floor") == {"on(cup)"}
+
+
+def test_of_facts_about_one_thing_the_newest_counts():
+    def at(cup: str, relation: str, value: str, time_s: float) -> Fact:
+        return Fact(subject=cup, relation=relation, value=value, source="arm", time_s=time_s)
+
+    facts = [
+        at("cup", "on", "table", 2.0),
+        at("cup", "at", "hallway", 1.0),
+        at("fork", "on", "table", 1.0),
+        at("fork", "at", "hallway", 2.0),
+        at("bowl", "on", "table", 3.0),
+        at("bowl", "at", "kitchen", 3.0),
+    ]
+    world = WorldModel.of(
+        {}, WORLD.places.values(), WORLD.objects.values(), WORLD.robots.values(), facts
+    )
+    assert dict(world.facts) == {
+        FactKey(AT, "cup"): "table",
+        FactKey(AT, "fork"): "hallway",
+        FactKey(AT, "bowl"): "table",
+    }

@@ -1,0 +1,230 @@
+"""Filling in the parameters of skills: only what no unchanging fact speaks against."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Sequence
+from functools import cache
+
+from fleet.core.model import derived
+from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, parse_type
+from fleet.core.model.skills import SkillModel
+from fleet.core.model.world import WorldModel, known_value
+from fleet.planners.symbolic.relevance import Row, few_of_each, related_skills, rows_of
+from keyexpr_schema.facts import AT, IN, ON, FactKey, Literal, Value
+
+Facts = dict[FactKey, Value]
+Binding = dict[str, str]
+ANY = "?any"
+"""As a wanted value: whatever the variable can be changed to."""
+
+
+class Instantiation:
+    """The skills that can matter for a goal, and the arguments that they can have.
+
+    `robots` are those looked at, `free` those of them that can drive wherever they are needed.
+    """
+
+    def __init__(
+        self,
+        world: WorldModel,
+        start: Facts,
+        goal: Sequence[Literal],
+        robots: Sequence[str],
+        free: Collection[str],
+    ) -> None:
+        self.world = world
+        self.start = start
+        self.goal = goal
+        self.robots = robots
+        self.free = frozenset(free)
+        self.refused: dict[Literal, list[str]] = defaultdict(list)
+        """Why robots cannot do what would make a literal true."""
+        self._skills = related_skills(world, goal)
+        self.writers: dict[str, list[Row]] = defaultdict(list)
+        """By relation, the effects that change it."""
+        for skill in self._skills:
+            for row in rows_of(skill):
+                self.writers[row.relation].append(row)
+        self._names = cache(self._names_of)
+        self._all_of = cache(self._set_of)
+        self.writable = cache(self._writable)
+        self._fixed_chain = cache(self._chain_if_fixed)
+        self.restores = cache(self._only_from)
+
+    def known(self, variable: FactKey) -> Value:
+        """The value of a variable at the start."""
+        return known_value(variable, self.start, self.world)
+
+    def unified(self, row: Row, literal: Literal) -> Binding | None:
+        """The parameters that are fixed if this row of a skill's effects is the literal."""
+        binding: Binding = {}
+        wanted: list[tuple[Value, Value]] = [(row.variable.subject, literal.variable.subject)]
+        if literal.value != ANY:
+            if row.adds:
+                return None
+            wanted.append((row.value, literal.value))
+        for term, value in wanted:
+            kind = row.kind_of(term)
+            if kind is None:
+                if term != value:
+                    return None
+                continue
+            if not isinstance(value, str) or not self.fits(kind, value):
+                return None
+            if binding.setdefault(str(term), value) != value:
+                return None
+        return {name: value for name, value in binding.items() if name in row.skill.parameters}
+
+    def completed(
+        self, skill: SkillModel, binding: Binding, literal: Literal | None
+    ) -> Iterator[Binding]:
+        """Every way to fill in the other parameters that no unchanging fact speaks against."""
+        if not self._consistent(skill, binding, literal):
+            return
+        missing = [name for name in skill.parameters if name not in binding]
+        if not missing:
+            yield dict(binding)
+            return
+        fixed = self._fixed_by_facts(skill, binding)
+        if fixed is not None:
+            parameter, value = fixed
+            if isinstance(value, str) and self.fits(skill.parameters[parameter], value):
+                yield from self.completed(skill, {**binding, parameter: value}, literal)
+            return
+        parameter = min(missing, key=lambda name: len(self._names(skill.parameters[name])))
+        for value in self._names(skill.parameters[parameter]):
+            yield from self.completed(skill, {**binding, parameter: value}, literal)
+
+    def _fixed_by_facts(self, skill: SkillModel, binding: Binding) -> tuple[str, Value] | None:
+        """A parameter that only a fact that never changes can give, and the value it gives."""
+        for (relation, subject), value in skill.before:
+            if value not in skill.parameters or value in binding or subject not in binding:
+                continue
+            variable = FactKey(relation, binding[subject])
+            if relation == AT and variable.subject in self.world.objects:
+                chain = self._fixed_chain(variable.subject)
+                if chain is not None:
+                    return str(value), self._place_in(chain, skill.parameters[str(value)])
+            elif not self.writable(variable) and relation not in (ON, IN, *derived.DERIVED):
+                return str(value), self.known(variable)
+        return None
+
+    def _place_in(self, chain: tuple[str, ...], kind: str) -> str | None:
+        """What of all that carries something is meant: the innermost place, or what it is on."""
+        if parse_type(kind).bases == (PLACE,):
+            return next((carrier for carrier in chain if carrier in self.world.places), None)
+        return next(iter(chain), None)
+
+    def _chain_if_fixed(self, name: str) -> tuple[str, ...] | None:
+        """All that carries a thing, if nothing can change that."""
+        try:
+            return tuple(derived.carriers(name, self._unchanging, self.world))
+        except _MayChange:
+            return None
+
+    def _unchanging(self, key: FactKey) -> Value:
+        if self.writable(key):
+            raise _MayChange
+        return self.known(key)
+
+    def _consistent(self, skill: SkillModel, binding: Binding, literal: Literal | None) -> bool:
+        robots = [binding[name] for name in skill.robot_parameters if name in binding]
+        if len(set(robots)) < len(robots):
+            return False
+        for (relation, subject), value in skill.before:
+            if subject not in binding or (value in skill.parameters and value not in binding):
+                continue
+            wanted = binding[value] if isinstance(value, str) and value in binding else value
+            try:
+                if not self._may_hold(Literal(FactKey(relation, binding[subject]), wanted)):
+                    return False
+            except _MayChange:
+                continue
+        return all(
+            self._able(skill, binding, parameter, literal)
+            for parameter in skill.robot_parameters
+            if parameter in binding
+        )
+
+    def _may_hold(self, literal: Literal) -> bool:
+        """Whether a literal holds.
+
+        Raises:
+            _MayChange: it can change whether it does.
+        """
+        (relation, subject), wanted = literal
+        if relation == AT and subject in self.world.objects and wanted in self.world.places:
+            chain = self._fixed_chain(subject)
+            if chain is None:
+                raise _MayChange
+            return next((c for c in chain if c in self.world.places), None) == wanted
+        return derived.holds(literal, self._unchanging, self.world)
+
+    def _able(
+        self, skill: SkillModel, binding: Binding, parameter: str, literal: Literal | None
+    ) -> bool:
+        """Whether its robot can stand for a parameter, as far as what is filled in tells."""
+        complete = len(binding) == len(skill.parameters)
+        measured = {need.of for need in skill.needs.get(parameter, ()) if need.of is not None}
+        if not complete and not measured <= binding.keys():
+            robot = binding[parameter]
+            if parameter != skill.actor_parameter or skill.name in self.world.robots[robot].skills:
+                return True
+            self._refuse(literal, f"{robot} does not have the skill {skill.name}")
+            return False
+        if not complete and parameter == skill.actor_parameter and self.world.hopeless:
+            return True  # the whole call may be one that is not to be tried again
+        args = {name: binding.get(name, "") for name in skill.parameters}
+        why = self.world.lacks(binding[parameter], skill.ground(args), parameter)
+        self._refuse(literal, why)
+        return why is None
+
+    def _refuse(self, literal: Literal | None, why: str | None) -> None:
+        if why is not None and literal is not None and why not in self.refused[literal]:
+            self.refused[literal].append(why)
+
+    def fits(self, kind: str, name: str) -> bool:
+        """Whether a name is of a type; of robots, whether it is one of those looked at."""
+        if kind == ROBOT:
+            return name in self.robots
+        return name in self._all_of(kind)
+
+    def _set_of(self, kind: str) -> frozenset[str]:
+        return frozenset(self.world.of_type(kind))
+
+    def _names_of(self, kind: str) -> tuple[str, ...]:
+        """Names to fill in for a parameter of which nothing is known."""
+        if kind == ROBOT:
+            return tuple(self.robots)
+        if OBJECT not in parse_type(kind).bases:
+            return self.world.of_type(kind)
+        few = few_of_each(self.world, self.start, self.goal, self._skills)
+        return tuple(n for n in self.world.of_type(kind) if n not in self.world.objects or n in few)
+
+    def _writable(self, variable: FactKey) -> bool:
+        """Whether a skill can change it, for all that is known of types."""
+        relation, subject = variable
+        if relation == AT and subject in self.free:
+            return True
+        return any(
+            kind is not None and self.fits(kind, subject)
+            for row in self.writers.get(relation, ())
+            if (kind := row.kind_of(row.variable.subject)) is not None
+        )
+
+    def _only_from(self, relation: str, value: Value) -> bool:
+        """Whether a variable takes any of its other, listed values only from `value`: nothing else
+        than having had it leads there, as a hand takes something only when it is empty.
+        """
+        for row in self.writers.get(relation, ()):
+            if row.kind_of(row.value) is None:
+                continue
+            before = next((b for b in row.skill.before if b.variable == row.variable), None)
+            if before is None or before.value != value:
+                return False
+        return True
+
+
+class _MayChange(Exception):
+    """What is asked for depends on a variable that a skill changes."""

@@ -1,0 +1,356 @@
+"""Facts of a task, and what is read off them, numbered: the nodes of its states and heuristics.
+
+A *fact* is a variable with a value. A *reading* is a condition on several variables; `Axiom`s say
+which nodes make it hold. A *ride* is that a thing is with a robot and not in its hand. What has too
+many ways to hold to list them is `Opaque`: only ever evaluated.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from fleet.core.model import derived
+from fleet.core.model.formulas.evaluation import evaluate
+from fleet.core.model.formulas.nodes import Formula, Holds, Not
+from fleet.core.model.world import WorldModel, known_value
+from fleet.planners.symbolic.instantiation import Facts
+from fleet.planners.symbolic.readings import (
+    Assumed,
+    TooManyWays,
+    ValueOf,
+    is_read_off,
+    variables_read,
+    ways,
+)
+from fleet.planners.symbolic.travel import Travel
+from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
+
+State = tuple[int, ...]
+Stands = tuple[tuple[str, str], ...]
+"""Robots, each with the place where it must be."""
+_ELSEWHERE = "?"
+"""Any place, where it does not matter which."""
+
+
+@dataclass(frozen=True, slots=True)
+class Axiom:
+    """Facts and rides that together make a reading hold where these robots stand."""
+
+    needs: tuple[int, ...]
+    stands: Stands
+    reading: int
+
+
+@dataclass(frozen=True, slots=True)
+class Ride:
+    """That a thing is with a robot and not in its hand: a node, and the facts that decide it."""
+
+    node: int
+    at_robot: int
+    in_hand: int
+
+
+@dataclass(frozen=True, slots=True)
+class Opaque:
+    """A formula that is only evaluated: its node, and the variables that it may be decided by."""
+
+    node: int
+    formula: Formula
+    variables: frozenset[FactKey]
+
+
+class Nodes:
+    """The nodes of a task over some variables; first come robots that can drive, `position`.
+
+    `counted` are variables with numbers that actions add to, so that nobody knows their values
+    beforehand.
+    """
+
+    def __init__(
+        self,
+        world: WorldModel,
+        start: Facts,
+        free: Sequence[str],
+        changed: Iterable[FactKey],
+        counted: Iterable[FactKey],
+        travel: Travel,
+    ) -> None:
+        self.world = world
+        self.start = start
+        self.travel = travel
+        positions = [FactKey(AT, robot) for robot in free]
+        self.variables = [*positions, *sorted(set(changed) - set(positions))]
+        self.position = {robot: v for v, robot in enumerate(free)}
+        self.number = {variable: v for v, variable in enumerate(self.variables)}
+        self.variable_of: list[int] = []
+        """By node: the number of its variable; -1 for what is no fact."""
+        self.value_of: list[Value] = []
+        self.axioms: dict[int, list[Axiom]] = {}
+        self.rides: dict[tuple[int, int], Ride] = {}
+        self.opaque: dict[int, Opaque] = {}
+        self._counted = frozenset(counted)
+        self._facts: dict[tuple[int, Value], int] = {}
+        self._values: list[list[Value]] = [[] for _ in self.variables]
+        self._readings: dict[object, int | bool] = {}
+        self._chains: dict[tuple[str, bool], list[tuple[Assumed, tuple[str, ...]]]] = {}
+        self.initial: State = tuple(
+            self.fact(v, self._initial(variable)) for v, variable in enumerate(self.variables)
+        )
+
+    def __len__(self) -> int:
+        return len(self.variable_of)
+
+    def fact(self, variable: int, value: Value) -> int:
+        """The node of a fact."""
+        key = variable, value
+        if key not in self._facts:
+            self._facts[key] = self._new(variable, value)
+            self._values[variable].append(value)
+        return self._facts[key]
+
+    def known(self, key: FactKey) -> Value:
+        """The value of a variable at the start."""
+        return known_value(key, self.start, self.world)
+
+    def values(self, state: State) -> ValueOf:
+        """The values that variables have in a state."""
+
+        def value_of(key: FactKey) -> Value:
+            v = self.number.get(key)
+            return self.known(key) if v is None else self.value_of[state[v]]
+
+        return value_of
+
+    def literal(self, literal: Literal, *, aboard: bool, innermost: bool) -> int | bool:
+        """The node of a literal; true or false where that never changes.
+
+        `aboard`: as in a goal; `innermost`: only where a place is the first around.
+        """
+        if not is_read_off(literal, self.world):
+            v = self.number.get(literal.variable)
+            if v is not None:
+                return self.fact(v, literal.value)
+            return derived.holds(literal, self.known, self.world, aboard=aboard)
+        key = literal, aboard, innermost
+        if key not in self._readings:
+            self._readings[key] = self._read(literal, aboard, innermost)
+        return self._readings[key]
+
+    def formula(self, formula: Formula) -> int | bool:
+        """The node of an `expanded` formula that is no conjunction."""
+        match formula:
+            case Holds(literal):
+                return self.literal(literal, aboard=False, innermost=False)
+            case Not(Holds(literal)) if (
+                known := self.literal(literal, aboard=False, innermost=False)
+            ) in (True, False) and isinstance(known, bool):
+                return not known
+        if formula not in self._readings:
+            self._readings[formula] = self._read_formula(formula)
+        return self._readings[formula]
+
+    def _read(self, literal: Literal, aboard: bool, innermost: bool) -> int | bool:
+        (relation, subject), wanted = literal
+        if relation != AT:
+
+            def read(value_of: ValueOf) -> bool:
+                return derived.holds(literal, value_of, self.world, aboard=aboard)
+
+            return self._reading(ways(read, self._domain_elsewhere, self.known))
+        places = self.world.places
+
+        def is_there(chain: tuple[str, ...]) -> bool:
+            if innermost and wanted in places:
+                return next((c for c in chain if c in places), None) == wanted
+            return wanted in chain
+
+        return self._reading(
+            (assumed, is_there(chain)) for assumed, chain in self._chain(subject, aboard)
+        )
+
+    def _chain(self, subject: str, aboard: bool) -> list[tuple[Assumed, tuple[str, ...]]]:
+        """Every way in which a thing can be carried, with all that carries it then."""
+        key = subject, aboard
+        if key not in self._chains:
+
+            def read(value_of: ValueOf) -> tuple[str, ...]:
+                return tuple(derived.carriers(subject, value_of, self.world, aboard=aboard))
+
+            self._chains[key] = list(ways(read, self._domain, self.known))
+        return self._chains[key]
+
+    def _read_formula(self, formula: Formula) -> int | bool:
+        def domain(key: FactKey) -> Sequence[Value] | None:
+            if key in self._counted:
+                raise TooManyWays
+            return self._domain(key)
+
+        def read(value_of: ValueOf) -> bool:
+            return evaluate(formula, value_of, self.world)
+
+        try:
+            return self._reading(list(ways(read, domain, self.known)))
+        except TooManyWays:
+            node = self._new(-1, None)
+
+            def values_of(key: FactKey) -> Sequence[Value]:
+                return self._domain(key) or (self.known(key),)
+
+            read_off = variables_read(formula, values_of, self.world)
+            self.opaque[node] = Opaque(node, formula, frozenset(read_off))
+            return node
+
+    def _domain(self, key: FactKey) -> Sequence[Value] | None:
+        """The values that a variable can have; `None` if it keeps the one that it has."""
+        v = self.number.get(key)
+        if v is None:
+            return None
+        if v < len(self.position):
+            robot = key.subject
+            return [p for p in self.world.places if self.travel.action(robot, p) is not None]
+        return self._values[v]
+
+    def _domain_elsewhere(self, key: FactKey) -> Sequence[Value] | None:
+        """As `_domain`, where it does not matter in which place a robot is."""
+        v = self.number.get(key)
+        return (_ELSEWHERE,) if v is not None and v < len(self.position) else self._domain(key)
+
+    def _reading(self, found: Iterable[tuple[Assumed, bool]]) -> int | bool:
+        """A node that holds in some of these ways."""
+        rows: dict[tuple[frozenset[int], Stands], None] = {}
+        always = True
+        for assumed, holds in found:
+            if not holds:
+                always = False
+                continue
+            needs, stands = set[int](), list[tuple[str, str]]()
+            for key, value in assumed.items():
+                if key.relation == AT and key.subject in self.position:
+                    if value != _ELSEWHERE:
+                        stands.append((key.subject, str(value)))
+                elif (ride := self._ride(key, value, assumed)) is not None:
+                    needs.add(ride)
+                elif not self._is_hand_of_ride(key, assumed):
+                    needs.add(self.fact(self.number[key], value))
+            rows[frozenset(needs), tuple(sorted(stands))] = None
+        if always or not rows:
+            return always
+        node = self._new(-1, None)
+        self.axioms[node] = [Axiom(tuple(sorted(needs)), stands, node) for needs, stands in rows]
+        return node
+
+    def _ride(self, key: FactKey, value: Value, assumed: Assumed) -> int | None:
+        """The node for a thing that is with a robot whose hand, as assumed, holds another."""
+        hand = FactKey(HOLDING, str(value))
+        if key.relation != AT or hand not in assumed or assumed[hand] == key.subject:
+            return None
+        at_robot = self.fact(self.number[key], value)
+        in_hand = self.fact(self.number[hand], key.subject)
+        if (at_robot, in_hand) not in self.rides:
+            self.rides[at_robot, in_hand] = Ride(self._new(-1, None), at_robot, in_hand)
+        return self.rides[at_robot, in_hand].node
+
+    def _is_hand_of_ride(self, key: FactKey, assumed: Assumed) -> bool:
+        return key.relation == HOLDING and any(
+            other.relation == AT and value == key.subject and other.subject != assumed[key]
+            for other, value in assumed.items()
+        )
+
+    def _initial(self, variable: FactKey) -> Value:
+        if variable.relation == AT and variable.subject in self.position:
+            return self.start.get(variable)
+        return self.known(variable)
+
+    def _new(self, variable: int, value: Value) -> int:
+        self.variable_of.append(variable)
+        self.value_of.append(value)
+        return len(self.variable_of) - 1
+
+    # What holds in a state.
+
+    def true_nodes(self, state: State) -> list[int]:
+        """The facts, rides and opaque formulas that hold in a state; readings follow from them."""
+        found = list(state)
+        found += [ride.node for ride in self.rides.values() if self._rides(ride, state)]
+        if self.opaque:
+            value_of = self.values(state)
+            found += [
+                node
+                for node, opaque in self.opaque.items()
+                if evaluate(opaque.formula, value_of, self.world)
+            ]
+        return found
+
+    def _rides(self, ride: Ride, state: State) -> bool:
+        at = state[self.variable_of[ride.at_robot]] == ride.at_robot
+        return at and state[self.variable_of[ride.in_hand]] != ride.in_hand
+
+    def stands_for(self, node: int, state: State) -> Sequence[Stands]:
+        """Where robots have to be for a node to hold in a state; none of them if it does not hold
+        wherever they are.
+        """
+        variable = self.variable_of[node]
+        if variable >= 0:
+            return ((),) if state[variable] == node else ()
+        axioms = self.axioms.get(node)
+        if axioms is not None:
+            return [
+                axiom.stands
+                for axiom in axioms
+                if all(self.stands_for(need, state) for need in axiom.needs)
+            ]
+        opaque = self.opaque.get(node)
+        if opaque is not None:
+            return ((),) if evaluate(opaque.formula, self.values(state), self.world) else ()
+        ride = next(ride for ride in self.rides.values() if ride.node == node)
+        return ((),) if self._rides(ride, state) else ()
+
+
+Watch = Callable[[int], Sequence[int]]
+
+
+def watch_lists(nodes: Nodes, rows: Sequence[Sequence[int]]) -> dict[int, list[int]]:
+    """Rows by the facts of which one must hold for all the nodes of the row to hold; -1: by none.
+
+    Chosen so that few rows are found by the same fact.
+    """
+    uses: dict[int, int] = defaultdict(int)
+    for row in rows:
+        for need in row:
+            uses[need] += 1
+    found_by: dict[int, list[int]] = defaultdict(list)
+    facts_of = {need: _deciding_facts(nodes, need) for need in uses}
+    for number, row in enumerate(rows):
+        decisive = [need for need in row if facts_of[need]]
+        best = min(decisive, key=lambda need: uses[need], default=None)
+        for fact in (-1,) if best is None else facts_of[best]:
+            found_by[fact].append(number)
+    return found_by
+
+
+def _deciding_facts(nodes: Nodes, node: int) -> list[int]:
+    """Facts of one variable, one of which holds wherever the node does; none if there are none."""
+    if nodes.variable_of[node] >= 0:
+        return [node]
+    for ride in nodes.rides.values():
+        if ride.node == node:
+            return [ride.at_robot]
+    facts: dict[int, set[int]] = defaultdict(set)
+    axioms = nodes.axioms.get(node, ())
+    for axiom in axioms:
+        for need in axiom.needs:
+            for fact in _deciding_facts(nodes, need):
+                facts[nodes.variable_of[fact]].add(fact)
+    for variable in sorted(facts):
+        if all(
+            any(
+                nodes.variable_of[fact] == variable
+                for need in axiom.needs
+                for fact in _deciding_facts(nodes, need)
+            )
+            for axiom in axioms
+        ):
+            return sorted(facts[variable])
+    return []

@@ -1,0 +1,139 @@
+"""Which skills and things can matter for a goal at all, before parameters are filled in."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from fleet.core.model.formulas.nodes import relations_of
+from fleet.core.model.parameter_types import OBJECT
+from fleet.core.model.skills import SkillModel
+from fleet.core.model.world import WorldModel
+from fleet.planners.symbolic.travel import only_drives
+from keyexpr_schema.facts import (
+    AT,
+    HELD,
+    HOLDING,
+    IN,
+    IS_OPEN,
+    LOCATED,
+    ON,
+    REACHABLE,
+    FactKey,
+    Literal,
+    Value,
+)
+from keyexpr_schema.payloads.world import Object
+
+READ_OFF = {
+    LOCATED: {AT},
+    HELD: {AT, HOLDING},
+    REACHABLE: {AT, IS_OPEN},
+    ON: {ON, AT},
+    IN: {IN, AT},
+}
+"""Relations that a derived one is read off."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One effect of a skill, with parameters, or names that it holds for `each` of, in it."""
+
+    skill: SkillModel
+    variable: FactKey
+    value: Value
+    each: tuple[tuple[str, str], ...] = ()
+    adds: bool = False
+    """It changes a number, nobody knows to what."""
+
+    @property
+    def relation(self) -> str:
+        """The relation that it changes."""
+        return self.variable.relation
+
+    def kind_of(self, term: Value) -> str | None:
+        """The type of a parameter or of a name that it holds for each of; `None` for a value."""
+        if not isinstance(term, str):
+            return None
+        return dict(self.each).get(term) or self.skill.parameters.get(term)
+
+
+def rows_of(skill: SkillModel) -> Iterator[Row]:
+    """All effects of a skill, on the variables that are stored."""
+    for variable, value in skill.after:
+        yield Row(skill, _stored(variable, value, skill), value)
+    for effect in skill.conditional:
+        variable = _stored(effect.variable, effect.value, skill)
+        yield Row(skill, variable, effect.value, effect.each, effect.add is not None)
+
+
+def _stored(variable: FactKey, value: Value, skill: SkillModel) -> FactKey:
+    """`at` for what says on or in which thing something is."""
+    on_thing = (
+        variable.relation in (ON, IN) and isinstance(value, str) and value in skill.parameters
+    )
+    return FactKey(AT, variable.subject) if on_thing else variable
+
+
+def related_skills(world: WorldModel, goal: Iterable[Literal]) -> list[SkillModel]:
+    """Skills that write a relation which the goal, or such a skill, reads; drives left out."""
+    wanted = set[str]().union(*(_read(literal.variable.relation) for literal in goal))
+    related: set[str] = set()
+    while True:
+        more = {
+            name
+            for name, skill in world.skills.items()
+            if name not in related
+            and not only_drives(skill)
+            and wanted & {row.relation for row in rows_of(skill)}
+        }
+        if not more:
+            return [world.skills[name] for name in sorted(related)]
+        related |= more
+        for name in more:
+            skill = world.skills[name]
+            formulas = [*skill.conditions, *(effect.when for effect in skill.conditional)]
+            wanted = wanted.union(
+                *(_read(row.variable.relation) for row in skill.before),
+                *(_read(relation) for formula in formulas for relation in relations_of(formula)),
+            )
+
+
+def _read(relation: str) -> set[str]:
+    return READ_OFF.get(relation, {relation})
+
+
+def few_of_each(
+    world: WorldModel,
+    start: Mapping[FactKey, Value],
+    goal: Iterable[Literal],
+    skills: Sequence[SkillModel],
+) -> frozenset[str]:
+    """Things that differ in what they are, or in what is known of them; those that the goal speaks
+    of, each. Of things that are all the same, as many as one skill takes are enough to find out
+    what can be done with them.
+    """
+    most = max(sum(OBJECT in kind.bases for kind in skill.types.values()) for skill in skills)
+    named = {name for (_, subject), value in goal for name in (subject, value)}
+    known: dict[str, list[str]] = defaultdict(list)
+    for variable, value in start.items():
+        if variable.subject in world.objects:
+            known[variable.subject].append(f"{variable.relation}={value}")
+        if isinstance(value, str) and value in world.objects:
+            known[value].append(str(variable))
+    chosen: dict[object, list[str]] = defaultdict(list)
+    for name, thing in world.objects.items():
+        same = chosen[name if name in named else (_profile(thing), *sorted(known[name]))]
+        if len(same) < most:
+            same.append(name)
+    return frozenset(name for same in chosen.values() for name in same)
+
+
+def _profile(thing: Object) -> object:
+    """All that a thing is, but for what it is called."""
+    return tuple(
+        repr(getattr(thing, name))
+        for name in thing.__struct_fields__
+        if name not in ("object", "label", "ordinal", "aliases", "home")
+    )

@@ -103,7 +103,7 @@ def test_a_joint_trip_is_one_carrier_and_hands_that_may_be_anybody() -> None:
     assert made is not None
     tasks, pins = deordered([made.sequence], world=world)
     assert not pins
-    assert [t.args["to"] for t in tasks if t.skill == "navigate" and t.args["to"] == "far"] == ["far"]
+    assert sum(task.args.get("to") == "far" for task in tasks) == 1
     loads = [task for task in tasks if task.skill == "place_on_robot"]
     assert len({task.args["carrier"] for task in loads}) == 1
     assert len({task.actor for task in loads}) == 2

@@ -216,7 +216,13 @@ class Grounding:
                 and before.value in row.skill.parameters
                 and self.skills.restores(row.relation, literal.value)
             ):
-                # It gives back what such actions take: only what has been taken matters.
+                # It gives back what such actions take: only what has been taken matters, and of
+                # several ways to give it back those that need nothing else.
+                if not (self._thorough or row.is_plain) and any(
+                    other.is_plain and other.value == row.value
+                    for other in self.skills.writers[row.relation]
+                ):
+                    continue
                 self._waiting[literal.variable].append((row, before, literal))
                 for value in list(self._values(literal.variable)):
                     self._restore(row, before, binding, value)

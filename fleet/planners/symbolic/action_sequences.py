@@ -8,7 +8,7 @@ from math import inf
 
 from msgspec.structs import replace
 
-from fleet.core.model.derived import is_closed, is_located
+from fleet.core.model.derived import carriers, is_closed, is_located
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, condition_holds
 from fleet.jobshop.time_budget import TimeBudget
@@ -195,9 +195,10 @@ def _unloading_s(found: Solution, sought: _Sought, world: WorldModel) -> float:
     """The charge for objects that end in a basket."""
     charge_s = 0.0
     for condition in sought.conditions:
-        where = found.facts.get(FactKey(AT, condition.subject))
-        wanted = where == condition.value or condition.relation == HELD
-        charge_s += 0.0 if wanted or where not in world.robots else UNLOADING_S
+        around = carriers(condition.subject, found.facts.get, world, aboard=True)
+        robots = [carrier for carrier in around if carrier in world.robots]
+        wanted = condition.value in robots or condition.relation == HELD
+        charge_s += 0.0 if wanted or not robots else UNLOADING_S
     return charge_s
 
 

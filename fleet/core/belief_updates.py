@@ -8,6 +8,7 @@ from __future__ import annotations
 import immutables
 from msgspec.structs import replace
 
+from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.indexes.fact_views import FactValues
 from fleet.core.indexes.fleet_index import M, carrier_in, in_set, rest_in
 from fleet.core.indexes.touches import Part, Touch, Touches
@@ -42,6 +43,11 @@ def believe(state: State, fact: Fact) -> State:
         same_word = (known.source, known.time_s) == (fact.source, fact.time_s)
         if same_word and known_finer(state, fact.literal) != fact.value:
             return state
+    if state.logic >= ONE_VARIABLE_SINCE_LOGIC and fact.relation == AT:
+        opened = _without_circle(state, fact)
+        if opened is None:
+            return state
+        state = opened
     older = state.older_facts.without(fact.key)
     if earlier:
         older = older.set(fact.key, None)
@@ -64,6 +70,26 @@ def known_finer(state: State, literal: Literal) -> Value:
         return value
     facts = FactValues(state.facts)
     return facts.get(variable) if holds(literal, facts.get, state) else value
+
+
+def _without_circle(state: State, fact: Fact) -> State | None:
+    """The state in which the thing can be where the fact says: of what would be on or in the thing
+    itself, what was said of the last is no longer believed. `None`: it cannot be there, since that
+    is itself, or a part of it."""
+    facts = FactValues(state.facts)
+    if not isinstance(fact.value, str) or fact.value in state.places:
+        return state
+    below, said = fact.value, None
+    for carrier in (*carriers(below, facts.get, state, aboard=True), None):
+        if below == fact.subject:
+            if said is None:
+                return None
+            unknown = replace(state.facts[said], value=None, source=fact.source, time_s=fact.time_s)
+            return conclude(state, unknown)
+        if facts.get(key := FactKey(AT, below)) == carrier is not None:
+            said = key
+        below = carrier or ""
+    return state
 
 
 def _said_in_earlier_era(state: State, fact: Fact) -> bool:
@@ -122,6 +148,9 @@ def touched_carriers(state: State, subject: str, touches: Touches) -> Touches:
 def set_object(state: State, thing: Object) -> State:
     """Keep a thing; what was said to be on or in it was said of where that is."""
     name = thing.object
+    if thing.part_of is not None:
+        whole = Literal(FactKey(AT, name), thing.part_of)
+        state = _without_circle(state, Fact.of(whole, PLANNER_SOURCE, state.time_s)) or state
     state = _part_changed(state, name, thing.part_of)
     return _said_on_known(replace(state, objects=state.objects.set(name, thing)), name)
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import repeat
+from typing import NamedTuple
 
 from fleet.core.model.formulas.abstraction import reads
 from fleet.core.model.formulas.effects import Guarded, instances
@@ -18,16 +20,38 @@ from keyexpr_schema.ids import actor_arg, bare_name
 from keyexpr_schema.payloads.plans import Task
 
 
+class Origin(NamedTuple):
+    """The sequence that an action of a joined one comes from: its goal, and a number."""
+
+    goal: str
+    part: int
+
+
 @dataclass(frozen=True)
 class ActionSequence:
     """Consecutive actions for one goal; each robot in it becomes an actor of its own.
 
-    `named` are robots that the goal itself speaks of: their actors are pinned to them.
+    `named` are robots that the goal itself speaks of: their actors are pinned to them. Where
+    sequences for several goals were joined, `origins` has one for each action: robots of different
+    parts become different actors, but for those that are `shared`.
     """
 
     goal: str
     actions: tuple[Action, ...]
     named: frozenset[str] = frozenset()
+    origins: tuple[Origin, ...] = ()
+    shared: frozenset[str] = frozenset()
+
+    @property
+    def with_origins(self) -> Iterator[tuple[Action, Origin]]:
+        """Each action, with where it comes from."""
+        alone = Origin(self.goal, 0)
+        return zip(self.actions, self.origins or repeat(alone), strict=False)
+
+    @property
+    def goals(self) -> frozenset[str]:
+        """All that it serves."""
+        return frozenset({self.goal, *(origin.goal for origin in self.origins)})
 
     @property
     def lifted(self) -> tuple[object, ...]:
@@ -63,22 +87,24 @@ def deordered(
     rows: dict[str, tuple[str, Action, dict[str, str]]] = {}
     pins: dict[str, str] = {}
     actor_count = 0
-    actors: dict[str, str] = {}
+    actors: dict[tuple[str, int], str] = {}
     named = frozenset[str]().union(*(sequence.named for sequence in sequences))
     for sequence in sequences:
         if not one_actor_each:
             actors, named = {}, sequence.named
-        for action in sequence.actions:
+        for action, (goal, part) in sequence.with_origins:
+            lifted: dict[str, str] = {}
             for robot in action.participants:
-                if robot not in actors:
+                role = robot, 0 if robot in sequence.shared else part
+                if role not in actors:
                     actor_count += 1
                     # Names stay unique over the revisions of a plan, as the task numbers do.
                     revision = f"{first_task}-" if first_task > 1 else ""
-                    actors[robot] = f"a{revision}{actor_count}"
+                    actors[role] = f"a{revision}{actor_count}"
                     if robot in named:
-                        pins[actors[robot]] = robot
-            lifted = {robot: actor_arg(actors[robot]) for robot in action.participants}
-            rows[f"t{first_task + len(rows)}"] = sequence.goal, action, lifted
+                        pins[actors[role]] = robot
+                lifted[robot] = actor_arg(actors[role])
+            rows[f"t{first_task + len(rows)}"] = goal, action, lifted
     touched = _Touched([action for _, action, _ in rows.values()], world)
     reduced = TaskGraph(_dependencies(rows, touched)).reduced()
     tasks = tuple(

@@ -22,13 +22,20 @@ def load_all_skills(skill_files: tuple[Path, ...] = ()) -> dict[str, SkillModel]
     A file or a package may model a skill of the household anew; two of them not the same one.
 
     Raises:
-        BadSkillFile: a file cannot be read, or models a skill that another or a package does.
+        BadSkillFile: a file cannot be read, or models a skill that another or a package does, or
+            declares a relation otherwise.
     """
+    household = load_skills(config_file("skills", "household"))
+    relations = {name: row for model in household.values() for name, row in model.relations.items()}
     added: dict[str, SkillModel] = {}
 
     def add(where: str, models: Mapping[str, SkillModel]) -> None:
         if twice := sorted(added.keys() & models):
             raise BadSkillFile(f"{where}: skill {twice[0]} is already modelled elsewhere")
+        for model in models.values():
+            for name, declared in model.relations.items():
+                if relations.setdefault(name, declared) != declared:
+                    raise BadSkillFile(f"{where}: relation {name} is declared otherwise elsewhere")
         added.update(models)
 
     def offered(models: Any) -> None:
@@ -41,7 +48,7 @@ def load_all_skills(skill_files: tuple[Path, ...] = ()) -> dict[str, SkillModel]
     load_plug_ins(SKILL_MODELS, offered)
     for path in skill_files:
         add(str(path), load_skills(path))
-    return {**load_skills(config_file("skills", "household")), **added}
+    return {**household, **added}
 
 
 def load_skills(path: Path) -> dict[str, SkillModel]:

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping
-from math import inf
+from functools import cached_property
 
 from fleet.core.checker.actor_requirements import Requirement
 from fleet.core.checker.quantities import BasketLoads
-from fleet.core.checker.reachable_states import Failure, ReachableStates, Undecided
+from fleet.core.checker.reachable_states import MOST_NAMED, Failure, ReachableStates, Undecided
 from fleet.core.checker.writers import Writers
 from fleet.core.model.derived import holds, read_by
 from fleet.core.model.formulas.nodes import (
@@ -57,6 +57,7 @@ class Causality:
         self._moved_by_chance = any(
             self._writers.guarded_mask(FactKey(AT, thing)) for thing in world.objects
         )
+        self._too_full: set[str] = set()
         self._states = ReachableStates(graph, self._writers, world, self._at_start)
         self._check()
 
@@ -136,8 +137,7 @@ class Causality:
     def _holds(self, literal: Literal, value: Value) -> bool:
         """Whether a plain literal holds where its variable has that value."""
         return value == literal.value or (
-            value is not None
-            and literal.variable.relation == AT
+            literal.variable.relation == AT
             and holds(literal, lambda v: value if v == literal.variable else None, self._world)
         )
 
@@ -149,7 +149,9 @@ class Causality:
         if failure is None:
             return
         needs = f"{task} needs {what or formula_text(failure.part)}"
-        names = ", ".join(failure.after)
+        names = ", ".join(failure.after[:MOST_NAMED])
+        if (more := len(failure.after) - MOST_NAMED) > 0:
+            names += f" and {more} more"
         if failure.open:
             code, why = (
                 "too-many-orders",
@@ -228,8 +230,11 @@ class Causality:
 
     def _check_space(self, task: str, carrier: str) -> None:
         if carrier in self._world.objects or self._moved_by_chance:
-            if actor_in(carrier) is None:
+            if actor_in(carrier) is None and carrier not in self._too_full:
+                found = len(self.violations)
                 self._check_formula(task, self._has_room(carrier), f"room on or in {carrier}")
+                if len(self.violations) > found:
+                    self._too_full.add(carrier)  # said once, and not of all that is put there
             return
         at_start, planned = self._baskets.before(task, self._actions[task], carrier)
         if actor_in(carrier) is not None:
@@ -243,17 +248,27 @@ class Causality:
             )
             self._report("no-space", sentence, task)
 
+    @cached_property
+    def _may_be_at(self) -> Mapping[Value, list[str]]:
+        """By carrier, the things that are there directly at some time, as far as one can tell."""
+        found: dict[Value, list[str]] = defaultdict(list)
+        for thing in self._world.objects:
+            for carrier in self._values_of(FactKey(AT, thing)):
+                found[carrier].append(thing)
+        return found
+
     def _has_room(self, carrier: str) -> Formula:
         """That there is room for one more thing, see `room_left`."""
-        if (room := capacity(carrier, self._world)) == inf:
+        things = self._may_be_at[carrier]
+        if len(things) < (room := capacity(carrier, self._world)):
             return TRUE
         rows = []
-        for thing in self._world.objects:
-            where = FactKey(AT, thing)
-            if carrier in self._values_of(where):
+        for thing in things:
+            there: Formula = Stored(Literal(FactKey(AT, thing), carrier))
+            if carrier in self._world.robots:
                 held = Stored(Literal(FactKey(HOLDING, carrier), thing))
-                there = And((Stored(Literal(where, carrier)), Not(held)))
-                rows.append(Total("", "", there, Constant(1)))
+                there = And((there, Not(held)))
+            rows.append(Total("", "", there, Constant(1)))
         return Compare(Sum(tuple(rows)), "<", Constant(room))
 
     def _final_facts(self) -> dict[FactKey, Value]:

@@ -23,10 +23,10 @@ from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import FactKey, Value
 
-MOST_STATES = 20_000
-"""States that are looked at for one condition."""
-MOST_STATES_OF_PLAN = 200_000
-"""The same for all conditions of a plan together."""
+MOST_LOOKED_AT = 100_000
+"""Values of variables, state by state, that are looked at for one condition."""
+MOST_LOOKED_AT_IN_PLAN = 500_000
+"""The same for all conditions of a plan together: about a second."""
 MOST_NAMED = 6
 """Tasks named in a sentence that says what is to be ordered."""
 State = tuple[Value, ...]
@@ -58,7 +58,7 @@ class ReachableStates:
         start: Callable[[FactKey], Value],
     ) -> None:
         self._graph, self._writers, self._world, self._start = graph, writers, world, start
-        self._left = MOST_STATES_OF_PLAN
+        self._left = MOST_LOOKED_AT_IN_PLAN
         self._gave_up = False
         self._explored: dict[frozenset[FactKey], Mapping[int, Collection[State]] | None] = {}
 
@@ -168,6 +168,13 @@ class ReachableStates:
 
         mask = graph.mask(writes)
         must = mask & before
+        # Mostly it is with nothing else done, or with all that can be.
+        for done in (must, mask):
+            state = first
+            for name in graph.named(done):
+                state = after(name, state)
+            if is_bad(state):
+                return Failure(part, graph.named(done))
         for done, state in self._explore(mask, first, after):
             if done & must == must and is_bad(state):
                 return Failure(part, graph.named(done))
@@ -255,11 +262,13 @@ class ReachableStates:
         bits = [(name, graph.mask((name,)), graph.before(name) & mask) for name in names]
         self._gave_up = False
         stack, known = [(0, first)], {(0, first)}
+        left = MOST_LOOKED_AT
         while stack:
-            if self._left <= 0 or len(known) > MOST_STATES:
+            if self._left <= 0 or left <= 0:
                 self._gave_up = True
                 return
-            self._left -= 1
+            left -= len(first) + 1
+            self._left -= len(first) + 1
             done, state = stack.pop()
             yield done, state
             for name, bit, befores in bits:

@@ -102,10 +102,10 @@ def _carrier(name: str, value_of: ValueOf, world: Inventory) -> str | None:
     if name in world.places:
         return None
     value = value_of(FactKey(AT, name))
-    return value if isinstance(value, str) else _stays_at(name, world)
+    return value if isinstance(value, str) else stays_at(name, world)
 
 
-def _stays_at(name: str, world: Inventory) -> str | None:
+def stays_at(name: str, world: Inventory) -> str | None:
     """Where a thing that does not move is if nothing else is known: where it belongs."""
     thing = world.objects.get(name)
     fixed = thing is not None and not thing.movable and not thing.is_a(Feature.PERSON)
@@ -240,7 +240,7 @@ def _read_around(subject: str, values_of: ValuesOf, world: Inventory, aboard: bo
         else:
             found.add(FactKey(AT, name))
             nexts = {value for value in values_of(FactKey(AT, name)) if isinstance(value, str)}
-            if (home := _stays_at(name, world)) is not None:
+            if (home := stays_at(name, world)) is not None:
                 nexts.add(home)
         for carrier in nexts:
             if is_robot(carrier, world):

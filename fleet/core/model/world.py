@@ -9,7 +9,7 @@ from math import inf
 
 import msgspec
 
-from fleet.core.model.derived import Inventory, holds, written
+from fleet.core.model.derived import Inventory, holds, stays_at, written
 from fleet.core.model.durations import only_moves, pace, work_s
 from fleet.core.model.parameter_types import ParameterType, names_of, parse_type
 from fleet.core.model.skills import Action, SkillModel
@@ -241,8 +241,11 @@ def condition_holds(facts: Mapping[FactKey, Value], condition: Condition, world:
 
 
 def known_value(variable: FactKey, facts: Mapping[FactKey, Value], world: WorldModel) -> Value:
-    """The value of a variable in `facts`; the hand of a robot that has none holds nothing."""
+    """The value of a variable in `facts`; the hand of a robot that has none holds nothing, and what
+    does not move is where it belongs."""
     value = facts.get(variable)
+    if value is None and variable.relation == AT:
+        return stays_at(variable.subject, world)
     if value is None and variable.relation == HOLDING and variable.subject in world.robots:
         return None if world.capability(variable.subject, "grip") else NOTHING
     return value

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from fleet.core.actors import least_loaded
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
+from fleet.core.model.preconditions import made_true
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
@@ -133,12 +134,14 @@ def _with_model_order(
 
 def world_after(candidate: Plan, world: WorldModel) -> WorldModel:
     """The world after a checked candidate, as far as that is settled before robots are chosen."""
-    facts: dict[FactKey, Value] = {}
+    facts: dict[FactKey, Value] = dict(world.facts)
+    settled: dict[FactKey, Value] = {}
     for task in _in_order(candidate):
-        for variable, value in world.skills[task.skill].ground(task.args).after:
+        for variable, value in made_true(world.skills[task.skill].ground(task.args), facts, world):
+            facts[variable] = value
             if actor_in(variable.subject) is None:
-                facts[variable] = value if actor_in(value) is None else None
-    return world.with_facts(facts)
+                settled[variable] = value if actor_in(value) is None else None
+    return world.with_facts(settled)
 
 
 def _in_order(plan: Plan) -> list[Task]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from fleet.core.model.formulas.text import effect_text, formula_text
 from fleet.core.model.skills import SPACE, SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.language import Vocabulary
@@ -22,6 +23,7 @@ def skills_text(skills: Iterable[SkillModel]) -> str:
 def _skill_text(skill: SkillModel) -> str:
     parameters = ", ".join(f"{name}: {kind}" for name, kind in skill.parameters.items())
     before = [str(row) for row in skill.before]
+    before += map(formula_text, skill.conditions)
     before += [f"{SPACE}({carrier})" for carrier in skill.space_in]
     sentences = [f"- {skill.name}({parameters}): {skill.about}".rstrip(": ")]
     needs = [
@@ -33,7 +35,8 @@ def _skill_text(skill: SkillModel) -> str:
     if needs:
         sentences.append(f"Needs: {', '.join(needs)}.")
     sentences.append(f"Before: {', '.join(before) or 'nothing'}.")
-    sentences.append(f"After: {', '.join(map(str, skill.after)) or 'nothing'}.")
+    after = [*map(str, skill.after), *map(effect_text, skill.conditional)]
+    sentences.append(f"After: {', '.join(after) or 'nothing'}.")
     return " ".join(sentences)
 
 

@@ -8,7 +8,8 @@ from math import inf
 
 from msgspec.structs import replace
 
-from fleet.core.model.derived import is_closed, is_located
+from fleet.core.model.derived import carriers, is_closed, is_located
+from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, condition_holds
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import PlanningProblem
@@ -20,7 +21,7 @@ from fleet.planners.symbolic.instantiation import Facts
 from fleet.planners.symbolic.robot_classes import representatives
 from fleet.planners.symbolic.search import Solution, Solver, Unfinished, Unreachable
 from fleet.planners.symbolic.travel import Travel
-from keyexpr_schema.facts import AT, HELD, HOLDING, SEARCHED, FactKey, Literal, Value
+from keyexpr_schema.facts import AT, HELD, HOLDING, IN, ON, SEARCHED, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 
 ALTERNATIVES = 4
@@ -38,17 +39,28 @@ REUSE_CHARGE_S = 200.0
 
 @dataclass(frozen=True)
 class Subgoal:
-    """One condition of one goal."""
+    """One condition of one goal; or with `others` several, to be reached at once."""
 
     goal: str
     condition: Condition
+    others: tuple[Condition, ...] = ()
 
-    def subjects(self) -> list[Condition]:
-        """The condition for each of those for whom it may hold."""
-        return [
-            replace(self.condition, subject=subject, any_of=())
-            for subject in self.condition.subjects
-        ]
+    def __str__(self) -> str:
+        return " and ".join(map(str, (self.condition, *self.others)))
+
+    def choices(self, world: WorldModel) -> list[tuple[Condition, ...]]:
+        """The conditions for each of those for whom the first may hold; the others are for the
+        same where they may be, or for one of whom it is known where they are.
+        """
+        choices = []
+        for subject in self.condition.subjects:
+            rows = [replace(self.condition, subject=subject, any_of=())]
+            for other in self.others:
+                known = (s for s in other.subjects if world.value(AT, s) is not None)
+                one = subject if subject in other.subjects else next(known, other.subject)
+                rows.append(replace(other, subject=one, any_of=()))
+            choices.append(tuple(rows))
+        return choices
 
 
 @dataclass(frozen=True)
@@ -107,39 +119,59 @@ def alternatives_for(
     Where a robot stands is left open at the start, so that every actor begins with the way to its
     work, whatever its robot does before; `settled` robots are taken to be where `facts` say.
     """
-    found: list[tuple[Solution, Condition]] = []
     failure: Impossible | GaveUp | None = None
     sought: list[_Sought] = []
-    for condition in subgoal.subjects():
-        made = _sought(condition, facts, world, settled)
+    for conditions in subgoal.choices(world):
+        made = _sought(conditions, facts, world, settled, thorough=False)
+        if isinstance(made, Impossible) and all(
+            _speaks_of_what_exists(c, world) for c in conditions
+        ):
+            made = _sought(conditions, facts, world, settled, thorough=True)
         if isinstance(made, _Sought):
             sought.append(made)
         else:
             failure = failure or made
     sought.sort(key=lambda one: one.least_s)
+    found: list[tuple[Solution, _Sought]] = []
     for one in sought:
         if len(found) >= ALTERNATIVES and one.least_s >= _dearest_s(found):
             break
         results = _different_solutions(one, budget)
+        if not results and not one.thorough:
+            again = _sought(one.conditions, facts, world, settled, thorough=True)
+            results = _different_solutions(again, budget) if isinstance(again, _Sought) else []
         if isinstance(results, Unfinished):
             failure = GaveUp(_gave_up(subgoal, results, budget))
             break
-        found += [(result, one.condition) for result in results]
+        found += [(result, one) for result in results]
     if not found:
         return failure or Impossible(_exhausted(subgoal))
     found.sort(key=lambda pair: pair[0].cost_s + _unloading_s(pair[0], pair[1], world))
     sequences: dict[object, ActionSequence] = {}
-    for result, condition in found:
-        # What rides in a basket already rides with a certain robot.
-        rides_with = world.value(AT, condition.subject)
-        spoken_of = (condition.subject, condition.value, rides_with)
-        named = frozenset(robot for robot in world.robots if robot in spoken_of)
+    for result, one in found:
+        named = frozenset(world.robots) & _spoken_of(one.conditions, world)
         sequence = ActionSequence(subgoal.goal, result.actions, named)
         sequences.setdefault(sequence.lifted, sequence)
     return tuple(sequences.values())[:ALTERNATIVES], found[0][0].facts
 
 
-def _dearest_s(found: Sequence[tuple[Solution, Condition]]) -> float:
+def _speaks_of_what_exists(condition: Condition, world: WorldModel) -> bool:
+    subject, value = condition.subject, condition.value
+    return world.kind_of(subject) is not None and (
+        condition.relation not in (AT, ON, IN) or world.kind_of(str(value)) is not None
+    )
+
+
+def _spoken_of(conditions: Sequence[Condition], world: WorldModel) -> frozenset[object]:
+    """What the conditions speak of; what rides in a basket already rides with a certain robot."""
+    return frozenset(
+        name
+        for condition in conditions
+        for name in (condition.subject, condition.value, world.value(AT, condition.subject))
+    )
+
+
+def _dearest_s(found: Sequence[tuple[Solution, _Sought]]) -> float:
     return sorted(solution.cost_s for solution, _ in found)[ALTERNATIVES - 1]
 
 
@@ -147,40 +179,48 @@ def _gave_up(subgoal: Subgoal, search: Unfinished, budget: TimeBudget) -> str:
     """How near a search came that ran out of time, or of states."""
     after = f"{budget.seconds:g} s" if budget.over else f"{search.states} states"
     steps = [f"{a.skill.name}({', '.join(a.args.values())})" for a in search.nearest]
-    rest = f"still lacked {', '.join(steps[:NEAREST_STEPS])}" if steps else "lacked no single step"
+    rest = f"still lacked {', '.join(steps[:NEAREST_STEPS])}" if steps else "is where it began"
     more = f" and {len(steps) - NEAREST_STEPS} more" if len(steps) > NEAREST_STEPS else ""
-    return f"gave up after {after}; the nearest it came to {subgoal.condition} {rest}{more}"
+    return f"gave up after {after}; the nearest it came to {subgoal} {rest}{more}"
 
 
 def _exhausted(subgoal: Subgoal) -> str:
     return (
-        f"every way to {subgoal.condition} undoes something that it needs: all states that the "
-        "connected robots can reach were looked at"
+        f"every way to {subgoal} undoes something that it needs: all states that the connected "
+        "robots can reach were looked at"
     )
 
 
-def _unloading_s(found: Solution, condition: Condition, world: WorldModel) -> float:
-    """The charge for an object that ends in a basket."""
-    where = found.facts.get(FactKey(AT, condition.subject))
-    wanted = where == condition.value or condition.relation == HELD
-    return 0.0 if wanted or where not in world.robots else UNLOADING_S
+def _unloading_s(found: Solution, sought: _Sought, world: WorldModel) -> float:
+    """The charge for objects that end in a basket."""
+    charge_s = 0.0
+    for condition in sought.conditions:
+        around = carriers(condition.subject, found.facts.get, world, aboard=True)
+        robots = [carrier for carrier in around if carrier in world.robots]
+        wanted = condition.value in robots or condition.relation == HELD
+        charge_s += 0.0 if wanted or not robots else UNLOADING_S
+    return charge_s
 
 
 @dataclass(frozen=True)
 class _Sought:
-    """A condition of one subject, as a task, and at least what it costs [s]."""
+    """Conditions of one subject each, as a task, and at least what it costs [s]."""
 
-    condition: Condition
+    conditions: tuple[Condition, ...]
     task: FiniteDomainTask
     solver: Solver
     least_s: float
+    thorough: bool
 
 
 def _different_solutions(sought: _Sought, budget: TimeBudget) -> list[Solution] | Unfinished:
-    """The cheapest sequence, and others made different by charging for what was used before."""
-    task, travel = sought.task, sought.task.travel
-    charge_s = [0.0] * len(task.operators)
-    numbers = {id(operator.action): number for number, operator in enumerate(task.operators)}
+    """The cheapest sequence, and others made different by charging for what was used before,
+    whichever robot did it.
+    """
+    charge_s = [0.0] * len(sought.task.operators)
+    same: dict[object, list[int]] = {}
+    for number, operator in enumerate(sought.task.operators):
+        same.setdefault(_whoever_does_it(operator.action), []).append(number)
     found: Solution | Unreachable | Unfinished | None = sought.solver.solve(charge_s, budget)
     if isinstance(found, Unfinished):
         return found
@@ -190,33 +230,39 @@ def _different_solutions(sought: _Sought, budget: TimeBudget) -> list[Solution] 
         if len(solutions) == ALTERNATIVES:
             break
         for action in found.actions:
-            number = numbers.get(id(action))
-            if number is not None:
+            for number in same.get(_whoever_does_it(action), ()):
                 charge_s[number] += REUSE_CHARGE_S
-            else:
-                travel.charge(action.actor, str(action.after[0].value), REUSE_CHARGE_S)
         found = sought.solver.another(charge_s, budget)
     return solutions
 
 
+def _whoever_does_it(action: Action) -> object:
+    robots = action.skill.robot_parameters
+    return action.skill.name, *(v for name, v in action.args.items() if name not in robots)
+
+
 def _sought(
-    condition: Condition, facts: Facts, world: WorldModel, settled: frozenset[str]
+    conditions: tuple[Condition, ...],
+    facts: Facts,
+    world: WorldModel,
+    settled: frozenset[str],
+    thorough: bool,
 ) -> _Sought | Impossible:
-    """The condition as a task, or why it is out of reach."""
-    goal = [Literal(FactKey(condition.relation, condition.subject), condition.value)]
-    robots = representatives(condition, facts, world)
+    """The conditions as a task, or why they are out of reach."""
+    goal = [Literal(FactKey(c.relation, c.subject), c.value) for c in conditions]
+    robots = representatives(conditions, facts, world)
     travel = Travel(world, facts)
     free = travel.free(robots)
     start: Facts = dict(facts)
     for robot in free - settled:
         start[FactKey(AT, robot)] = None
-    grounding = Grounding(world, start, goal, robots, free)
+    grounding = Grounding(world, start, goal, robots, free, thorough)
     task = FiniteDomainTask(world, start, goal, grounding.actions, robots, travel, free)
     solver = Solver(task)
     least_s = inf if task.impossible else solver.least_s()
     if least_s == inf:
         return Impossible(what_is_missing(grounding, task))
-    return _Sought(condition, task, solver, least_s)
+    return _Sought(conditions, task, solver, least_s, thorough)
 
 
 def exploration_for(

@@ -58,6 +58,7 @@ class Grounding:
         self._thorough = thorough
         self.skills = Instantiation(world, start, goal, robots, free)
         self._along: set[Literal] = set()
+        self._looked_into: set[str] = set()
         self._wanted: set[Literal] = set()
         self._open: list[Literal] = []
         self._possible: dict[FactKey, set[Value]] = {}
@@ -131,9 +132,12 @@ class Grounding:
         for value in dict.fromkeys(values):
             if value != subject:
                 self._want(Literal(key, value))
-        if not (aboard or self._thorough):
-            return
-        around = [*self._around(subject), *(self._carriers if self._thorough else ())]
+        if self._thorough:
+            around = [*self._around(subject), *self._carriers]
+        elif self.skills.writable(key):
+            return  # it can be taken there itself
+        else:
+            around = [*self._around(subject)]
         for carrier in around:  # it comes along with what carries it
             if carrier in self.world.objects and self.skills.writable(FactKey(AT, carrier)):
                 literal = Literal(FactKey(AT, carrier), where)
@@ -192,6 +196,9 @@ class Grounding:
 
     def _make_room(self, carrier: str) -> None:
         """What lies in a full basket is taken out."""
+        if carrier in self._looked_into:
+            return
+        self._looked_into.add(carrier)
         if not self._thorough and room_left(carrier, self.start, self.world) > 0:
             return
         for thing in self.world.objects:
@@ -213,7 +220,13 @@ class Grounding:
                 and before.value in row.skill.parameters
                 and self.skills.restores(row.relation, literal.value)
             ):
-                # It gives back what such actions take: only what has been taken matters.
+                # It gives back what such actions take: only what has been taken matters, and of
+                # several ways to give it back those that need nothing else.
+                if not (self._thorough or row.is_plain) and any(
+                    other.is_plain and other.value == row.value
+                    for other in self.skills.writers[row.relation]
+                ):
+                    continue
                 self._waiting[literal.variable].append((row, before, literal))
                 for value in list(self._values(literal.variable)):
                     self._restore(row, before, binding, value)

@@ -1,11 +1,163 @@
-"""What is missing first where a goal is out of reach: the sentence for it."""
+"""What is missing first where a goal is out of reach even if nothing ever ceased to hold.
+
+The goal is followed back: what could make it true, what that needs, and so on, to the first thing
+that nothing can bring about: a capability, a robot, a tool, a way, a place that nobody knows.
+"""
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Iterator
+
+from fleet.core.model import derived
+from fleet.core.model.formulas.evaluation import conjuncts, expanded
+from fleet.core.model.formulas.nodes import Formula
+from fleet.core.model.formulas.text import formula_text
+from fleet.core.model.parameter_types import PLACE, ROBOT
+from fleet.core.model.skills import Action
 from fleet.planners.symbolic.finite_domain import FiniteDomainTask
 from fleet.planners.symbolic.grounding import Grounding
+from fleet.planners.symbolic.relevance import rows_of
+from keyexpr_schema.facts import AT, IN, ON, REACHABLE, Literal
+
+MAX_NAMED = 3
+"""Reasons named, where there are several of a kind."""
 
 
 def what_is_missing(grounding: Grounding, task: FiniteDomainTask) -> str:
-    """A sentence."""
-    return f"no sequence of skills leads to {task.goal[0]}"
+    """A phrase for a goal that is out of reach."""
+    search = _Missing(grounding, task)
+    goal = task.impossible or next(filter(search.is_missing, task.goal), None)
+    if goal is None:
+        return "all that it needs can be had, but not at the same time"
+    return search.why(goal)
+
+
+class _Missing:
+    def __init__(self, grounding: Grounding, task: FiniteDomainTask) -> None:
+        self._grounding = grounding
+        self._task = task
+        self._world = grounding.world
+        self._true = _reachable(task)
+        self._seen: set[Literal | Formula] = set()
+
+    def is_missing(self, literal: Literal) -> bool:
+        """Whether a literal of the goal is out of reach."""
+        if self._is_position(literal):
+            return self._task.travel.action(literal.variable[1], str(literal.value)) is None
+        return not self._can_be(self._task.nodes.literal(literal, aboard=True, innermost=False))
+
+    def why(self, literal: Literal | Formula) -> str:
+        """What is missing first for something that can never hold."""
+        self._seen.add(literal)
+        if not isinstance(literal, Literal):
+            return f"{formula_text(literal)} never holds"
+        unknown = self._unknown(literal)
+        if unknown is not None:
+            return unknown
+        stored = derived.written(literal, self._world)
+        missing: dict[Literal | Formula, None] = {}
+        for action in self._grounding.actions:
+            if any(derived.written(row, self._world) == stored for row in action.after):
+                first = next(self._missing_for(action), None)
+                if first is not None and first not in self._seen:
+                    missing[first] = None
+        if missing:
+            found = [self.why(first) for first in list(missing)[:MAX_NAMED]]
+            return "; ".join(dict.fromkeys(found))
+        refused = self._grounding.skills.refused.get(stored, [])
+        if refused:
+            more = f" (and {len(refused) - MAX_NAMED} more)" if len(refused) > MAX_NAMED else ""
+            return "; ".join(refused[:MAX_NAMED]) + more
+        if not self._grounding.makers_of(literal):
+            return self._no_maker(stored)
+        return f"nothing leads to {literal}"
+
+    def _unknown(self, literal: Literal) -> str | None:
+        """What it speaks of that nobody knows of, or knows the place of."""
+        (relation, subject), value = literal
+        world = self._world
+        if world.kind_of(subject) is None:
+            return f"nobody knows of {subject}"
+        if relation in (AT, ON, IN):
+            if isinstance(value, str) and world.kind_of(value) is None:
+                return f"nobody knows of a place {value}"
+            if subject in world.robots:
+                return f"{subject} cannot drive to {value}"
+        if relation in (AT, ON, IN, REACHABLE) and not derived.is_located(
+            subject, self._task.nodes.known, world
+        ):
+            return f"nobody knows where {subject} is"
+        return None
+
+    def _missing_for(self, action: Action) -> Iterator[Literal | Formula]:
+        """What an action needs that can never hold."""
+        nodes = self._task.nodes
+        there = {literal.value for literal in action.before if self._is_position(literal)}
+        for literal in action.before:
+            if self._is_position(literal):
+                place = str(literal.value)
+                if self._task.travel.action(literal.variable.subject, place) is None:
+                    yield literal
+            else:
+                innermost = literal.value in there
+                if not self._can_be(nodes.literal(literal, aboard=False, innermost=innermost)):
+                    yield literal
+        for condition in action.conditions:
+            for part in conjuncts(expanded(condition, self._world)):
+                if not self._can_be(nodes.formula(part)):
+                    yield part
+
+    def _is_position(self, literal: Literal) -> bool:
+        return literal.variable.relation == AT and literal.variable.subject in self._task.position
+
+    def _can_be(self, node: int | bool) -> bool:
+        return node is True or (node is not False and node in self._true)
+
+    def _no_maker(self, literal: Literal) -> str:
+        """Why no skill makes it true: there is none, or those there are are for other things."""
+        (relation, subject), value = literal
+        reasons: dict[str, None] = {}
+        for skill in self._world.skills.values():
+            for row in rows_of(skill):
+                if row.relation != relation:
+                    continue
+                for term, name in ((row.variable.subject, subject), (row.value, value)):
+                    kind = row.kind_of(term)
+                    if kind in (None, ROBOT, PLACE) or not isinstance(name, str):
+                        continue
+                    assert kind is not None
+                    if self._world.kind_of(name) is not None and not self._grounding.skills.fits(
+                        kind, name
+                    ):
+                        reasons[f"{skill.name} is for {kind}, and {name} is none"] = None
+        named = list(reasons)[:MAX_NAMED]
+        return "; ".join(named) if named else f"no skill makes {literal} true"
+
+
+def _reachable(task: FiniteDomainTask) -> set[int]:
+    """The nodes that can hold as if nothing ever ceased to."""
+    rows = [
+        (operator.needs, (*operator.writes, *task.also.get(number, ())))
+        for number, operator in enumerate(task.operators)
+    ]
+    rows += [(a.needs, (a.reading,)) for axioms in task.nodes.axioms.values() for a in axioms]
+    open_ = [len(set(needs)) for needs, _ in rows]
+    used_by: dict[int, list[int]] = defaultdict(list)
+    for number, (needs, _) in enumerate(rows):
+        for need in set(needs):
+            used_by[need].append(number)
+    true = set(task.nodes.true_nodes(task.initial))
+    todo = list(true)
+    ready = [number for number, left in enumerate(open_) if left == 0]
+    while todo or ready:
+        for number in ready:
+            todo += [node for node in rows[number][1] if node not in true]
+            true.update(rows[number][1])
+        ready = []
+        if todo:
+            for number in used_by.get(todo.pop(), ()):
+                open_[number] -= 1
+                if open_[number] == 0:
+                    ready.append(number)
+    return true

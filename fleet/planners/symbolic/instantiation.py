@@ -10,9 +10,8 @@ from fleet.core.model import derived
 from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, parse_type
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel, known_value
-from fleet.planners.symbolic.readings import is_read_off
 from fleet.planners.symbolic.relevance import Row, few_of_each, related_skills, rows_of
-from keyexpr_schema.facts import AT, FactKey, Literal, Value
+from keyexpr_schema.facts import AT, IN, ON, FactKey, Literal, Value
 
 Facts = dict[FactKey, Value]
 Binding = dict[str, str]
@@ -107,7 +106,7 @@ class Instantiation:
                 chain = self._fixed_chain(variable.subject)
                 if chain is not None:
                     return str(value), self._place_in(chain, skill.parameters[str(value)])
-            elif not self.writable(variable) and not is_read_off(Literal(variable, ""), self.world):
+            elif not self.writable(variable) and relation not in (ON, IN, *derived.DERIVED):
                 return str(value), self.known(variable)
         return None
 
@@ -169,16 +168,21 @@ class Instantiation:
         complete = len(binding) == len(skill.parameters)
         measured = {need.of for need in skill.needs.get(parameter, ()) if need.of is not None}
         if not complete and not measured <= binding.keys():
-            if parameter != skill.actor_parameter:
+            robot = binding[parameter]
+            if parameter != skill.actor_parameter or skill.name in self.world.robots[robot].skills:
                 return True
-            return skill.name in self.world.robots[binding[parameter]].skills
+            self._refuse(literal, f"{robot} does not have the skill {skill.name}")
+            return False
         if not complete and parameter == skill.actor_parameter and self.world.hopeless:
             return True  # the whole call may be one that is not to be tried again
         args = {name: binding.get(name, "") for name in skill.parameters}
         why = self.world.lacks(binding[parameter], skill.ground(args), parameter)
+        self._refuse(literal, why)
+        return why is None
+
+    def _refuse(self, literal: Literal | None, why: str | None) -> None:
         if why is not None and literal is not None and why not in self.refused[literal]:
             self.refused[literal].append(why)
-        return why is None
 
     def fits(self, kind: str, name: str) -> bool:
         """Whether a name is of a type; of robots, whether it is one of those looked at."""

@@ -52,6 +52,17 @@ class Row:
         """The relation that it changes."""
         return self.variable.relation
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether its skill is done by one robot and asks for nothing but the state of that one."""
+        skill = self.skill
+        return (
+            not skill.conditions
+            and not skill.space_in
+            and all(before.variable.subject == skill.actor_parameter for before in skill.before)
+            and len(skill.robot_parameters) == 1
+        )
+
     def kind_of(self, term: Value) -> str | None:
         """The type of a parameter or of a name that it holds for each of; `None` for a value."""
         if not isinstance(term, str):

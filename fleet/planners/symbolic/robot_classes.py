@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from fleet.core.model.parameter_types import OBJECT
 from fleet.core.model.skills import SkillModel
@@ -17,7 +17,7 @@ MAX_FULL_HANDS = 2
 
 
 def representatives(
-    condition: Condition, facts: Mapping[FactKey, Value], world: WorldModel
+    conditions: Sequence[Condition], facts: Mapping[FactKey, Value], world: WorldModel
 ) -> list[str]:
     """One robot of each kind that is interchangeable now, as many where a skill takes several of
     the kind, and those that are spoken of.
@@ -25,17 +25,19 @@ def representatives(
     What a hand holds, if not the subject, only has to be put down, and each thing more would
     multiply the states to be looked at: a few such robots stand for all, unless it may be a tool.
     """
-    subject = condition.subject
-    tools = _needs_a_tool(condition, world)
+    subjects = {condition.subject for condition in conditions}
+    spoken_of = subjects | {condition.value for condition in conditions}
+    spoken_of |= {facts.get(FactKey(AT, subject)) for subject in subjects}
+    tools = any(_needs_a_tool(condition, world) for condition in conditions)
     kinds: dict[object, list[str]] = {}
     full: Counter[object] = Counter()
     together: dict[object, int] = {}
     for robot in world.team:
         spec = world.robots[robot]
         holds = facts.get(FactKey(HOLDING, robot))
-        named = robot in (subject, condition.value) or facts.get(FactKey(AT, subject)) == robot
+        named = robot in spoken_of
         able = spec.skills, tuple(sorted(spec.capabilities.items()))
-        if not (named or tools or holds in (None, NOTHING, subject)):
+        if not (named or tools or holds in (None, NOTHING) or holds in subjects):
             full[able] += 1
             if full[able] > MAX_FULL_HANDS:
                 continue

@@ -1,0 +1,285 @@
+"""Chooses one action sequence for each subgoal, as the strategy says, by the plans they lead to.
+
+Plans are compared by what they take with a quick allocation; the few best with the best allocation
+there is, if they are small. In the end carriers that go the same way are made one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, cycle, product
+from math import inf, prod
+
+from fleet.core.actors import carried_at_end
+from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
+from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, PlanningProblem
+from fleet.planners.deordering import ActionSequence, deordered
+from fleet.planners.symbolic.action_sequences import UNLOADING_S, Exploration
+from fleet.planners.symbolic.joint_trips import joined
+from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
+from fleet.scheduling.quick_allocation import quick_allocation
+from keyexpr_schema.payloads.plans import Plan
+
+MAX_COMBINATIONS = 256
+"""Up to this many combinations are all compared; beyond, one sequence is changed at a time."""
+MOST_REFINED, REFINING_NODES = 12, 3000
+"""Of those, how many of the most promising get a better allocation, and how long it is sought."""
+MOST_JOINED = 24
+"""Pairs of trips that are tried as one trip before no more are joined."""
+FEW = 32
+"""Beside a joint trip, up to so many combinations of what the others do are all compared."""
+
+Choice = Sequence[ActionSequence]
+Cost = tuple[float, float]
+"""The makespan [s], with a charge for what is left in baskets, and the work of all robots [s]."""
+
+
+def choose(
+    problem: PlanningProblem, options: Sequence[Choice], explored: Exploration | None
+) -> CheckedPlan | NoPlan:
+    """A plan of one sequence of each of the `options`, and of all that are to `explore`."""
+    return _Choosing(problem, explored).made(options)
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """A valid plan for a choice of sequences, each actor with an able robot.
+
+    Until it is verified, `cost` is that of the shortest schedule, which need not pass the checker.
+    """
+
+    choice: Choice
+    allocated: AllocatedPlan
+    cost: Cost
+
+    def refined(self) -> _Candidate:
+        """With a better allocation, if a look at all of a small plan's finds one."""
+        checked = self.allocated.checked
+        made = _allocated(self.choice, checked, quick_allocation(checked, REFINING_NODES))
+        return made if made is not None and made.cost < self.cost else self
+
+    def verified(self) -> _Candidate | NoPlan:
+        """With the cost of the shortest schedule that passes the checker."""
+        found = self.allocated.valid_schedule()
+        if isinstance(found, tuple):
+            return NoPlan(found[0].sentence, found)
+        return replace(self, cost=_cost(found, self.allocated.checked))
+
+
+def _allocated(
+    choice: Choice, checked: CheckedPlan, allocation: Mapping[str, str] | None
+) -> _Candidate | None:
+    if allocation is None:
+        return None
+    allocated = AllocatedPlan(checked, allocation)
+    schedule = next(allocated.schedules(), None)
+    cost = (inf, inf) if schedule is None else _cost(schedule, checked)
+    return _Candidate(choice, allocated, cost)
+
+
+def _cost(schedule: PlanSchedule, checked: CheckedPlan) -> Cost:
+    unloading_s = UNLOADING_S * len(carried_at_end(checked))
+    return round(schedule.makespan_s + unloading_s, 3), sum(schedule.durations_s.values())
+
+
+def _promise(found: _Candidate | NoPlan) -> Cost:
+    return (-inf, -inf) if isinstance(found, NoPlan) else found.cost
+
+
+class _Best:
+    """The cheapest valid candidate so far, and why the first that was not valid was not."""
+
+    def __init__(self, begin: _Candidate | None = None) -> None:
+        self.found = begin
+        self.failure: NoPlan | None = None
+
+    def improved(self, candidate: _Candidate | NoPlan) -> bool:
+        """Whether the candidate is better; verifying does not make a plan cheaper, so only what
+        looks cheaper is verified."""
+        if isinstance(candidate, _Candidate) and self._is_better(candidate):
+            candidate = candidate.verified()
+            if isinstance(candidate, _Candidate) and self._is_better(candidate):
+                self.found = candidate
+                return True
+        if isinstance(candidate, NoPlan):
+            self.failure = self.failure or candidate
+        return False
+
+    def _is_better(self, candidate: _Candidate) -> bool:
+        return self.found is None or candidate.cost < self.found.cost
+
+    @property
+    def result(self) -> _Candidate | NoPlan:
+        """The best, or why there is none."""
+        none = NoPlan("no combination of action sequences passes the checker")
+        return self.found or self.failure or none
+
+
+@dataclass(frozen=True)
+class _Choosing:
+    problem: PlanningProblem
+    explored: Exploration | None
+
+    def made(self, options: Sequence[Choice]) -> CheckedPlan | NoPlan:
+        """The plan that the problem's strategy leads to."""
+        if self.problem.strategy == MONOLITHIC:
+            best = self._best([alternatives[:1] for alternatives in options])
+        elif self.problem.strategy == PER_GOAL:
+            # What is best for each goal alone may not fit together: two may want one helper.
+            best = self._each_alone(options) or self._best(options)
+        else:
+            best = self._best(options)
+        if isinstance(best, NoPlan):
+            return best
+        if self.problem.strategy == BIG_DAG:
+            best = self._with_joint_trips(best, options)
+        return best.allocated.checked
+
+    def _each_alone(self, options: Sequence[Choice]) -> _Candidate | None:
+        """For each goal what is best as if there were no other, if that is a plan in time."""
+        alone, choice = replace(self, explored=None), list[Choice]()
+        for goal in dict.fromkeys(alternatives[0].goal for alternatives in options):
+            mine = [alternatives for alternatives in options if alternatives[0].goal == goal]
+            best = alone._best(mine)
+            if isinstance(best, NoPlan) or self.problem.budget.over:
+                return None
+            choice += [(sequence,) for sequence in best.choice]
+        together = self._best(choice)
+        return together if isinstance(together, _Candidate) else None
+
+    def _best(self, options: Sequence[Choice]) -> _Candidate | NoPlan:
+        """The cheapest candidate: of few combinations the cheapest of all; else from the cheapest
+        sequence of each, one is changed at a time for as long as that helps.
+
+        When the time is over it is the cheapest of those looked at until then, at least one.
+        """
+        if prod(map(len, options)) > MAX_COMBINATIONS:
+            return self._one_at_a_time(options)
+        best = _Best()
+        for found in self._ranked(product(*options), MOST_REFINED):
+            if best.found is not None and self.problem.budget.over:
+                break
+            best.improved(found)
+        return best.result
+
+    def _one_at_a_time(self, options: Sequence[Choice]) -> _Candidate | NoPlan:
+        best = _Best()
+        current = [alternatives[0] for alternatives in options]
+        best.improved(self._candidate(current))
+        unchanged = 0
+        for number, alternatives in cycle(enumerate(options)):
+            if unchanged == len(options):
+                break
+            unchanged += 1
+            for sequence in alternatives:
+                changed = [*current[:number], sequence, *current[number + 1 :]]
+                if self.problem.budget.over:
+                    return best.result
+                if changed != current and best.improved(self._candidate(changed)):
+                    current, unchanged = changed, 1
+        return best.result
+
+    def _ranked(self, choices: Iterator[Choice], most_refined: int) -> list[_Candidate | NoPlan]:
+        """All of them, the cheapest first; so many of the cheapest with better allocations."""
+        candidates: list[_Candidate | NoPlan] = []
+        for choice in choices:
+            candidates.append(self._candidate(choice))
+            if self.problem.budget.over:
+                break
+        candidates.sort(key=_promise)
+        for number, found in enumerate(candidates[:most_refined]):
+            if self.problem.budget.over:
+                break
+            if isinstance(found, _Candidate):
+                candidates[number] = found.refined()
+        return sorted(candidates, key=_promise)
+
+    def _with_joint_trips(self, begin: _Candidate, options: Sequence[Choice]) -> _Candidate:
+        """Sequences for two goals joined into one with one carrier, for as long as that helps."""
+        best, ways = begin, [list(alternatives) for alternatives in options]
+        while (joint := self._joint_trip(best, ways)) is not None:
+            (one, other, sequence), best = joint
+            ways[one] = [sequence]
+            del ways[other]
+        return best
+
+    def _joint_trip(
+        self, begin: _Candidate, ways: Sequence[Choice]
+    ) -> tuple[_Joint, _Candidate] | None:
+        """The pair of trips that makes the cheapest plan as one, and that plan, if it is cheaper.
+
+        Of many goals it is the first pair that helps, and the others stay as they are.
+        """
+        best, chosen = _Best(begin), None
+        for joint in self._joinable(ways):
+            if self.problem.budget.over:
+                break
+            one, other, sequence = joint
+            few = prod(len(row) for k, row in enumerate(ways) if k not in (one, other)) <= FEW
+            rest = list(ways) if few else [(each,) for each in begin.choice]
+            rest[one] = (sequence,)
+            del rest[other]
+            for found in self._ranked(product(*rest), MOST_REFINED):
+                if best.improved(found):
+                    chosen = joint
+            if chosen is not None and not few:
+                break
+        return None if chosen is None or best.found is None else (chosen, best.found)
+
+    def _joinable(self, ways: Sequence[Choice]) -> list[_Joint]:
+        """Which two sequences can be one, those first that save most of the carriers' ways."""
+        found: list[tuple[float, _Joint]] = []
+        for one, other in combinations(range(len(ways)), 2):
+            if self.problem.budget.over:
+                break
+            for first, second in product(ways[one], ways[other]):
+                made = joined(first, second, self.problem.world)
+                if made is not None and made.saved_s > 0.0:
+                    found.append((made.saved_s, (one, other, made.sequence)))
+        found.sort(key=lambda row: -row[0])
+        return [joint for _, joint in found[:MOST_JOINED]]
+
+    def _candidate(self, choice: Choice) -> _Candidate | NoPlan:
+        plan = _plan(self.problem, choice, self.explored)
+        checked = check_plan(plan, self.problem.world)
+        if isinstance(checked, InvalidPlan):
+            return NoPlan(checked.violations[0].sentence, checked.violations)
+        made = _allocated(choice, checked, quick_allocation(checked))
+        return made or NoPlan("there are fewer robots than the plan needs at the same time")
+
+
+_Joint = tuple[int, int, ActionSequence]
+"""Two subgoals by number, and one sequence for both."""
+
+
+def _plan(problem: PlanningProblem, choice: Choice, explored: Exploration | None) -> Plan:
+    """The plan of these sequences; it promises the conditions of goals that have one."""
+    sequences = [*choice, *(explored.sequences if explored else ())]
+    tasks, pins = deordered(
+        sequences,
+        problem.first_task,
+        one_actor_each=problem.strategy == MONOLITHIC,
+        world=problem.world,
+    )
+    seeks = frozenset(explored.seeks if explored else ())
+    served = frozenset[str]().union(*(sequence.goals for sequence in choice))
+    conditions = tuple(
+        condition
+        for goal in problem.goals
+        for condition in goal.conditions
+        if seeks.isdisjoint(condition.subjects)
+        and (goal.goal in served or problem.world.holds(condition))
+    )
+    return Plan(
+        plan=problem.plan,
+        revision=problem.revision,
+        goals=tuple(goal.goal for goal in problem.goals),
+        conditions=(*conditions, *(explored.conditions if explored else ())),
+        tasks=tasks,
+        pins=pins,
+        strategy=problem.strategy,
+        made_by="symbolic",
+        allocator=problem.allocator,
+        seeks=tuple(explored.seeks) if explored else (),
+    )

@@ -40,8 +40,9 @@ def out_of_reach(mission: Mission) -> tuple[str, ...]:
         if any(spots.stances(point, radius_m, reach_m) for _, radius_m, reach_m in hands):
             continue
         robot_name, radius_m, reach_m = hands[0]
+        where = f"{'on' if entry.on else 'in'} {entry.carrier} at {list(entry.at_m)}"
         unreachable.append(
-            f"{name} lies {'on' if entry.on else 'in'} {entry.carrier} at {list(entry.at_m)}, where no hand gets to: "
+            f"{name} lies {where}, where no hand gets to: "
             f"for {robot_name}, {spots.why_not(point, radius_m, reach_m)}"
         )
     return tuple(unreachable)

@@ -292,7 +292,7 @@ def test_furniture_people_and_states_that_cannot_be_are_one_clear_sentence(
 def test_an_object_says_once_what_it_is_on_or_in(tmp_path: Path) -> None:
     path = tmp_path / "world.yaml"
     path.write_text(HOME.read_text().replace("on: kitchen_table,", "", 1))
-    with pytest.raises(BadFile, match="objects.cup_1: say either `on` or `in`"):
+    with pytest.raises(BadFile, match=r"objects\.cup_1: say either `on` or `in`"):
         load_world(path)
 
 

@@ -375,11 +375,13 @@ class Observer:
 
     def detect_fixture(self, thing: str) -> Detection:
         """What the camera reports of furniture or a person that it notices."""
+        movers = self._world.fixtures.movers
+        opening = self._mechanisms.opening(thing) if thing in movers else 0.0
         x, y = self._world.fixture_of[thing].center_m
         return Detection(
             object=thing,
             kind=self.noticed[thing],
-            point_m=(x, y, 0.0),
+            point_m=self._world.fixtures.face_m(thing, opening),
             place=self._world.place_at(x, y),
             states=self._mechanisms.state_of(thing),
         )

@@ -212,7 +212,7 @@ class Fixtures:
             carrier = self.carriers[thing][1]
             across = min(0.0, BEHIND_FRONT_M - carrier.size_m[1] / 2) if carrier.roofed else 0.0
             return self.carrier_point_m(thing, 0.0, across, opening)
-        return (*next(f for n, f in self.by_name.items() if n == thing).center_m, 0.0)
+        return (*self.by_name[thing].center_m, 0.0)
 
     def carrier_point_m(
         self, thing: str, along_m: float, across_m: float, opening: float = 0.0

@@ -132,6 +132,10 @@ def stow(run: MotionRun) -> Step:
     if arm is None or arm.stowed():
         return
     run.phase = "folding the arm"
+    if robot.way_out is not None and robot.held is None and robot.gripper is not None:
+        # It was stopped with its fingers round a handle, or about to take something.
+        robot.gripper.open()
+        yield from wait(0.6)
     x, y, z = arm.grip_point()
     radius = math.dist(robot.pose()[:2], (x, y))
     if radius > robot.description.clearance_m:

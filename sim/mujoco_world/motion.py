@@ -130,6 +130,7 @@ def stow(run: MotionRun) -> Step:
     robot = run.robot
     arm = robot.arm
     if arm is None or arm.stowed():
+        robot.way_out = None
         return
     run.phase = "folding the arm"
     if robot.way_out is not None and robot.held is None and robot.gripper is not None:

@@ -6,6 +6,7 @@ finger pads, and success is what the hand's own sensors say.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -325,8 +326,8 @@ def reach_down(
         if hit is not None:
             touched = hit
             continue
-        for hover in hovers_m:
-            above = arm.solve((x, y, z + hover), at, opening_rad)
+        for hover, start in itertools.product(hovers_m, (at, *arm.entry.seeds)):
+            above = arm.solve((x, y, z + hover), start, opening_rad)
             if above is not None:
                 hit = arm.obstacle(above)
                 if hit is None:

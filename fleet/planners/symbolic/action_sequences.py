@@ -18,6 +18,7 @@ from fleet.planners.symbolic.finite_domain import FiniteDomainTask
 from fleet.planners.symbolic.grounding import Grounding
 from fleet.planners.symbolic.impossibility import what_is_missing
 from fleet.planners.symbolic.instantiation import Facts
+from fleet.planners.symbolic.readings import TooManyWays
 from fleet.planners.symbolic.robot_classes import representatives
 from fleet.planners.symbolic.search import Solution, Solver, Unfinished, Unreachable
 from fleet.planners.symbolic.travel import Travel
@@ -126,7 +127,10 @@ def alternatives_for(
         if isinstance(made, Impossible) and all(
             _speaks_of_what_exists(c, world) for c in conditions
         ):
-            made = _sought(conditions, facts, world, settled, thorough=True)
+            try:
+                made = _sought(conditions, facts, world, settled, thorough=True)
+            except TooManyWays:
+                pass
         if isinstance(made, _Sought):
             sought.append(made)
         else:
@@ -138,7 +142,10 @@ def alternatives_for(
             break
         results = _different_solutions(one, budget)
         if not results and not one.thorough:
-            again = _sought(one.conditions, facts, world, settled, thorough=True)
+            try:
+                again = _sought(one.conditions, facts, world, settled, thorough=True)
+            except TooManyWays:
+                again = Impossible("")
             results = _different_solutions(again, budget) if isinstance(again, _Sought) else []
         if isinstance(results, Unfinished):
             failure = GaveUp(_gave_up(subgoal, results, budget))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
 
@@ -127,10 +128,8 @@ def alternatives_for(
         if isinstance(made, Impossible) and all(
             _speaks_of_what_exists(c, world) for c in conditions
         ):
-            try:
+            with suppress(TooManyWays):
                 made = _sought(conditions, facts, world, settled, thorough=True)
-            except TooManyWays:
-                pass
         if isinstance(made, _Sought):
             sought.append(made)
         else:

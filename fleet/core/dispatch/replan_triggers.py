@@ -42,7 +42,7 @@ def contradicted(state: State, entry: PlanEntry, fact: Fact) -> PlanEntry | None
     for task, needed in _needs_about(state, entry, fact.key):
         record = entry.records[task]
         if evaluate(needed, world.facts.get, world) or _is_still_to_be_made(
-            entry, needed, fact.key, world
+            entry, task, needed, world
         ):
             continue
         if record.state in OUTSTANDING and fact.source == record.robot:
@@ -79,21 +79,20 @@ def _needs_about(state: State, entry: PlanEntry, known: FactKey) -> Iterator[tup
                     yield task, formula
 
 
-def _is_still_to_be_made(
-    entry: PlanEntry, needed: Formula, known: FactKey, world: WorldModel
-) -> bool:
-    """Whether what the need is read off, other than the variable that has become known, is yet to
-    change."""
+def _is_still_to_be_made(entry: PlanEntry, task: str, needed: Formula, world: WorldModel) -> bool:
+    """Whether something that the need is read off is yet to change: of what it names, by tasks
+    before, and of what else it is read off, by any other."""
+    graph = entry.index.graph
     formula = expanded(needed, world)
-    read = reads(formula, lambda key: (world.facts.get(key),), world) - {known}
-    if isinstance(needed, Holds):
-        read.discard(needed.literal.variable)
-    setters = entry.index.graph.setters
-    return any(
-        entry.records[task].state not in ENDED_TASKS
-        for variable in read
-        for task in (*setters.get(variable, ()), *setters.get(FactKey(variable.relation, ANY), ()))
-    )
+    read = reads(formula, lambda key: (world.facts.get(key),), world)
+    for variable in read:
+        names: Iterable[str] = graph.suppliers.get((task, variable), ())
+        if variable not in graph.needs[task]:
+            of_any = FactKey(variable.relation, ANY)
+            names = (*graph.setters.get(variable, ()), *graph.setters.get(of_any, ()))
+        if any(n != task and entry.records[n].state not in ENDED_TASKS for n in names):
+            return True
+    return False
 
 
 def _is_being_made(state: State, entry: PlanEntry, fact: Fact) -> bool:

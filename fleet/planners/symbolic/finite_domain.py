@@ -84,16 +84,13 @@ class FiniteDomainTask:
         self.impossible: Literal | None = None
         self.goal_needs, self.goal_stands = self._goal()
         self._count_rides()
-        self._room = {
-            carrier: self._room_beside(carrier)
-            for operator in self.operators
-            for carrier in operator.action.space_in
-        }
         self._things = [
             (v, variable.subject)
             for v, variable in enumerate(self.nodes.variables)
             if variable.relation == AT and variable.subject in world.objects
         ]
+        carriers = {carrier for o in self.operators for carrier in o.action.space_in}
+        self._room = {carrier: self._room_beside(carrier) for carrier in carriers}
         self._watched = watch_lists(self.nodes, [operator.needs for operator in self.operators])
 
     def facts(self, state: State) -> Facts:
@@ -273,11 +270,10 @@ class FiniteDomainTask:
 
     def _room_beside(self, carrier: str) -> float:
         """Room in or on a carrier, without the things that move in this task."""
-        moving = {v for v in self.nodes.variables if v.relation == AT}
-        moving = {v for v in moving if v.subject in self.world.objects}
-        start = self.nodes.start
-        beside = {key: value for key, value in start.items() if key not in moving}
-        return room_left(carrier, beside, self.world)
+        known = self.nodes.known
+        held = known(FactKey(HOLDING, carrier))
+        inside = [t for _, t in self._things if known(FactKey(AT, t)) == carrier and t != held]
+        return room_left(carrier, self.nodes.start, self.world) + len(inside)
 
     def _has_room(self, action: Action, state: State) -> bool:
         for carrier in action.space_in:

@@ -58,6 +58,7 @@ class Grounding:
         self._thorough = thorough
         self.skills = Instantiation(world, start, goal, robots, free)
         self._along: set[Literal] = set()
+        self._looked_into: set[str] = set()
         self._wanted: set[Literal] = set()
         self._open: list[Literal] = []
         self._possible: dict[FactKey, set[Value]] = {}
@@ -195,6 +196,9 @@ class Grounding:
 
     def _make_room(self, carrier: str) -> None:
         """What lies in a full basket is taken out."""
+        if carrier in self._looked_into:
+            return
+        self._looked_into.add(carrier)
         if not self._thorough and room_left(carrier, self.start, self.world) > 0:
             return
         for thing in self.world.objects:

@@ -70,6 +70,28 @@ def test_objects_are_told_one_by_one(robotctl: Robotctl) -> None:
     assert "'kitchen' is a place already" in taken.err
 
 
+def test_what_others_can_be_on_is_told_with_its_features(robotctl: Robotctl) -> None:
+    robotctl("world", "load", WORLD)
+    desk = ("world", "add", "--object", "desk", "--kind", "desk", "--fixed", "--home", "kitchen")
+    robotctl(*desk)
+    drawer = robotctl(
+        *("world", "add", "--object", "drawer", "--kind", "drawer", "--part-of", "desk"),
+        *("--feature", "contains", "--feature", "openable", "--json"),
+    ).data
+    assert (drawer["features"], drawer["part_of"]) == (["contains", "openable"], "desk")
+    assert "openable" in robotctl("world", "list").out
+    said = robotctl("world", "add", "--fact", "in", "cup_1", "drawer")
+    assert said.out.strip() == "stored at(cup_1) = drawer"
+    wrong = robotctl("world", "add", "--fact", "at", "cup_1", "cup_1")
+    assert "cannot be on or in itself" in wrong.err
+    robotctl("world", "add", "--object", "anna", "--kind", "person")
+    goal = ("goal", "add", "Bring me the first cup.")
+    assert robotctl(*goal, "--speaker", "anna", "--json").data["spec"]["speaker"] == "anna"
+    assert "there is no person 'ana' (did you mean 'anna'?)" in robotctl(
+        *goal, "--speaker", "ana"
+    ).err
+
+
 def test_places_are_told_one_by_one(robotctl: Robotctl) -> None:
     robotctl("world", "load", WORLD)
     told = robotctl(

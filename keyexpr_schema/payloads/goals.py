@@ -22,8 +22,8 @@ class Condition(Payload, frozen=True, kw_only=True):
     in a bowl on a table there, or in the basket of a robot that is there; it does not while a hand
     holds the object. `on(object)` and `in(object)` name the thing that carries it directly.
     `located(object) = true` holds when it is known where the object is, `held(object) = true` when
-    a robot's hand holds it. With `any_of`, it is enough that the condition holds for one of those subjects
-    (`subject` is then the first of them): "a cup", "some robot".
+    a robot's hand holds it. With `any_of`, it is enough that the condition holds for one of those
+    subjects (`subject` is then the first of them): "a cup", "some robot".
     """
 
     relation: Id

@@ -198,6 +198,21 @@ class Observer:
                 found.append((x + dx, y + dy, z + dz))
         return found
 
+    def rim_m(self, point_m: tuple[float, float, float]) -> float | None:
+        """How high the edge is over which a hand gets to a point in a drawer or a basin [m]."""
+        for name, fixture in self._world.fixtures.by_name.items():
+            thing = self._carriers.at_fixture(name, point_m)
+            if thing is None:
+                continue
+            carrier = self._world.fixtures.carriers[thing][1]
+            if carrier.inside and not carrier.roofed:
+                mover = fixture.mover(thing)
+                if mover is None:
+                    return fixture.height_m
+                front = mover.panels[0]
+                return front.center_m[2] + front.half_m[2]
+        return None
+
     def contents(self, carrier: str) -> list[str]:
         """What is directly on or in a thing."""
         return [name for name, support in self._supports()[0].items() if support == carrier]
@@ -360,11 +375,13 @@ class Observer:
 
     def detect_fixture(self, thing: str) -> Detection:
         """What the camera reports of furniture or a person that it notices."""
+        movers = self._world.fixtures.movers
+        opening = self._mechanisms.opening(thing) if thing in movers else 0.0
         x, y = self._world.fixture_of[thing].center_m
         return Detection(
             object=thing,
             kind=self.noticed[thing],
-            point_m=(x, y, 0.0),
+            point_m=self._world.fixtures.face_m(thing, opening),
             place=self._world.place_at(x, y),
             states=self._mechanisms.state_of(thing),
         )

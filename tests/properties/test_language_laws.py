@@ -104,27 +104,39 @@ FURNISHED_WORDS = words_in(
 )
 FURNISHED_SOUP = st.lists(st.sampled_from(FURNISHED_WORDS), max_size=12).map(" ".join)
 THING = st.sampled_from(
-    "the fork|the lamp|the first cup|the bowl|the box|the tray|the fridge|Anna|everything|it|"
-    "the television|the shelf|the kitchen table|the upper board|me|the cups".split("|")
+    (
+        *("the fork", "the lamp", "the first cup", "the bowl", "the box", "the tray", "the fridge"),
+        *("Anna", "everything", "it", "the television", "the shelf", "the kitchen table", "me"),
+        *("the upper board", "the cups"),
+    )
 )
 FURNISHED_WISH = st.builds(
     str.format,
     st.sampled_from(
-        "put {} on {}|put {} in {}|bring {} to {}|give {} to {}|close {}|switch {} off|open {}|"
-        "put {} back|clear {}|search {}|{} should be open|bring me {}|take {} from {}".split("|")
+        (
+            *("put {} on {}", "put {} in {}", "bring {} to {}", "give {} to {}", "close {}"),
+            *("switch {} off", "open {}", "put {} back", "clear {}", "search {}", "bring me {}"),
+            *("{} should be open", "take {} from {}"),
+        )
     ),
     THING,
     THING,
 )
-FURNISHED_WISHES = st.lists(FURNISHED_WISH, min_size=1, max_size=3).map(" and ".join)
+FURNISHED_CLAIM = st.builds(
+    str.format,
+    st.sampled_from(
+        ("{} is on {}", "{} is in {}", "{} is open", "{} is off", "{} has {}", "{} contains {}")
+    ),
+    THING,
+    THING,
+)
+FURNISHED_WISHES = st.lists(FURNISHED_WISH, min_size=1, max_size=2).map(" and ".join)
 
 
-@reaches(least={"refused": 50, "on or in": 10, "state": 10, "handed": 3})
+@reaches("handed", least={"refused": 50, "on or in": 5, "state": 3})
 @settings(max_examples=500, deadline=None)
-@given(st.one_of(FURNISHED_SOUP, FURNISHED_WISHES), st.sampled_from([None, "anna"]))
-def test_what_is_wished_for_things_can_be(
-    reached: Reached, text: str, speaker: str | None
-) -> None:
+@given(st.one_of(FURNISHED_SOUP, FURNISHED_WISH, FURNISHED_WISHES), st.sampled_from([None, "anna"]))
+def test_what_is_wished_for_things_can_be(reached: Reached, text: str, speaker: str | None) -> None:
     """Nothing is put into itself, nor on what only contains, nor moved that stays where it is."""
     try:
         reading = read_goal(text, replace(FURNISHED, speaker=speaker))
@@ -152,7 +164,7 @@ def test_what_is_wished_for_things_can_be(
 
 @reaches("refused", "read")
 @settings(max_examples=300, deadline=None)
-@given(FURNISHED_SOUP)
+@given(st.one_of(FURNISHED_SOUP, FURNISHED_CLAIM))
 def test_any_statement_about_furniture_is_read_or_refused(reached: Reached, text: str) -> None:
     try:
         facts = statement_facts(text, FURNISHED)

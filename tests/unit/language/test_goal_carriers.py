@@ -32,7 +32,7 @@ def read(text: str, speaker: str | None = None) -> str:
         ("Put the fork on the table in the living room", "on(fork) = coffee_table"),
         ("Put the fork on the tray", "on(fork) = tray_1"),
         ("Put a cup on every table",
-         "on(cup_1|cup_2) = kitchen_table; on(cup_1|cup_2) = coffee_table"),
+         "on(cup_1|cup_2) = coffee_table; on(cup_1|cup_2) = kitchen_table"),
         ("Put the cup from the fridge on the kitchen table", "on(cup_2) = kitchen_table"),
         ("Bring the cup in the fridge to the hallway", "at(cup_2) = hallway"),
         ("Bring the cup on the table in the kitchen to the hallway", "at(cup_1) = hallway"),

@@ -87,9 +87,9 @@ def test_what_others_can_be_on_is_told_with_its_features(robotctl: Robotctl) -> 
     robotctl("world", "add", "--object", "anna", "--kind", "person")
     goal = ("goal", "add", "Bring me the first cup.")
     assert robotctl(*goal, "--speaker", "anna", "--json").data["spec"]["speaker"] == "anna"
-    assert "there is no person 'ana' (did you mean 'anna'?)" in robotctl(
-        *goal, "--speaker", "ana"
-    ).err
+    assert (
+        "there is no person 'ana' (did you mean 'anna'?)" in robotctl(*goal, "--speaker", "ana").err
+    )
 
 
 def test_places_are_told_one_by_one(robotctl: Robotctl) -> None:

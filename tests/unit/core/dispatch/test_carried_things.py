@@ -62,6 +62,17 @@ def test_of_two_words_of_one_moment_the_finer_one_holds() -> None:
     assert believed(model, "cup_1") == "kitchen"
 
 
+def test_nothing_comes_to_be_in_itself() -> None:
+    model = with_tray()
+    model.learn("tray", "in", "cupboard")
+    model.learn("cupboard", "on", "tray")
+    assert believed(model, "cupboard") == "tray"
+    assert believed(model, "tray") is None, "said before that it would be in what is on it"
+    model.learn("tray", "on", "tray")
+    assert believed(model, "tray") is None
+    assert believed(model, "cup_1") == "tray"
+
+
 def test_a_statement_that_says_less_does_not_make_it_less_known() -> None:
     model = with_tray()
     statement = Statement(statement="s", text="The cup 1 is in the kitchen", said_s=200.0)

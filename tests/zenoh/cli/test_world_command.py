@@ -46,7 +46,7 @@ def test_the_world_is_loaded_said_listed_and_forgotten(robotctl: Robotctl) -> No
     statement = world["statements"][0]["statement"]
     assert robotctl("world", "delete", statement).code == 0
     assert robotctl("world", "delete", "cup_2").out.strip() == "deleted object cup_2"
-    assert "known are: cup_1," in robotctl("world", "delete", "cup_2").err
+    assert "did you mean 'cup_1'?" in robotctl("world", "delete", "cup_2").err
     left = robotctl("world", "list", "--json").data
     assert left["facts"] == left["statements"] == []
 

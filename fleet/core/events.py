@@ -52,6 +52,12 @@ class PlannerStarted(Event, frozen=True, kw_only=True):
     lineage: str = ""
 
 
+class EpochRaised(Event, frozen=True, kw_only=True):
+    """The run goes on with a higher epoch: robots have had orders of one that was not known of."""
+
+    epoch: int
+
+
 class GoalPut(Event, frozen=True, kw_only=True):
     """A goal was put."""
 

@@ -13,6 +13,7 @@ import uuid
 from pathlib import Path
 
 from fleet.errors import StoreError, StoreInUse
+from keyexpr_schema.data_folder import usable_folder
 
 FORMAT = 2
 PAGES_AT_ONCE = 256
@@ -57,13 +58,8 @@ def take_lock(data_dir: Path) -> int:
         StoreInUse: another process has it.
         StoreError: the directory cannot be used.
     """
-    try:
-        data_dir.mkdir(parents=True, exist_ok=True)
+    with usable_folder(data_dir, "store", StoreError):
         guard = os.open(data_dir / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-    except OSError as error:
-        raise StoreError(
-            f"the store directory {data_dir} cannot be used: {error.strerror}"
-        ) from None
     try:
         # The kernel drops the lock with the process, however it ends.
         fcntl.flock(guard, fcntl.LOCK_EX | fcntl.LOCK_NB)

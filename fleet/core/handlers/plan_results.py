@@ -217,14 +217,16 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
     if first:
         entry = replace(entry, state=PlanState.REJECTED, reason=event.reason)
         state = set_entry(state, entry)
-        state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None, event.reason)
+        for goal in entry.plan.goals:
+            state = mark_goals(state, (goal,), GoalState.WAITING, None, event.reason_for(goal))
         if job.partial:  # nobody has asked for this plan who now knows better
             state = _wait_for_robots(state, job, dict.fromkeys(event.for_robots, event.reason))
         return answer(state, job.request, False, event.reason, entry.plan.plan, event.violations)
     for wish in wishes:
         sentence = f"{wish.refusal}: {event.reason}"
         state = answer(state, wish.request, False, sentence, plan, event.violations)
-        state = mark_goals(state, wish.goals, GoalState.WAITING, None, event.reason)
+        for goal in wish.goals:
+            state = mark_goals(state, (goal,), GoalState.WAITING, None, event.reason_for(goal))
         if wish.request is None:
             waiting = [goal for goal in wish.goals if goal in event.for_robots]
             state = _wait_for_robots(state, job, dict.fromkeys(waiting, event.reason))

@@ -86,6 +86,8 @@ class Past:
         self._retirement = Retirement(session, archive, retention or Retention(), self._rejected)
         self._tasks: set[asyncio.Task[None]] = set()
         self._settling: set[asyncio.Task[None]] = set()
+        self._to_delete: dict[str, dict[str, events.ControlRequested]] = {}
+        """Requests, by plan and name, to delete plans that are about to be over."""
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
@@ -153,6 +155,9 @@ class Past:
         task = self._in_background(self._settle(record))
         self._settling.add(task)
         task.add_done_callback(self._settling.discard)
+        if isinstance(record, PlanRecord):
+            for event in self._to_delete.pop(record.spec.plan, {}).values():
+                self._in_background(self._delete(event.request, event))
 
     async def _settle(self, record: Ended) -> None:
         await self._outbox.written(d.key.build(d.address) for d in documents_of(record))
@@ -185,6 +190,9 @@ class Past:
             case events.PlanRequested() | events.ReplanRequested() | events.ControlRequested():
                 ask = event.request
                 if self._archive.answered(ask.request) or self._deal_with(ask, event, state):
+                    return None
+                if isinstance(event, events.ControlRequested) and _soon_deletable(state, ask):
+                    self._to_delete.setdefault(event.request.plan, {})[ask.request] = event
                     return None
             case _:
                 pass
@@ -308,6 +316,17 @@ class Past:
         """Wait, for a while, until the keys of what is over have their last values."""
         if self._settling:
             await asyncio.wait(tuple(self._settling), timeout=SETTLE_S)
+
+
+def _soon_deletable(state: State, ask: Request) -> bool:
+    """Whether somebody wants a plan deleted that is being given up, and is over as soon as robots
+    that are there have said how they left off. Until then, the request has no answer."""
+    if not (isinstance(ask, ControlRequest) and ask.control is Control.DELETE):
+        return False
+    entry = state.plans.get(ask.plan)
+    if entry is None or not (entry.cancelling or entry.ended):
+        return False
+    return all(record.robot in state.connected for record in entry.outstanding())
 
 
 def _records(effects: Iterable[Effect]) -> list[Ended]:

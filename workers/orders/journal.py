@@ -18,6 +18,7 @@ from typing import Self
 
 import msgspec
 
+from keyexpr_schema.data_folder import usable_folder
 from keyexpr_schema.key import Payload
 from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact
@@ -94,7 +95,8 @@ class Journal:
             JournalBusy: another process has it open.
             JournalUnreadable: it is not a journal, or one of another version.
         """
-        self.path.parent.mkdir(parents=True, exist_ok=True)
+        with usable_folder(self.path.parent, "worker's", JournalUnreadable):
+            self.path.touch()
         db = sqlite3.connect(self.path, timeout=0.5, isolation_level=None, check_same_thread=False)
         try:
             db.execute("PRAGMA locking_mode=EXCLUSIVE")

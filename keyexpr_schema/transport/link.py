@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, TypeVar
 import zenoh
 from zenoh import handlers
 
+from keyexpr_schema.transport.hand_over import HandOver
 from keyexpr_schema.transport.router_presence import RouterPresence
 from keyexpr_schema.transport.samples import Encoded, Sample, read_sample
 
@@ -90,6 +91,7 @@ class Link:
         self._session = session
         self._executor = executor
         self._loop = asyncio.get_running_loop()
+        self._call_soon = HandOver(self._loop)
         self.router = RouterPresence()
         self._events = session.info.declare_transport_events_listener(
             handlers.Callback(self._on_transport, indirect=False), history=True
@@ -101,14 +103,6 @@ class Link:
             self._call_soon(self.router.count, str(event.transport.zid), opened)
 
     # --- threads ---------------------------------------------------------------------------------
-
-    def _call_soon(self, function: Callable[..., object], *args: Any) -> bool:
-        """Call `function(*args)` soon on the loop, from any thread; whether the loop still runs."""
-        try:
-            self._loop.call_soon_threadsafe(function, *args)
-        except RuntimeError:
-            return False
-        return True
 
     async def call(self, function: Callable[..., _T], *args: Any) -> _T:
         """Run a blocking Zenoh call on the link's thread, after those made before it."""

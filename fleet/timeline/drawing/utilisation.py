@@ -59,7 +59,10 @@ class Utilisation:
         wall = [self._sink.clock.wall_at(time_s) or 0.0 for time_s in times]
         total = [0.0] * len(times)
         for robot, lane in self._lanes.lanes.items():
-            busy = [lane.busy_s(start_s, time_s) / (time_s - start_s) for time_s in times]
+            busy = [
+                busy_s / (time_s - start_s)
+                for busy_s, time_s in zip(lane.busy_s(start_s, times), times, strict=True)
+            ]
             total = [a + b for a, b in zip(total, busy, strict=True)]
             self._send(robot, self._palette.robot(robot), 1.5, times, wall, busy)
         count = len(self._lanes.lanes)

@@ -207,7 +207,7 @@ ROWS = (
     Target("idle planner, 120,000 reports stored", "≤ 1 % (router ≤ 1 %)", "idle", _idle_planner),
     Target("idle worker, of a core for each robot", "≤ 0.2 %", "idle", _idle_workers),
     Target("50 robots, MuJoCo, with their workers, of real time", "≥ 4 x", "physics", _physics),
-    Target("500 missions with restarts in between: time, memory, files", "flat after retention",
+    Target("2,500 missions with restarts in between: time, memory, files", "flat after retention",
            "lifetime", _lifetime),
     Target("recorder over 600 s of missions", "≤ 60 s CPU, bounded memory; files that roll",
            "recording", _recorder),

@@ -18,6 +18,7 @@ from fleet.core.model.world import WorldModel
 from fleet.core.planning_input import InterpretationInput, PlanningInput
 from fleet.jobshop.time_budget import Clock, TimeBudget
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
+from fleet.planners.contradictions import contradictions, reasons_of
 from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
 from fleet.planners.plan_repair import repair_plan
 from fleet.service.composition import Composition
@@ -57,6 +58,7 @@ def run_planning_job(
         planning_time_s=took_s,
         postponed=result.postponed,
         for_robots=for_robots,
+        goal_reasons=dict(result.goal_reasons),
     )
 
 
@@ -227,7 +229,16 @@ class _Run:
         if job.partial:
             return plan_reachable_goals(self.planner, self.feasibility, problem, self._reached())
         plan = self.planner.plan(problem)
-        return plan if isinstance(plan, NoPlan) else PartialPlan.of(plan, problem)
+        if isinstance(plan, CheckedPlan):
+            return PartialPlan.of(plan, problem)
+        if plan.postponed:
+            return plan
+        reasons = reasons_of(contradictions(self.feasibility, problem), problem.goals)
+        if not reasons:
+            return plan
+        first = next(goal.goal for goal in problem.goals if goal.goal in reasons)
+        sentence = f"goal {first} cannot be planned: {reasons[first]}"
+        return changed(plan, reason=sentence, goal_reasons=reasons)
 
     def _problem(self) -> PlanningProblem:
         return _problem(self.given, self.world, self.budget)

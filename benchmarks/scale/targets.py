@@ -177,7 +177,7 @@ def _lifetime(rows: Rows) -> str:
 
 
 def _recorder(rows: Rows) -> str:
-    first, last = rows[0], rows[-1]
+    first, last = next(row for row in rows if not row.get("without")), rows[-1]
     return (
         f"{last['cpu_s']:.0f} s CPU in {last['after_s']:.0f} s, "
         f"RSS {first['rss_mb']:.0f} to {last['rss_mb']:.0f} MB, {last['missions']} missions"

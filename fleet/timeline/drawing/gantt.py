@@ -187,6 +187,14 @@ class Lanes:
         for lane in self.lanes.values():
             lane.settle(before_s)
 
+    def begin_again(self) -> None:
+        """The fleet's clock went back: what was counted, and what still ran, is of another run."""
+        self.first_s = None
+        for lane in self.lanes.values():
+            lane.bars.clear()
+            lane.logged.clear()
+            lane.settled_s, lane.settled_busy_s = float("-inf"), 0.0
+
     def drop(self, plan: str, task: str, now_s: float) -> None:
         """The planner deleted its record of a task: what still ran there ended."""
         before = self._last.pop((plan, task), None)

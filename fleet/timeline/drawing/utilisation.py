@@ -19,6 +19,9 @@ LAG_S = 1.0
 SETTLED_S = 60.0
 """So long after a sample nothing changes what it says any more."""
 
+AGAIN_S = 1.0
+"""A fleet's clock that is further behind than this went back: a simulation began again."""
+
 _MAX_SAMPLES = 5_000
 
 
@@ -34,6 +37,9 @@ class Utilisation:
 
     def advance(self, now_s: float, final: bool = False) -> None:
         """Log the samples up to `now_s` [s, fleet time]; none while nobody works."""
+        if self._next_s is not None and now_s < self._next_s - STEP_S - AGAIN_S:
+            self._next_s = None
+            self._lanes.begin_again()
         start_s = self._lanes.first_s
         if start_s is None:
             return

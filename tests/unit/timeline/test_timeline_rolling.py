@@ -59,6 +59,26 @@ def test_what_is_kept_does_not_grow_with_the_missions(tmp_path: Path) -> None:
     assert [f"plan p1-{number} is succeeded" in said for number in range(60)] == [True] * 60
 
 
+def test_what_is_kept_does_not_grow_where_the_clock_went_back(tmp_path: Path) -> None:
+    """A simulation that began again is hours behind what was drawn before."""
+    recorder = Recorder(open_stream(tmp_path / "again.rrd", "test"))
+    kept = []
+    for number in (*range(1000, 1010), *range(60)):
+        for change in live(number):
+            recorder.record(change)
+        recorder.flush()
+        kept.append(len(recorder))
+    recorder.close()
+    assert len(set(kept[60:])) == 1, kept
+    busy = [
+        row.value[0]
+        for row in rows(tmp_path / "again.rrd", "/fleet/utilisation/all/fleet", "scalars")
+        if row.sim_s is not None and row.sim_s < 60 * END_S
+    ]
+    assert len(busy) > 58 * END_S
+    assert all(0.0 <= share <= 1.0 for share in busy)
+
+
 def test_the_calls_of_a_mission_do_not_go_with_its_events(tmp_path: Path) -> None:
     """Rows go to Rerun together: a call for each entity and flush, however many there are."""
     calls = []

@@ -189,11 +189,14 @@ COLUMNS: dict[str, Sequence[Column]] = {
     ),
     "recording": (
         ("after", lambda row: f"{row['after_s']:.0f} s"),
+        ("recorder", lambda row: "no" if row.get("without") else "yes"),
         _number("missions"),
+        ("missions a second", lambda row: f"{row['missions'] / row['after_s']:.1f}"),
         _number("cpu_s", ".1f", " s"),
         _number("rss_mb", ".0f", " MB"),
         _number("files"),
         _number("files_mb", ".1f", " MB"),
+        ("load average", lambda row: f"{row['load']:.1f}" if "load" in row else ""),
     ),
 }
 

@@ -6,6 +6,7 @@ SIGINT or SIGTERM.
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated, TypeVar
 
@@ -296,6 +297,8 @@ def record(
     ] = None,
 ) -> None:
     """Record everything that happens for Rerun."""
+    # Read when Rerun is imported; it would warn, of each file, that it has no table of contents.
+    os.environ.setdefault("RUST_LOG", "error")
     from cli.demo.child_processes import end_with_parent
     from cli.errors import BadArgument
     from fleet.timeline.process import run_recorder

@@ -1,4 +1,4 @@
-"""Plans of any size, and a world in which they are valid: each goal brings a cup to the next room."""
+"""Plans of any size, and a world for them: each goal brings a cup to the next room."""
 
 from __future__ import annotations
 

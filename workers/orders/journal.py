@@ -38,14 +38,10 @@ _KINDS: dict[str, type[Payload]] = {"fact": Fact, "report": Report}
 
 @dataclass(frozen=True)
 class Unsent:
-    """Something that must be read back from the store before it may be forgotten.
-
-    `earlier_run`: a run of the worker before this one wrote it.
-    """
+    """Something that must be read back from the store before it may be forgotten."""
 
     number: int
     payload: Fact | Report
-    earlier_run: bool
 
 
 @dataclass(frozen=True)
@@ -83,7 +79,6 @@ class Journal:
         self._retention = retention
         self._wall_s = wall_s
         self._db: sqlite3.Connection | None = None
-        self._earlier = 0
         self._reports: dict[int, AttemptName] = {}
         """The attempts of the reports that wait to be sent, by number."""
         self._last_report: dict[AttemptName, int] = {}
@@ -219,7 +214,7 @@ class Journal:
             payload = msgspec.json.decode(data, type=_KINDS[kind])
             assert isinstance(payload, (Fact, Report))
             if not self._overtaken(number, payload):
-                return Unsent(number, payload, earlier_run=number <= self._earlier)
+                return Unsent(number, payload)
             self.sent(number)
 
     def sent(self, number: int) -> None:
@@ -356,7 +351,6 @@ class Journal:
             "SELECT number, payload FROM outbox WHERE kind='report' ORDER BY number"
         ):
             self._note_waiting(number, msgspec.json.decode(payload, type=Report))
-        (self._earlier,) = db.execute("SELECT coalesce(max(number), 0) FROM outbox").fetchone()
 
 
 def _row_of(name: AttemptName) -> tuple[str, str, str, int]:

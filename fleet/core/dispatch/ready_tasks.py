@@ -103,7 +103,8 @@ def _touches_unwanted_work(state: State, action: Action) -> bool:
     That of a robot that is lost, or of a plan that is over, may be carried out as well.
     """
     variables = action.variables
-    for entry in state.plans.values():
+    for plan in state.index.dropping:
+        entry = state.plans[plan]
         for task in entry.unwanted:
             if task in entry.index.outstanding:
                 other = action_of(entry.records[task], state.skills)

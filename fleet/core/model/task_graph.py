@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from heapq import heapify, heappop, heappush
 
@@ -73,6 +73,17 @@ class TaskGraph:
         """Whether `first` ends before `second` starts in every order the graph allows."""
         return bool(self._ancestors[self._index[second]] >> self._index[first] & 1)
 
+    def before(self, task: str) -> int:
+        """The tasks that precede a task, as a bit set."""
+        return self._ancestors[self._index[task]]
+
+    def tasks(self, mask: int) -> Iterator[str]:
+        """Those of a bit set, in their order."""
+        while mask:
+            lowest = mask & -mask
+            yield self.order[lowest.bit_length() - 1]
+            mask ^= lowest
+
     def mask(self, tasks: Iterable[str]) -> int:
         """These tasks as a bit set; `last_before` takes it."""
         bits = 0
@@ -92,10 +103,6 @@ class TaskGraph:
             found.append(self.order[index])
             mask &= ~(self._ancestors[index] | 1 << index)
         return tuple(found)
-
-    def before(self, task: str) -> int:
-        """The tasks that end before this one starts, as a bit set."""
-        return self._ancestors[self._index[task]]
 
     def first_not_after(self, task: str, mask: int) -> str | None:
         """Of the tasks in `mask`, the first in `order` that is neither this one nor after it."""

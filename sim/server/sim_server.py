@@ -21,6 +21,9 @@ from sim.server.publisher import WorldPublisher
 CHUNK_S = 0.004
 """Wall time for which the world goes on before calls are looked at."""
 
+PACE_S, IDLE_S = 0.005, 0.05
+"""How often a world looks around that has a pace, and one that waits for calls."""
+
 LAG_S = 0.5
 """A world that is further behind the wall clock stops trying to catch up."""
 
@@ -104,34 +107,37 @@ class SimServer:
                 await self._advance_until(loop, max(due_s, self._backend.time_s))
             self._poll_motions(loop.time())
             self._called.clear()
-            held = self._held(loop.time())
-            pause_s = 0.005 if speed > 0.0 or held else 0.05
             paused_s = loop.time()
+            held_s = self._held_s(paused_s)
+            moves = self._anybody_moves()
+            if speed == 0.0 and moves and not held_s:
+                continue
+            pause_s = PACE_S if speed > 0.0 else max(PACE_S, min(held_s or IDLE_S, IDLE_S))
             try:
                 async with asyncio.timeout(pause_s):
                     await self._called.wait()
             except TimeoutError:
                 pass
-            if held and self._anybody_moves():
+            if held_s and moves:
                 self._waits_s -= loop.time() - paused_s
 
     def _speed_now(self, wall_s: float) -> float | None:
         if self._speed is not None:
             return self._speed
-        return None if self._anybody_moves() and not self._held(wall_s) else 0.0
+        return None if self._anybody_moves() and not self._held_s(wall_s) else 0.0
 
     def _anybody_moves(self) -> bool:
         return any(calls.active for calls in self._calls.values())
 
-    def _held(self, wall_s: float) -> bool:
-        """The world waits for the next call of a robot whose motion just ended."""
-        return (
-            self._waits_s > 0.0
-            and self._speed is None
-            and any(
-                not calls.active and wall_s < calls.held_until_s for calls in self._calls.values()
-            )
-        )
+    def _held_s(self, wall_s: float) -> float:
+        """How long the world waits at most for the next calls of robots whose motions just ended.
+
+        A call wakes it up earlier.
+        """
+        if self._speed is not None or self._waits_s <= 0.0:
+            return 0.0
+        until_s = (calls.held_until_s for calls in self._calls.values() if not calls.active)
+        return max(0.0, min(max(until_s, default=0.0) - wall_s, self._waits_s))
 
     async def _advance_until(self, loop: asyncio.AbstractEventLoop, until_s: float | None) -> None:
         """Let the world go on for a few milliseconds, at most to `until_s`."""

@@ -99,7 +99,7 @@ class CoreRun:
             if isinstance(effect, MakePlan):
                 self.given.append(effect.given)
             elif isinstance(effect, Publish):
-                self._heard(effect)
+                self.heard(effect)
         return effects
 
     def handle(self, event: Event) -> tuple[Effect, ...]:
@@ -111,7 +111,8 @@ class CoreRun:
         """What an event would do, without a trace."""
         step(self.state, event)
 
-    def _heard(self, effect: Publish) -> None:
+    def heard(self, effect: Publish) -> None:
+        """Something is published: robots, and who looks on, act on it."""
         if effect.key is ORDER:
             order = effect.payload
             assert isinstance(order, Order)

@@ -11,18 +11,18 @@ from __future__ import annotations
 import os
 import sqlite3
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from benchmarks.scale.core_run import CoreRun
 from benchmarks.scale.errands import SOURCE, Errands
 from benchmarks.scale.processes import folder_mb, rss_mb
 from fleet.core import events
 from fleet.core.effects import Archive as ToArchive
-from fleet.core.effects import Effect, Publish, Retract
+from fleet.core.effects import Effect, MakePlan, Publish, Retract, documents_of, effects_of
 from fleet.core.events import Event
 from fleet.history.archive import FILE, Archive
 from fleet.history.retention import Retention, Retirement
@@ -34,6 +34,7 @@ from fleet.stores import SqliteStore, StoreMemory
 from keyexpr_schema.key import KeyTree
 from keyexpr_schema.keyspace import FACT, GOAL_SPEC, OBJECT, PLAN_REQUEST, REPORT
 from keyexpr_schema.payloads.goals import GoalAddress
+from keyexpr_schema.payloads.history import Ended
 from keyexpr_schema.payloads.plans import PlanState
 from keyexpr_schema.payloads.requests import RequestAddress
 from keyexpr_schema.payloads.tasks import ReportAddress
@@ -41,6 +42,7 @@ from keyexpr_schema.payloads.world import FactAddress, ObjectAddress
 from keyexpr_schema.transport.store.storage import Write
 
 REALM = "realm"
+STORE, EVENTS, ARCHIVE = "store/state.sqlite", "planner/events.db", f"planner/{FILE}"
 ROBOTS, CUPS = 4, 12
 MISSION_S = 600.0
 """Simulated time from one mission to the next."""
@@ -65,7 +67,10 @@ class Size:
 
 
 class LongLife(CoreRun):
-    """A fleet whose planner and store keep in `folder` what they keep; use in a `with` block."""
+    """A fleet whose planner and store keep in `folder` what they keep; use in a `with` block.
+
+    It goes on there with the mission after the last, however it ended.
+    """
 
     def __init__(
         self, folder: Path, retention: Retention | None = None, memory: StoreMemory | None = None
@@ -104,6 +109,7 @@ class LongLife(CoreRun):
             self._retention,
             lambda before_wall_s, keep: (),
         )
+        self._core.recover(load_all_skills(), lambda effects: self.archive.add(_records(effects)))
 
     def start_again(self) -> float:
         """Planner and store end and start again; the seconds of CPU of that start."""
@@ -111,11 +117,31 @@ class LongLife(CoreRun):
         self._open = ExitStack()
         began_s = time.process_time()
         self._begin()
-        self._core.recover(load_all_skills(), lambda effects: None)
         took_s = time.process_time() - began_s
-        self.state = self._core.state
-        self.begin_run(self.state.epoch + 1)
+        self.begin_run(self._core.state.epoch + 1)
         return took_s
+
+    def begin_run(self, epoch: int) -> None:
+        """The planner starts; what was under way when an earlier run ended comes to its end."""
+        before = self.state = self._core.state
+        if before.epoch:
+            self.time_s = before.time_s
+            newest = _one(self._folder / STORE, "SELECT max(stamp) FROM latest")
+            self._stamp = int.from_bytes(newest, "big") >> 128
+        super().begin_run(before.epoch + 1)
+        for record in self.archive.unsettled():
+            self._write(wanted_by(tuple(documents_of(record))))
+            self.archive.settle(record)
+        for effect in effects_of(self.state) if before.epoch else ():
+            if isinstance(effect, MakePlan):
+                job = effect.given.job
+                self.apply(_errand(int(job.plan.removeprefix("m"))).made(job.job, self.at()))
+            elif isinstance(effect, Publish):
+                self.heard(effect)
+        self.work()
+        self.plans.clear()
+        lived = "SELECT count(*) FROM ended WHERE kind = 'plan'"
+        self.missions = _one(self._folder / ARCHIVE, lived)
 
     # --- what happens ----------------------------------------------------------------------------
 
@@ -124,7 +150,7 @@ class LongLife(CoreRun):
         self._write(said_by(event))
         effects = self._core.apply(event)
         self.state = self._core.state
-        records = [effect.record for effect in effects if isinstance(effect, ToArchive)]
+        records = _records(effects)
         if records:
             self.archive.add(records)
         self._write(wanted_by(effects))
@@ -149,7 +175,7 @@ class LongLife(CoreRun):
         """A cup is brought to the next room; whatever is old enough goes."""
         number, self.missions = self.missions, self.missions + 1
         self.wait(MISSION_S)
-        wanted = Errands(f"m{number}", [number], ROBOTS, cups=CUPS)
+        wanted = _errand(number)
         self.put_cups([number % CUPS])  # somebody has put it back
         self.put_goals([number], cups=CUPS)
         self.apply(self.ask(wanted))
@@ -170,17 +196,17 @@ class LongLife(CoreRun):
 
     def size(self) -> Size:
         """What there is now."""
-        store, planner = self._folder / "store", self._folder / "planner"
-        history_mb = sum(file.stat().st_size for file in planner.glob(f"{FILE}*")) / 2**20
-        latest = "SELECT count(*) FROM latest WHERE"
+        store, events_file = self._folder / STORE, self._folder / EVENTS
+        history = self._folder / ARCHIVE
+        history_mb = sum(f.stat().st_size for f in history.parent.glob(f"{FILE}*")) / 2**20
         return Size(
             state_bytes=len(encode_snapshot(Snapshot(state=self.state))),
-            keys=_count(store / "state.sqlite", f"{latest} NOT deleted"),
-            deletions=_count(store / "state.sqlite", f"{latest} deleted"),
-            store_journal=_count(store / "state.sqlite", "SELECT count(*) FROM journal"),
-            planner_journal=_count(planner / "events.db", "SELECT count(*) FROM events"),
-            store_mb=folder_mb(store),
-            planner_mb=folder_mb(planner) - history_mb,
+            keys=_one(store, "SELECT count(*) FROM latest WHERE NOT deleted"),
+            deletions=_one(store, "SELECT count(*) FROM latest WHERE deleted"),
+            store_journal=_one(store, "SELECT count(*) FROM journal"),
+            planner_journal=_one(events_file, "SELECT count(*) FROM events"),
+            store_mb=folder_mb(store.parent),
+            planner_mb=folder_mb(history.parent) - history_mb,
             history_mb=history_mb,
             rss_mb=rss_mb(os.getpid()),
         )
@@ -213,9 +239,17 @@ def wanted_by(effects: Sequence[Effect]) -> Iterator[tuple[str, bytes | None]]:
             yield effect.key.build(effect.address), None
 
 
-def _count(database: Path, query: str) -> int:
+def _errand(number: int) -> Errands:
+    return Errands(f"m{number}", [number], ROBOTS, cups=CUPS)
+
+
+def _records(effects: Iterable[Effect]) -> list[Ended]:
+    return [effect.record for effect in effects if isinstance(effect, ToArchive)]
+
+
+def _one(database: Path, query: str) -> Any:
     db = sqlite3.connect(database)
     try:
-        return int(db.execute(query).fetchone()[0])
+        return db.execute(query).fetchone()[0]
     finally:
         db.close()

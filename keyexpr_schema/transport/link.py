@@ -27,8 +27,9 @@ from keyexpr_schema.transport.samples import Encoded, Sample, read_sample
 _T = TypeVar("_T")
 _log = logging.getLogger(__name__)
 
-COLLECTED = 100_000
-"""So many values of one subscription wait to be collected; of more the oldest are dropped."""
+COLLECTED = 4096
+"""So many values of one subscription wait to be collected; of more the oldest are dropped. Zenoh
+makes room for all of them, a quarter of a kB each."""
 
 _TIMED_OUT = b"Timeout"
 """What Zenoh puts into the error reply of a query that ran into its timeout."""
@@ -251,12 +252,12 @@ class Link:
     @asynccontextmanager
     async def collected(
         self, receivers: Sequence[tuple[str, Callable[[Sample], None]]]
-    ) -> AsyncIterator[Callable[[], None]]:
+    ) -> AsyncIterator[Callable[[], bool]]:
         """Subscribe to key expressions; values wait until the function that this yields is called.
 
-        It passes on all that wait, by their timestamps. Zenoh's threads wait for no Python, and the
-        loop is not woken for each value: for those who are in no hurry, and ask for what they
-        missed.
+        It passes on all that wait, by their timestamps, and says whether some may be lost. Zenoh's
+        threads wait for no Python, and the loop is not woken for each value: for those who are in
+        no hurry, and ask for what they missed.
         """
         async with contextlib.AsyncExitStack() as stack:
             subscribers = []
@@ -268,13 +269,17 @@ class Link:
                     (await stack.enter_async_context(self._declared(declare)), receive)
                 )
 
-            def collect() -> None:
-                waiting = []
+            def collect() -> bool:
+                lost = False
+                waiting: list[tuple[Sample, Callable[[Sample], None]]] = []
                 for subscriber, receive in subscribers:
+                    had = len(waiting)
                     while (sample := subscriber.try_recv()) is not None:
                         waiting.append((read_sample(sample), receive))
+                    lost |= len(waiting) - had >= COLLECTED
                 for value, receive in sorted(waiting, key=lambda one: one[0].stamp):
                     receive(value)
+                return lost
 
             yield collect
 

@@ -115,9 +115,10 @@ class Watch(ChangeStream[Change[Any, Any]]):
             stack.enter_context(self._link.router.listening(self.relist))
             yield await stack.enter_async_context(self._in_background(self._keep_up_to_date()))
 
-    async def _collect(self, collect: Callable[[], None], every_s: float) -> None:
+    async def _collect(self, collect: Callable[[], bool], every_s: float) -> None:
         while True:
-            collect()
+            if collect():
+                self.relist()
             await asyncio.sleep(every_s)
 
     async def _keep_up_to_date(self) -> None:

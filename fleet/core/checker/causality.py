@@ -35,6 +35,7 @@ class Causality:
         for task in graph.order:
             for literal in actions[task].after:
                 self._writers[literal.variable].append((task, literal.value))
+        self._written: dict[FactKey, tuple[int, dict[Value, int]]] = {}
         self._baskets = BasketLoads(world, graph, self._writers)
         self._check()
 
@@ -76,18 +77,32 @@ class Causality:
 
     def _check_condition(self, task: str, literal: Literal) -> None:
         graph, variable = self._graph, literal.variable
-        rows = [row for row in self._writers.get(variable, ()) if row[0] != task]
-        restorers = [w for w, value in rows if value == literal.value and graph.precedes(w, task)]
-        for writer, value in rows:
-            if value == literal.value or graph.precedes(task, writer):
-                continue
-            if not any(graph.precedes(writer, restorer) for restorer in restorers):
-                verb = "makes" if graph.precedes(writer, task) else "may make"
-                undone = f"{writer} {verb} it {render_value(value)} before"
-                self._unmet("condition-undone", task, literal, undone)
-                return
-        if not restorers:
+        all_writers, by_value = self._masks(variable)
+        same = by_value.get(literal.value, 0)
+        restorers = graph.last_before(task, same)
+        others = all_writers & ~same
+        for restorer in restorers:
+            others &= ~graph.before(restorer)
+        writer = graph.first_not_after(task, others)
+        if writer is not None:
+            value = next(v for v, mask in by_value.items() if graph.mask((writer,)) & mask)
+            verb = "makes" if graph.precedes(writer, task) else "may make"
+            undone = f"{writer} {verb} it {render_value(value)} before"
+            self._unmet("condition-undone", task, literal, undone)
+        elif not restorers:
             self._check_at_start(task, literal)
+
+    def _masks(self, variable: FactKey) -> tuple[int, dict[Value, int]]:
+        """The tasks that write a variable, as a bit set, and those that write each value."""
+        if variable not in self._written:
+            by_value: dict[Value, int] = {}
+            for task, value in dict(self._writers.get(variable, ())).items():
+                by_value[value] = by_value.get(value, 0) | self._graph.mask((task,))
+            every = 0
+            for mask in by_value.values():
+                every |= mask
+            self._written[variable] = every, by_value
+        return self._written[variable]
 
     def _check_at_start(self, task: str, literal: Literal) -> None:
         variable = literal.variable
@@ -131,11 +146,8 @@ class Causality:
             for relation, (value, _) in requirement.facts.items():
                 final[FactKey(relation, actor)] = value
         for variable, rows in self._writers.items():
-            last = {
-                value
-                for writer, value in rows
-                if not any(self._graph.precedes(writer, other) for other, _ in rows)
-            }
+            written = dict(rows)
+            last = {written[task] for task in self._graph.last_of(self._masks(variable)[0])}
             final[variable] = last.pop() if len(last) == 1 else None
         pinned = {actor_arg(actor): robot for actor, robot in self._plan.pins.items()}
         for variable in self._writers:

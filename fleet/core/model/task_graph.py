@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from heapq import heapify, heappop, heappush
 
 
@@ -92,13 +93,31 @@ class TaskGraph:
 
     def last_before(self, task: str, mask: int) -> tuple[str, ...]:
         """Of the tasks in `mask`, those before `task` with no other of them in between."""
-        rest = self._ancestors[self._index[task]] & mask
+        return self.last_of(self._ancestors[self._index[task]] & mask)
+
+    def last_of(self, mask: int) -> tuple[str, ...]:
+        """Of the tasks in `mask`, those with no other of them behind them."""
         found = []
-        while rest:
-            index = rest.bit_length() - 1
+        while mask:
+            index = mask.bit_length() - 1
             found.append(self.order[index])
-            rest &= ~(self._ancestors[index] | 1 << index)
+            mask &= ~(self._ancestors[index] | 1 << index)
         return tuple(found)
+
+    def first_not_after(self, task: str, mask: int) -> str | None:
+        """Of the tasks in `mask`, the first in `order` that is neither this one nor after it."""
+        number = self._index[task]
+        mask &= ~(self._descendants[number] | 1 << number)
+        return self.order[(mask & -mask).bit_length() - 1] if mask else None
+
+    @cached_property
+    def _descendants(self) -> list[int]:
+        found = [0] * len(self.order)
+        for number in reversed(range(len(self.order))):
+            for later in self.successors[self.order[number]]:
+                index = self._index[later]
+                found[number] |= found[index] | 1 << index
+        return found
 
     def reduced(self) -> dict[str, tuple[str, ...]]:
         """The fewest edges with the same meaning: task to the tasks it waits for directly."""

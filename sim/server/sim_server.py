@@ -17,6 +17,7 @@ from keyexpr_schema.transport.session import Session
 from sim.backend import Backend
 from sim.server.motion_calls import MotionCalls
 from sim.server.publisher import WorldPublisher
+from sim.server.wait_budget import WaitBudget
 
 CHUNK_S = 0.004
 """Wall time for which the world goes on before calls are looked at."""
@@ -28,9 +29,6 @@ LAG_S = 0.5
 """A world that is further behind the wall clock stops trying to catch up."""
 
 GRACE_S = 0.25
-WAIT_SHARE, WAIT_S = 0.1, 5.0
-"""A world without a pace waits for robots that think for no longer than this share of the time that
-it has gone on for, beyond so much at first [s]: of many robots there is always one that thinks."""
 WATCHDOG_S = 2.0
 
 
@@ -40,7 +38,7 @@ class SimServer:
     `speed` is simulated seconds a second of wall time. `None` is as fast as it goes: then time
     advances only while some robot moves, and after a motion has ended it waits up to `grace_s` of
     wall time for that robot's next call, so that the thinking of workers and planners takes no
-    simulated time; with many robots, as far as that can be afforded (`WAIT_SHARE`).
+    simulated time; with many robots, as far as that can be afforded (`WaitBudget`).
 
     A motion that nobody has asked about for `watchdog_s` (beyond the wait of the last call) is
     stopped, as a driver would stop a robot whose worker is gone. While our own link to the router
@@ -60,8 +58,7 @@ class SimServer:
         self._calls = {robot: MotionCalls(backend, robot) for robot in backend.robots}
         self._publisher = WorldPublisher(session, backend, speed)
         self._called = asyncio.Event()
-        self._waits_s = WAIT_S
-        """How long the world may still wait for robots that think."""
+        self._budget = WaitBudget()
         self._ready = asyncio.Event()
 
     async def ready(self) -> None:
@@ -109,8 +106,9 @@ class SimServer:
             self._called.clear()
             paused_s = loop.time()
             held_s = self._held_s(paused_s)
-            moves = self._anybody_moves()
-            if speed == 0.0 and moves and not held_s:
+            moving = sum(calls.active for calls in self._calls.values())
+            thinking = sum(calls.holds(paused_s) for calls in self._calls.values())
+            if speed == 0.0 and moving and not held_s:
                 continue
             pause_s = PACE_S if speed > 0.0 else max(PACE_S, min(held_s or IDLE_S, IDLE_S))
             try:
@@ -118,8 +116,8 @@ class SimServer:
                     await self._called.wait()
             except TimeoutError:
                 pass
-            if held_s and moves:
-                self._waits_s -= loop.time() - paused_s
+            if held_s:
+                self._budget.spend(loop.time() - paused_s, moving, thinking)
 
     def _speed_now(self, wall_s: float) -> float | None:
         if self._speed is not None:
@@ -134,10 +132,10 @@ class SimServer:
 
         A call wakes it up earlier.
         """
-        if self._speed is not None or self._waits_s <= 0.0:
+        if self._speed is not None or self._budget.left_s <= 0.0:
             return 0.0
-        until_s = (calls.held_until_s for calls in self._calls.values() if not calls.active)
-        return max(0.0, min(max(until_s, default=0.0) - wall_s, self._waits_s))
+        until_s = (c.held_until_s for c in self._calls.values() if c.holds(wall_s))
+        return max(0.0, min(max(until_s, default=0.0) - wall_s, self._budget.left_s))
 
     async def _advance_until(self, loop: asyncio.AbstractEventLoop, until_s: float | None) -> None:
         """Let the world go on for a few milliseconds, at most to `until_s`."""
@@ -147,7 +145,7 @@ class SimServer:
             self._backend.advance()
             if self._poll_motions(loop.time()) or loop.time() >= end_wall_s:
                 break
-        self._waits_s = min(WAIT_S, self._waits_s + WAIT_SHARE * (loop.time() - began_wall_s))
+        self._budget.earn(loop.time() - began_wall_s)
         await asyncio.sleep(0)
 
     def _poll_motions(self, wall_s: float) -> bool:

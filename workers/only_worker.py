@@ -19,6 +19,9 @@ from workers.errors import RobotTaken
 
 GONE_S = 4.0
 """How long the token of a worker that is dead can stay [s]: its lease of 2 s, and as much again."""
+SETTLED_S = 60.0
+"""How long one that stays waits for those that give way to end [s]: on a busy host that takes
+a while, and if it gave up, nobody would be left."""
 
 
 class OnlyWorker:
@@ -37,7 +40,7 @@ class OnlyWorker:
         """
         async with self._watched() as self._watch:
             await self._watch.synced()
-            await self._until_alone(self._watch)
+            await self._until_alone(self._watch, GONE_S)
             async with self._session.token(ROBOT_ALIVE, self._own):
                 yield self
 
@@ -50,7 +53,7 @@ class OnlyWorker:
         async with self._watched() as seen:  # looks anew: of two, the later one sees the other
             await seen.synced()
             self._give_way(seen)
-            await self._until_alone(seen)
+            await self._until_alone(seen, SETTLED_S)
 
     async def give_way(self) -> None:
         """Watch for ever.
@@ -68,10 +71,10 @@ class OnlyWorker:
     def _others(self, watch: TokenWatch[AliveAddress]) -> list[str]:
         return sorted(seen.incarnation for seen in watch.alive - {self._own})
 
-    async def _until_alone(self, watch: TokenWatch[AliveAddress]) -> None:
+    async def _until_alone(self, watch: TokenWatch[AliveAddress], limit_s: float) -> None:
         """Until the others are gone: one that was killed just now soon is."""
         with suppress(TimeoutError):
-            async with asyncio.timeout(GONE_S):
+            async with asyncio.timeout(limit_s):
                 while self._others(watch):
                     await anext(watch)
         if others := self._others(watch):

@@ -14,7 +14,7 @@ from keyexpr_schema.payloads.robots import RobotActivity, RobotSpec
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState
 from keyexpr_schema.transport.session import Session
 from workers.embodiment import Embodiment
-from workers.errors import BadArguments, RobotUnreachable, UnknownSkill
+from workers.errors import BadArguments, RobotTaken, RobotUnreachable, UnknownSkill
 from workers.only_worker import OnlyWorker
 from workers.orders.fencing import Phase
 from workers.orders.journal import Journal
@@ -85,10 +85,13 @@ class Worker:
         async with only.connected():
             await only.settled()
             sending = asyncio.create_task(self._outbox.run())
+            taken: BaseExceptionGroup[RobotTaken] | None = None
             try:
                 async with asyncio.TaskGroup() as group:
                     group.create_task(only.give_way())
                     await self._serve(sending, group)
+            except* RobotTaken as others:
+                taken = others
             finally:
                 # While the token is still there: who sees it go must find the last report.
                 try:
@@ -96,6 +99,8 @@ class Worker:
                 finally:
                     sending.cancel()
                     await asyncio.gather(sending, return_exceptions=True)
+            if taken is not None:
+                raise RobotTaken(str(taken.exceptions[0]))
 
     async def _serve(self, sending: asyncio.Task[None], group: asyncio.TaskGroup) -> None:
         await first_senses(self._embodiment)

@@ -130,7 +130,14 @@ def conditions_of(state: State, goals: Iterable[str]) -> tuple[Condition, ...]:
 def without_goal(state: State, plan: Plan, goal: str) -> Plan:
     """The plan, answering for its other goals only; its tasks stay."""
     rest = tuple(other for other in plan.goals if other != goal)
-    return replace(plan, goals=rest, conditions=conditions_of(state, rest))
+    specs = [state.goals[other] for other in rest if other in state.goals]
+    return replace(
+        plan,
+        goals=rest,
+        conditions=conditions_of(state, rest),
+        always=tuple(dict.fromkeys(row for spec in specs for row in spec.always)),
+        never=tuple(dict.fromkeys(row for spec in specs for row in spec.never)),
+    )
 
 
 # --- plans ---------------------------------------------------------------------------------------

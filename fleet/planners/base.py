@@ -10,7 +10,7 @@ from math import inf
 from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.core.model.world import WorldModel
 from fleet.jobshop.time_budget import TimeBudget
-from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 BIG_DAG, PER_GOAL, MONOLITHIC = "big-dag", "per-goal", "monolithic"
@@ -35,6 +35,16 @@ class PlanningProblem:
     searched: frozenset[str] = frozenset()
     """Places in which this plan has looked around already."""
     budget: TimeBudget = field(default_factory=lambda: TimeBudget(inf))
+
+    @property
+    def always(self) -> tuple[Condition, ...]:
+        """What must hold all the time."""
+        return tuple(dict.fromkeys(row for goal in self.goals for row in goal.always))
+
+    @property
+    def never(self) -> tuple[Condition, ...]:
+        """What must not hold at any time."""
+        return tuple(dict.fromkeys(row for goal in self.goals for row in goal.never))
 
     @property
     def not_in_time(self) -> str:

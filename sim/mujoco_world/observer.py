@@ -11,6 +11,7 @@ from keyexpr_schema.payloads.motions import Detection
 from keyexpr_schema.payloads.simulation import Truth
 from keyexpr_schema.payloads.world import Object
 from sim.files.world_schema import FLOOR, FLOOR_M, WorldFile
+from sim.mujoco_world.baskets import Baskets
 from sim.mujoco_world.carriers import Carriers
 from sim.mujoco_world.mechanisms import Mechanisms
 from sim.mujoco_world.robot_body import RobotBody
@@ -25,9 +26,6 @@ VISIBLE = 3
 
 NEAR_ENOUGH_M = 0.5
 """The base of an object can be that much farther off than its middle."""
-
-GIVES_M = 0.003
-"""A thing may be that far outside of a basket's volume and lie in it: contacts give way by less."""
 
 NOISE_M = 0.003
 """Standard deviation of a seen point, each axis in the plane: what an RGB-D camera gives at 2 m."""
@@ -70,11 +68,7 @@ class Observer:
         self._bodies = np.array(list(self._objects.values()), dtype=int)
         first = model.body_dofadr[self._bodies].reshape(-1, 1)
         self._dofs = first + np.arange(6)  # (n, 6): of all objects, velocities and turning rates
-        self._with_basket = [name for name, robot in robots.items() if robot.basket >= 0]
-        self._trays = np.array([robots[name].basket for name in self._with_basket], dtype=int)
-        self._trays_m = model.site_size[self._trays][:, None] + GIVES_M  # (robots, 1, 3)
-        self._loads: dict[str, tuple[str, ...]] = {}
-        self._loads_at_s = -math.inf
+        self._baskets = Baskets(model, data, robots.values(), self._objects)
         self._trees = model.body_treeid[self._bodies]
         self._asleep = data.tree_asleep[self._trees] >= 0
         self._at_rest: dict[str, set[tuple[str, str]]] = {}
@@ -111,23 +105,9 @@ class Observer:
         return math.atan2(float(axis[1]), float(axis[0]))
 
     def basket(self, robot: RobotBody) -> tuple[str, ...]:
-        """What lies in a robot's basket, as its sensor says, in the order of the world file."""
-        return self._baskets().get(robot.name, ())
-
-    def _baskets(self) -> dict[str, tuple[str, ...]]:
-        """What lies in each robot's basket, where anything does; worked out once for a moment."""
-        data = self._data
-        if self._loads_at_s != data.time:
-            self._loads_at_s, self._loads = data.time, {}
-            away = data.xpos[self._bodies] - data.site_xpos[self._trays][:, None]
-            local = abs(away @ data.site_xmat[self._trays].reshape(-1, 3, 3))  # (robots, n, 3)
-            inside = (local <= self._trays_m).all(axis=2)
-            for number in inside.any(axis=1).nonzero()[0].tolist():
-                lying = tuple(itertools.compress(self._objects, inside[number].tolist()))
-                self._loads[self._with_basket[number]] = tuple(
-                    name for name in lying if self._carriers.object_below(name, lying) is None
-                )
-        return self._loads
+        """What lies in a robot's basket and not on anything in it, in the world file's order."""
+        lying = self._baskets.contents().get(robot.name, ())
+        return tuple(name for name in lying if self._carriers.object_below(name, lying) is None)
 
     def note_sleepers(self) -> None:
         """Take down what objects touch that fell asleep in this physics step."""
@@ -243,7 +223,11 @@ class Observer:
     def _supports(self) -> tuple[dict[str, str | None], dict[str, set[tuple[str, str]]]]:
         """What carries each object directly, and what it touches."""
         touching = self.touching()
-        baskets = {name: robot for robot, load in self._baskets().items() for name in load}
+        baskets = {
+            name: robot
+            for robot in self._baskets.contents()
+            for name in self.basket(self._robots[robot])
+        }
         return {
             name: self._support(name, baskets.get(name), touching) for name in self._objects
         }, touching

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from dataclasses import replace as changed
 from typing import Any
@@ -23,6 +23,7 @@ from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
 from fleet.planners.plan_repair import repair_plan
 from fleet.service.composition import Composition
 from fleet.service.planning.job_context import context_of, robots_under_way
+from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan
 
 PLANNERS_SHARE = 0.5
@@ -252,5 +253,14 @@ class _Run:
 
     def _with_goal_conditions(self, plan: Plan) -> Plan:
         """A proposed plan answers for its goals: their conditions must hold at its end, too."""
-        wanted = [condition for goal in self.given.goals for condition in goal.conditions]
-        return replace(plan, conditions=tuple(dict.fromkeys([*plan.conditions, *wanted])))
+        goals = self.given.goals
+        return replace(
+            plan,
+            conditions=_both(plan.conditions, (c for g in goals for c in g.conditions)),
+            always=_both(plan.always, (c for g in goals for c in g.always)),
+            never=_both(plan.never, (c for g in goals for c in g.never)),
+        )
+
+
+def _both(mine: Iterable[Condition], wanted: Iterable[Condition]) -> tuple[Condition, ...]:
+    return tuple(dict.fromkeys([*mine, *wanted]))

@@ -15,8 +15,10 @@ from sim.files.mission_file import load_robot
 from sim.files.world_file import load_world
 from sim.mujoco_world.assemble import compile_world
 from sim.mujoco_world.description import load_description
+from sim.mujoco_world.mechanisms import Mechanisms
 from sim.mujoco_world.observer import POINTS, VISIBLE, Observer
 from sim.mujoco_world.robot_body import RobotBody
+from sim.states import ThingStates
 
 HOME = load_world("home")
 HSR, LOCOBOT = load_robot("hsr"), load_robot("locobot")
@@ -43,7 +45,9 @@ def observed(
         name: RobotBody(model, data, msgspec.structs.replace(spec, robot=name), found[name], start)
         for name, (spec, start) in robots.items()
     }
-    return Observer(model, counted := Counted(data), HOME, bodies, 0), bodies, counted
+    counted = Counted(data)
+    mechanisms = Mechanisms(model, data, HOME, bodies, ThingStates(HOME))
+    return Observer(model, counted, HOME, bodies, {}, mechanisms, 0), bodies, counted
 
 
 @pytest.mark.parametrize(

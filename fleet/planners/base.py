@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
 
@@ -55,12 +56,14 @@ class PlanningProblem:
 class NoPlan:
     """Why there is no plan: a sentence, and violations where a plan was found wanting.
 
-    `postponed`: there may be one, and only the time did not suffice to find it.
+    `postponed`: there may be one, and only the time did not suffice to find it. `goal_reasons` are
+    those of goals that have one of their own.
     """
 
     reason: str
     violations: tuple[Violation, ...] = field(default=())
     postponed: bool = False
+    goal_reasons: Mapping[str, str] = field(default_factory=dict)
 
 
 class Planner(ABC):

@@ -169,18 +169,21 @@ class Causality:
 
     def _check_condition(self, task: str, literal: Literal) -> None:
         graph, variable = self._graph, literal.variable
-        rows = [row for row in self._writers.plain.get(variable, ()) if row[0] != task]
-        good = {value for _, value in rows if self._holds(literal, value)}
-        restorers = [w for w, value in rows if value in good and graph.precedes(w, task)]
-        for writer, value in rows:
-            if value in good or graph.precedes(task, writer):
-                continue
-            if not any(graph.precedes(writer, restorer) for restorer in restorers):
-                verb = "makes" if graph.precedes(writer, task) else "may make"
-                undone = f"{writer} {verb} it {render_value(value)} before"
-                self._unmet("condition-undone", task, literal, undone)
-                return
-        if not restorers:
+        every = same = 0
+        for value, mask in self._writers.by_value(variable).items():
+            every |= mask
+            if self._holds(literal, value):
+                same |= mask
+        restorers = graph.last_before(task, same)
+        others = every & ~same
+        for restorer in restorers:
+            others &= ~graph.before(restorer)
+        writer = graph.first_not_after(task, others)
+        if writer is not None:
+            verb = "makes" if graph.precedes(writer, task) else "may make"
+            made = render_value(self._writers.value(writer, variable))
+            self._unmet("condition-undone", task, literal, f"{writer} {verb} it {made} before")
+        elif not restorers:
             self._check_at_start(task, literal)
 
     def _check_at_start(self, task: str, literal: Literal) -> None:

@@ -85,11 +85,9 @@ class PlanGoals:
             for relation, (value, _) in requirement.facts.items():
                 final[FactKey(relation, actor)] = value
         for variable, rows in self._writers.plain.items():
-            last = {
-                value
-                for writer, value in rows
-                if not any(self._graph.precedes(writer, other) for other, _ in rows)
-            }
+            values = dict(rows)
+            lasts = self._graph.last_of(self._writers.plain_mask(variable))
+            last = {values[task] for task in lasts}
             final[variable] = last.pop() if len(last) == 1 else None
         pinned = {actor_arg(actor): robot for actor, robot in self._plan.pins.items()}
         for variable in self._writers.plain:

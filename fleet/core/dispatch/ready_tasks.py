@@ -112,7 +112,8 @@ def _touches_unwanted_work(state: State, action: Action) -> bool:
     """
     world = state.world()
     variables = variables_of(action, world)
-    for entry in state.plans.values():
+    for plan in state.index.dropping:
+        entry = state.plans[plan]
         for task in entry.unwanted:
             if task in entry.index.outstanding:
                 other = action_of(entry.records[task], state.skills)

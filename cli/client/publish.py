@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from cli.client.names import TakenMeanwhile, free_name, next_number, put_if_unchanged
 from cli.errors import BadArgument, check_known
-from keyexpr_schema.facts import AT, parse_value
+from keyexpr_schema.facts import AT, IN, ON, parse_value
 from keyexpr_schema.keyspace import (
     FACT,
     GOAL_SPEC,
@@ -22,7 +23,7 @@ from keyexpr_schema.keyspace import (
     SIM_SCENE,
     STATEMENT,
 )
-from keyexpr_schema.payloads.goals import Goal, GoalAddress
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress
 from keyexpr_schema.payloads.world import (
     Fact,
     FactAddress,
@@ -70,13 +71,15 @@ async def put_statement(session: Session, text: str, name: str | None = None) ->
 
 
 async def put_fact(session: Session, relation: str, subject: str, written: str) -> Fact:
-    """Store a fact, confirmed.
+    """Store a fact, confirmed. What is on or in a known object is stored as where it is (`at`).
 
     Raises:
         Unknown: `at` of something that is no object or robot, or of a place that is none.
         BadArgument: something would be at itself.
     """
     value = parse_value(written)
+    if relation in (ON, IN) and written in [a.object for a in await session.list(OBJECT)]:
+        relation = AT
     if relation == AT:
         how = "load a world with `robotctl world load FILE`"
         robots = [a.robot for a in await session.list(ROBOT_SPEC)]
@@ -122,6 +125,8 @@ async def put_goal(
     priority: int = 0,
     within_s: float | None = None,
     speaker: str | None = None,
+    always: Sequence[Condition] = (),
+    never: Sequence[Condition] = (),
 ) -> Goal:
     """Store a goal, confirmed, after all that were given before it; due `within_s` from now [s].
 
@@ -150,6 +155,8 @@ async def put_goal(
             ordinal=ordinal,
             said_s=said_s,
             speaker=speaker,
+            always=tuple(always),
+            never=tuple(never),
         )
         address = GoalAddress(spec.goal)
         if spec.goal not in stored and await session.create(GOAL_SPEC, address, spec):

@@ -255,7 +255,8 @@ def _sought(
 ) -> _Sought | Impossible:
     """The conditions as a task, or why they are out of reach."""
     goal = [Literal(FactKey(c.relation, c.subject), c.value) for c in conditions]
-    robots = representatives(conditions, facts, world, thorough)
+    way = (*on_the_way.always, *on_the_way.never)
+    robots = representatives(conditions, facts, world, way, thorough)
     travel = Travel(world, facts)
     free = travel.free(robots)
     start: Facts = dict(facts)

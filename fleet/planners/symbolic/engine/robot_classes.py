@@ -21,6 +21,7 @@ def representatives(
     conditions: Sequence[Condition],
     facts: Mapping[FactKey, Value],
     world: WorldModel,
+    on_the_way: Sequence[Condition] = (),
     thorough: bool = False,
 ) -> list[str]:
     """One robot of each kind that is interchangeable now, as many where a skill takes several of
@@ -32,6 +33,7 @@ def representatives(
     """
     subjects = {condition.subject for condition in conditions}
     spoken_of = subjects | {condition.value for condition in conditions}
+    spoken_of |= {name for c in on_the_way for name in (*c.subjects, c.value)}
     spoken_of |= {facts.get(FactKey(AT, subject)) for subject in subjects}
     tools = thorough or any(_needs_a_tool(condition, world) for condition in conditions)
     kinds: dict[object, list[str]] = {}

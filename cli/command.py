@@ -196,7 +196,7 @@ class one_sentence_errors:  # noqa: N801 - used like a function, as contextlib's
         if found is not None:
             # Some libraries print to a buffered stdout; keep what was said before the error first.
             sys.stdout.flush()
-            typer.echo(f"Error: {' '.join(str(found).split())}", err=True)
+            typer.echo(f"Error: {' '.join(_sentence(found).split())}", err=True)
             raise typer.Exit(1) from None
 
 
@@ -218,6 +218,13 @@ def _of_the_domain(error: BaseException) -> bool:
     return isinstance(error, OSError) or any(
         module.split(".")[0] in _OURS and module.endswith(".errors") for module in declared
     )
+
+
+def _sentence(error: BaseException) -> str:
+    """What went wrong, for a person; the system's own words name neither subject nor verb."""
+    if isinstance(error, OSError) and error.strerror and error.filename:
+        return f"{error.filename} cannot be used: {error.strerror}"
+    return str(error)
 
 
 def _encode(value: object) -> object:

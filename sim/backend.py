@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
 from keyexpr_schema.payloads.simulation import ContactCount, Frame, Scene, Truth
 from keyexpr_schema.payloads.world import Feature
-from sim.files.world_payloads import all_things
+from sim.files.world_payloads import object_payloads
 from sim.files.world_schema import WorldFile
 
 NEEDS: dict[MotionKind, tuple[str, ...]] = {
@@ -55,7 +55,7 @@ class Backend(ABC):
     def __init__(self, world: WorldFile, robots: tuple[str, ...]) -> None:
         self.world = world
         self.robots = robots
-        self.things = {thing.object: thing for thing in all_things(world)}
+        self.things = {thing.object: thing for thing in object_payloads(world)}
         """Movable ones first, each kind in the order of the world file."""
         self.time_s = 0.0
         self._refused: dict[str, str] = {}

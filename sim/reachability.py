@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import msgspec
+
+from keyexpr_schema.facts import IS_OPEN
 from sim.files.mission_file import Mission
 from sim.mujoco_world.base_motions import REACH_MARGIN_M
 from sim.mujoco_world.description import load_description
@@ -9,7 +12,8 @@ from sim.navigation.spots import Spots
 
 
 def out_of_reach(mission: Mission) -> tuple[str, ...]:
-    """A sentence for each object that no robot of the mission can pick up where it lies.
+    """A sentence for each object that no robot of the mission can pick up where it lies, once what
+    it is in is open.
 
     Of a mission without a robot that picks things up there is nothing to say. What stands in the
     way besides furniture (other robots, other objects) is not looked at.
@@ -28,13 +32,17 @@ def out_of_reach(mission: Mission) -> tuple[str, ...]:
         return ()
     spots = Spots(mission.world)
     unreachable = []
+    opened = msgspec.structs.replace(
+        mission.world, states={thing: {IS_OPEN: True} for thing in mission.world.fixtures.movers}
+    )
     for name, entry in mission.world.object_entries.items():
-        point = mission.world.start_point_m(name)
+        point = opened.start_point_m(name)
         if any(spots.stances(point, radius_m, reach_m) for _, radius_m, reach_m in hands):
             continue
         robot_name, radius_m, reach_m = hands[0]
+        where = f"{'on' if entry.on else 'in'} {entry.carrier} at {list(entry.at_m)}"
         unreachable.append(
-            f"{name} lies on {entry.on} at {list(entry.at_m)}, where no hand gets to: "
+            f"{name} lies {where}, where no hand gets to: "
             f"for {robot_name}, {spots.why_not(point, radius_m, reach_m)}"
         )
     return tuple(unreachable)

@@ -7,7 +7,8 @@ action client, or a vendor's API.
 
 To put a real robot behind it, map each `MotionKind` to what the robot offers (`GO_TO` and
 `APPROACH` to its navigation, `LOOK` to its detector, `GRASP`, `RELEASE`, `RELEASE_IN_BASKET` and
-`STOW` to its arm), and answer a kind that the robot does not have with a `FAILED` outcome whose
+`STOW` to its arm, `OPEN`, `SWITCH_ON`, `PLACE_AT`, `HAND_OVER` and the like to what does that as a
+whole), and answer a kind that the robot does not have with a `FAILED` outcome whose
 `reason` says so. Then offer a factory of it as an entry point in the group
 `robotfleet.embodiments` (`robotctl worker --embodiment NAME`), or pass it to `run_worker`.
 """

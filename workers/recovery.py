@@ -1,25 +1,19 @@
-"""What a worker does before it takes orders: see that it is the only one of its robot, find out how
-it left the world, and report it."""
+"""What a worker does before it takes orders: find out how it left the world, and report it."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from contextlib import suppress
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.facts import AT
-from keyexpr_schema.keyspace import ROBOT_ALIVE
 from keyexpr_schema.payloads.motions import Motion, MotionKind, Senses
 from keyexpr_schema.payloads.tasks import Order, ReportState
-from keyexpr_schema.transport.session import Session
 from workers.embodiment import Embodiment
-from workers.errors import RobotTaken, RobotUnreachable, SkillFailed
+from workers.errors import RobotUnreachable, SkillFailed
 from workers.orders.fencing import Ledger, Phase
 from workers.skill_context import SkillContext
 
-GONE_S = 4.0
-"""How long the token of a worker that is dead can stay [s]: its lease of 2 s, and as much again."""
 SAFE_S = 60.0
 """Wall seconds that bringing the body to rest may take before the worker goes on without."""
 DRIVER_S = 1.0
@@ -29,31 +23,6 @@ OBJECT_ARGUMENT = "object"
 """The argument of an order that names the thing it handles, if it handles one."""
 
 _log = logging.getLogger("robotfleet.worker.recovery")
-
-
-async def ensure_single_worker(session: Session, robot: str) -> None:
-    """Return when no worker of `robot` is connected; one that was killed just now soon is not.
-
-    One journal cannot be open twice, but a second worker may be started with another data folder,
-    or on another host: it would make every attempt a second time. Two that start at the same moment
-    do not see each other here.
-
-    Raises:
-        RobotTaken: one still is after `GONE_S`.
-    """
-    async with session.watch_tokens(ROBOT_ALIVE, robot=robot) as watch:
-        await watch.synced()
-        with suppress(TimeoutError):
-            async with asyncio.timeout(GONE_S):
-                while watch.alive:
-                    await anext(watch)
-        others = watch.alive
-    if others:
-        names = ", ".join(sorted(other.incarnation for other in others))
-        raise RobotTaken(
-            f"a worker of {robot} is connected already ({names}): two would both carry out each "
-            "order; stop that one first"
-        )
 
 
 async def make_safe(embodiment: Embodiment) -> None:

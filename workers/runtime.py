@@ -10,18 +10,17 @@ from msgspec.structs import replace
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.facts import HOLDING, FactKey
-from keyexpr_schema.keyspace import ROBOT_ALIVE
-from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotSpec
+from keyexpr_schema.payloads.robots import RobotActivity, RobotSpec
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState
 from keyexpr_schema.transport.session import Session
 from workers.embodiment import Embodiment
-from workers.errors import BadArguments, RobotUnreachable, UnknownSkill
+from workers.errors import BadArguments, RobotTaken, RobotUnreachable, UnknownSkill
+from workers.only_worker import OnlyWorker
 from workers.orders.fencing import Phase
 from workers.orders.journal import Journal
 from workers.orders.order_queue import OrderQueue
 from workers.orders.outbox import Outbox, make_report
 from workers.recovery import (
-    ensure_single_worker,
     first_senses,
     make_safe,
     observe_after_crash,
@@ -82,21 +81,26 @@ class Worker:
         Raises:
             RobotTaken: another worker of this robot is connected.
         """
-        robot = self.spec.robot
-        alive = self._session.token(ROBOT_ALIVE, AliveAddress(robot, self.incarnation))
-        await ensure_single_worker(self._session, robot)
-        sending = asyncio.create_task(self._outbox.run())
-        try:
-            async with alive:
+        only = OnlyWorker(self._session, self.spec.robot, self.incarnation)
+        async with only.connected():
+            await only.settled()
+            sending = asyncio.create_task(self._outbox.run())
+            taken: BaseExceptionGroup[RobotTaken] | None = None
+            try:
+                async with asyncio.TaskGroup() as group:
+                    group.create_task(only.give_way())
+                    await self._serve(sending, group)
+            except* RobotTaken as others:
+                taken = others
+            finally:
+                # While the token is still there: who sees it go must find the last report.
                 try:
-                    async with asyncio.TaskGroup() as group:
-                        await self._serve(sending, group)
-                finally:
-                    # While the token is still there: who sees it go must find the last report.
                     await self._drain_outbox()
-        finally:
-            sending.cancel()
-            await asyncio.gather(sending, return_exceptions=True)
+                finally:
+                    sending.cancel()
+                    await asyncio.gather(sending, return_exceptions=True)
+            if taken is not None:
+                raise RobotTaken(str(taken.exceptions[0]))
 
     async def _serve(self, sending: asyncio.Task[None], group: asyncio.TaskGroup) -> None:
         await first_senses(self._embodiment)

@@ -132,8 +132,13 @@ def _type(kind: str) -> str:
 
 def _action(skill: SkillModel) -> str:
     parameters = [f"?{name} - a-{kind.bases[0]}" for name, kind in skill.types.items()]
-    known = dict(skill.before)
-    before = [f"(is-{r} ?{s} {_term(v, skill)})" for (r, s), v in skill.before]
+    known = dict(_before(skill))
+    before = [f"(is-{r} ?{s} {_term(v, skill)})" for (r, s), v in _before(skill)]
+    before += [
+        f"({_type(kind)} ?{name})"
+        for name, kind in skill.parameters.items()
+        if kind not in BASE_TYPES
+    ]
     before += [f"(skilled-{skill.name} ?{skill.actor_parameter})"]
     robots = skill.robot_parameters
     before += [f"(other ?{a} ?{b})" for i, a in enumerate(robots) for b in robots[i + 1 :]]

@@ -89,7 +89,7 @@ class Row:
             _seconds(self.own_makespan_s),
             "" if fast is None else _seconds(fast.planning_s, 2) or fast.outcome,
             "" if fast is None or fast.tasks is None else str(fast.tasks),
-            "" if fast is None else _seconds(fast.reallocated_s),
+            "" if fast is None else _seconds(fast.reallocated_s or fast.makespan_s),
         )
 
 
@@ -151,6 +151,8 @@ def tools() -> WorldModel:
         for name, kind, _ in things
     ]
     facts = [_fact(name, AT, f"room_{room}") for name, _, room in things]
+    undone = (("sliced", "bread"), ("filled", "jug"), ("watered", "plant"))
+    facts += [_fact(subject, relation, False) for relation, subject in undone]
     return _world(TOOL_PLACES, objects, facts, tuple(TOOLS))
 
 
@@ -195,7 +197,7 @@ def _world(
     return WorldModel.of(skills, places, objects, robots, known)
 
 
-def _fact(subject: str, relation: str, value: str) -> Fact:
+def _fact(subject: str, relation: str, value: str | bool) -> Fact:
     return Fact(subject=subject, relation=relation, value=value, source="benchmark")
 
 

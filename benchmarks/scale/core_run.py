@@ -34,7 +34,7 @@ class CoreRun:
     every event, the seconds of CPU that its step took, and whether it changed the state.
     """
 
-    def __init__(self, robots: int, watched: Timed | None = None) -> None:
+    def __init__(self, robots: int, watched: Timed | None = None, began_s: float = 0.0) -> None:
         self.robots = robots
         self.state = State()
         self.waiting: deque[Event] = deque()
@@ -48,17 +48,11 @@ class CoreRun:
         """Tasks of each plan reported as done."""
         self.given: list[PlanningInput] = []
         """The planning jobs that were wanted."""
-        self._seen: set[tuple[str, str, int]] = set()
+        self.seen: set[tuple[str, str, int]] = set()
+        """Attempts that robots have heard of."""
         self._watched = watched
-        self._time_s = 0.0
-        self.receive(
-            events.PlannerStarted,
-            epoch=1,
-            incarnation="benchmark",
-            skills=load_all_skills(),
-            logic=LOGIC,
-            lineage="benchmark",
-        )
+        self.time_s = began_s
+        self.begin_run(1)
         for place in errands.places():
             self.receive(events.PlacePut, place=place)
         for number in range(robots):
@@ -68,14 +62,25 @@ class CoreRun:
             for fact in errands.robot_facts(number):
                 self.receive(events.FactPut, fact=fact)
 
+    def begin_run(self, epoch: int) -> None:
+        """The planner starts."""
+        self.receive(
+            events.PlannerStarted,
+            epoch=epoch,
+            incarnation="benchmark",
+            skills=load_all_skills(),
+            logic=LOGIC,
+            lineage="benchmark",
+        )
+
     def at(self) -> dict[str, float]:
         """When the next event happens: time hardly passes."""
-        self._time_s += 0.001
-        return {"time_s": self._time_s, "wall_time_s": self._time_s}
+        self.time_s += 0.001
+        return {"time_s": self.time_s, "wall_time_s": self.time_s}
 
     def wait(self, seconds: float) -> None:
         """Time passes."""
-        self._time_s += seconds
+        self.time_s += seconds
 
     def receive(self, kind: type[Event], **fields: Any) -> tuple[Effect, ...]:
         """An event into the core; what it came to."""
@@ -84,7 +89,7 @@ class CoreRun:
     def apply(self, event: Event) -> tuple[Effect, ...]:
         """An event into the core, as it is; what follows from it is put into `waiting`."""
         before, began_s = self.state, time.process_time()
-        self.state, effects = step(before, event)
+        effects = self.handle(event)
         if self._watched is not None:
             self._watched(event, time.process_time() - began_s, self.state is not before)
         self.events += 1
@@ -94,20 +99,26 @@ class CoreRun:
             if isinstance(effect, MakePlan):
                 self.given.append(effect.given)
             elif isinstance(effect, Publish):
-                self._heard(effect)
+                self.heard(effect)
+        return effects
+
+    def handle(self, event: Event) -> tuple[Effect, ...]:
+        """An event into the core; what is to be done about it."""
+        self.state, effects = step(self.state, event)
         return effects
 
     def tried(self, event: Event) -> None:
         """What an event would do, without a trace."""
         step(self.state, event)
 
-    def _heard(self, effect: Publish) -> None:
+    def heard(self, effect: Publish) -> None:
+        """Something is published: robots, and who looks on, act on it."""
         if effect.key is ORDER:
             order = effect.payload
             assert isinstance(order, Order)
             attempt = (order.plan, order.task, order.attempt)
-            if attempt not in self._seen:
-                self._seen.add(attempt)
+            if attempt not in self.seen:
+                self.seen.add(attempt)
                 self.orders[order.robot] = order
                 self.waiting.append(self.reported(order, ReportState.STARTED))
                 self.waiting.append(self.reported(order, ReportState.SUCCEEDED))
@@ -130,10 +141,12 @@ class CoreRun:
             self.receive(events.ObjectPut, object=errands.cup(number))
             self.receive(events.FactPut, fact=errands.cup_fact(number))
 
-    def put_goals(self, numbers: Sequence[int], sentences: bool = False) -> None:
+    def put_goals(
+        self, numbers: Sequence[int], sentences: bool = False, cups: int | None = None
+    ) -> None:
         """Goals are told."""
         for number in numbers:
-            self.receive(events.GoalPut, goal=errands.goal(number, sentences))
+            self.receive(events.GoalPut, goal=errands.goal(number, sentences, cups))
 
     def ask(self, wanted: Errands) -> events.PlanningSucceeded:
         """A plan is asked for; the job's answer, which the core has not got yet."""

@@ -74,7 +74,7 @@ def goal(number: int, sentence: bool = False, cups: int | None = None) -> Goal:
 
     With fewer `cups` than goals, several goals are about one.
     """
-    name, which = f"g{number}", number if cups is None else number % cups
+    name, which = f"g{number}", _which(number, cups)
     if sentence:
         text = f"Bring cup {which + 1} to {_target(which).replace('_', ' ')}"
         return Goal(goal=name, text=text, ordinal=number)
@@ -83,12 +83,13 @@ def goal(number: int, sentence: bool = False, cups: int | None = None) -> Goal:
 
 @dataclass(frozen=True)
 class Errands:
-    """A plan for goals with these numbers, done by these robots in turn."""
+    """A plan for goals with these numbers, done by these robots in turn; `cups` as for `goal`."""
 
     plan: str
     numbers: Sequence[int]
     robots: int
     with_goals: bool = True
+    cups: int | None = None
 
     @property
     def tasks(self) -> int:
@@ -99,8 +100,9 @@ class Errands:
         """The plan, every actor pinned to its robot."""
         tasks: list[Task] = []
         for place, number in enumerate(self.numbers):
-            here, there = _origin(number), _target(number)
-            thing = f"cup_{number}"
+            which = _which(number, self.cups)
+            here, there = _origin(which), _target(which)
+            thing = f"cup_{which}"
             arguments = (
                 {"to": here},
                 {"object": thing, "place": here},
@@ -123,7 +125,7 @@ class Errands:
         return Plan(
             plan=self.plan,
             goals=tuple(f"g{number}" for number in self.numbers) if self.with_goals else (),
-            conditions=tuple(_condition(number) for number in self.numbers),
+            conditions=tuple(_condition(_which(n, self.cups)) for n in self.numbers),
             tasks=tuple(tasks),
             allocator=allocator,
             pins=self.allocation,
@@ -163,6 +165,10 @@ class Errands:
     def task(place: int, step: int) -> str:
         """The name of a task: of which goal in the plan's order, and which of its four."""
         return f"t{TASKS_A_GOAL * place + step + 1}"
+
+
+def _which(number: int, cups: int | None) -> int:
+    return number if cups is None else number % cups
 
 
 def _origin(number: int) -> str:

@@ -13,22 +13,21 @@ from msgspec.structs import replace
 
 from benchmarks.scale import errands
 from benchmarks.scale.errands import Errands
+from benchmarks.scale.planner_news import PlannerNews
 from benchmarks.scale.processes import REALM
 from keyexpr_schema.keyspace import (
     FACT,
     GOAL_SPEC,
-    GOAL_STATUS,
     OBJECT,
     ORDER,
     PLACE,
     PLAN_PROPOSAL,
-    PLAN_STATUS,
     REPORT,
     ROBOT_ALIVE,
     ROBOT_SPEC,
 )
 from keyexpr_schema.payloads.goals import GoalAddress
-from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanAddress, PlanState
+from keyexpr_schema.payloads.plans import PlanAddress, PlanState
 from keyexpr_schema.payloads.robots import AliveAddress, RobotAddress
 from keyexpr_schema.payloads.tasks import Order, ReportAddress, ReportState
 from keyexpr_schema.payloads.world import FactAddress, ObjectAddress, PlaceAddress
@@ -42,7 +41,7 @@ INCARNATION = "i1"
 
 
 @dataclass
-class KeysRun:
+class KeysRun(PlannerNews):
     """Made by `keys_run`. Times are of `time.perf_counter`, s."""
 
     operator: Session
@@ -56,15 +55,10 @@ class KeysRun:
     """When its worker put the report that it is done."""
     latencies_s: list[float] = field(default_factory=list)
     """From a robot's report that it is done to its next order, which waited for nothing else."""
-    plans: dict[str, PlanState] = field(default_factory=dict)
-    ended: dict[str, float] = field(default_factory=dict)
-    goals: set[str] = field(default_factory=set)
-    """Goals of which the planner has said something."""
     epoch: int = 0
     """The epoch of the newest order."""
     _free_since: dict[str, float] = field(default_factory=dict)
     _reporting: set[asyncio.Task[None]] = field(default_factory=set)
-    _news: asyncio.Event = field(default_factory=asyncio.Event)
 
     # --- what robots do --------------------------------------------------------------------------
 
@@ -96,32 +90,6 @@ class KeysRun:
         await self.workers.confirm(REPORT, ReportAddress.of(report), report, CONFIRM_S)
 
     # --- what the operator sees ------------------------------------------------------------------
-
-    async def follow_planner(self) -> None:
-        """How plans and goals stand."""
-        async with self.operator.watch(PLAN_STATUS, GOAL_STATUS) as watch:
-            async for change in watch:
-                if change.value is None:
-                    continue
-                if change.key is GOAL_STATUS:
-                    self.goals.add(change.value.goal)
-                else:
-                    self.plans[change.value.plan] = change.value.state
-                    if change.value.state in ENDED_PLANS:
-                        self.ended.setdefault(change.value.plan, time.perf_counter())
-                self._news.set()
-
-    async def until(self, condition: Callable[[], bool], limit_s: float) -> bool:
-        """Wait for news that make a condition hold; whether it did within `limit_s`."""
-        until_s = time.perf_counter() + limit_s
-        while not condition():
-            self._news.clear()
-            try:
-                async with asyncio.timeout(until_s - time.perf_counter()):
-                    await self._news.wait()
-            except TimeoutError:
-                return condition()
-        return True
 
     def done(self, plan: str) -> int:
         """How many tasks of a plan were reported as done."""
@@ -165,7 +133,7 @@ class KeysRun:
             for n in numbers
         )
         names = {f"g{n}" for n in numbers}
-        return await self.until(lambda: names <= self.goals, limit_s)
+        return await self.until(lambda: names <= self.goals.keys(), limit_s)
 
     async def propose(self, wanted: Errands) -> None:
         """The plan is put for the planner to check, to allocate and to carry out."""
@@ -197,7 +165,7 @@ async def keys_run(
         run = KeysRun(operator, workers, robots, pace_s)
         following = [
             asyncio.create_task(run.follow_orders()),
-            asyncio.create_task(run.follow_planner()),
+            asyncio.create_task(run.follow_planner(operator)),
         ]
         try:
             yield run

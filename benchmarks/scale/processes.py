@@ -102,7 +102,7 @@ class Child:
 
     def rss_mb(self) -> float:
         """Memory that it and the processes that it started have now, MB."""
-        return sum(_rss_mb(pid) for pid in (self.pid, *_descendants(self.pid)))
+        return sum(rss_mb(pid) for pid in (self.pid, *_descendants(self.pid)))
 
 
 async def _drain(stream: asyncio.StreamReader) -> None:
@@ -124,7 +124,8 @@ def _cpu_s(pid: int) -> float:
     return sum(int(fields[place]) for place in range(11, 15)) / _TICKS_A_S if fields else 0.0
 
 
-def _rss_mb(pid: int) -> float:
+def rss_mb(pid: int) -> float:
+    """Memory that a process has now, MB; 0 where it is gone."""
     fields = _stat(pid)
     return int(fields[21]) * _PAGE_MB if fields else 0.0
 

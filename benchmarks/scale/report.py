@@ -172,13 +172,31 @@ COLUMNS: dict[str, Sequence[Column]] = {
         ),
         ("load average", lambda row: f"{row['load']:.1f}"),
     ),
+    "missions": (
+        ("missions", lambda row: row["missions"]),
+        _number("cpu_ms", ".2f", " ms"),
+        ("state", lambda row: f"{row['state_bytes'] / 1024:.1f} kB"),
+        _number("keys"),
+        _number("deletions"),
+        ("entries, store's journal", lambda row: f"{row['store_journal']:,}"),
+        ("events, planner's journal", lambda row: f"{row['planner_journal']:,}"),
+        *(
+            (f"files, {name}", lambda row, name=name: f"{row[f'{name}_mb']:.1f} MB")
+            for name in ("store", "planner", "history")
+        ),
+        _number("rss_mb", ".0f", " MB"),
+        ("started again in", lambda row: f"{row['started_s']:.2f} s"),
+    ),
     "recording": (
         ("after", lambda row: f"{row['after_s']:.0f} s"),
+        ("recorder", lambda row: "no" if row.get("without") else "yes"),
         _number("missions"),
+        ("missions a second", lambda row: f"{row['missions'] / row['after_s']:.1f}"),
         _number("cpu_s", ".1f", " s"),
         _number("rss_mb", ".0f", " MB"),
         _number("files"),
         _number("files_mb", ".1f", " MB"),
+        ("load average", lambda row: f"{row['load']:.1f}" if "load" in row else ""),
     ),
 }
 

@@ -26,12 +26,12 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.scale.keys_run import CONFIRM_S
+from benchmarks.scale.planner_news import PlannerNews
 from benchmarks.scale.processes import Child, Processes, folder_mb, processes
 from benchmarks.scale.simulated_fleet import SimulatedFleet, simulated
-from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS, PLAN_REQUEST, PLAN_STATUS
+from keyexpr_schema.keyspace import GOAL_SPEC, PLAN_REQUEST
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalAddress, GoalState
 from keyexpr_schema.payloads.requests import PlanRequest, RequestAddress
-from keyexpr_schema.transport.session import Session
 
 ROBOTS = 4
 MISSION_S = 120.0
@@ -53,42 +53,11 @@ class Lived:
     load: float = field(default_factory=lambda: os.getloadavg()[0])
 
 
-class Statuses:
-    """How goals stand, as the operator sees it."""
-
-    def __init__(self) -> None:
-        self.goals: dict[str, GoalState] = {}
-        self.reasons: dict[str, str | None] = {}
-        self._news = asyncio.Event()
-
-    async def follow(self, operator: Session) -> None:
-        """Watch for ever."""
-        async with operator.watch(GOAL_STATUS, PLAN_STATUS) as watch:
-            async for change in watch:
-                status = change.value
-                if status is not None and change.key is GOAL_STATUS:
-                    self.goals[status.goal] = status.state
-                    self.reasons[status.goal] = status.reason
-                    self._news.set()
-
-    async def until(self, condition: Callable[[], bool], limit_s: float) -> bool:
-        """Whether a condition comes to hold within `limit_s`."""
-        until_s = time.perf_counter() + limit_s
-        while not condition():
-            self._news.clear()
-            try:
-                async with asyncio.timeout(until_s - time.perf_counter()):
-                    await self._news.wait()
-            except TimeoutError:
-                return condition()
-        return True
-
-
 class Soak:
     """A fleet that lives; `mission` is lived through once."""
 
-    def __init__(self, fleet: Processes, made: SimulatedFleet, statuses: Statuses) -> None:
-        self.fleet, self._made, self._statuses = fleet, made, statuses
+    def __init__(self, fleet: Processes, made: SimulatedFleet, news: PlannerNews) -> None:
+        self.fleet, self._made, self._news = fleet, made, news
         self._children: dict[str, tuple[Child, ...]] = {
             "router": (fleet.router,), "planner": (fleet.planner,),
             "workers": made.workers, "sim": (made.sim,),
@@ -118,7 +87,7 @@ class Soak:
             text = f"Bring cup {cup} to room {room}"
             goal = Goal(goal=name, text=text, ordinal=number * cups + cup)
             await operator.confirm(GOAL_SPEC, GoalAddress(name), goal, CONFIRM_S)
-        known, ended = self._statuses.goals, ENDED_GOALS
+        known, ended = self._news.goals, ENDED_GOALS
         await self._wait(lambda: all(name in known for name in names), number)
         request = f"ask-{number}"
         ask = PlanRequest(request=request, plan=f"m{number}", goals=tuple(names))
@@ -126,7 +95,7 @@ class Soak:
         await self._wait(lambda: all(known.get(name) in ended for name in names), number)
         missed = [name for name in names if known[name] is not GoalState.REACHED]
         if missed:
-            reason = self._statuses.reasons[missed[0]]
+            reason = self._news.reasons[missed[0]]
             raise SystemExit(f"{missed[0]} is {known[missed[0]].value}: {reason}")
         took_s = time.perf_counter() - began_s
         return Lived(
@@ -147,9 +116,9 @@ class Soak:
         }
 
     async def _wait(self, condition: Callable[[], bool], number: int) -> None:
-        if not await self._statuses.until(condition, MISSION_S):
+        if not await self._news.until(condition, MISSION_S):
             raise SystemExit(
-                f"mission {number} was not over after {MISSION_S:g} s: {self._statuses.goals}; "
+                f"mission {number} was not over after {MISSION_S:g} s: {self._news.goals}; "
                 f"logs are in {self.fleet.folder}"
             )
 
@@ -170,10 +139,10 @@ class Soak:
 async def soaking(folder: Path) -> AsyncIterator[Soak]:
     """A fleet in `folder`, and someone who looks on."""
     async with processes(folder) as fleet, simulated(fleet, ROBOTS, "kinematic") as made:
-        statuses = Statuses()
-        following = asyncio.create_task(statuses.follow(made.operator))
+        news = PlannerNews()
+        following = asyncio.create_task(news.follow_planner(made.operator))
         try:
-            yield Soak(fleet, made, statuses)
+            yield Soak(fleet, made, news)
         finally:
             following.cancel()
             await asyncio.gather(following, return_exceptions=True)

@@ -177,7 +177,7 @@ def _lifetime(rows: Rows) -> str:
 
 
 def _recorder(rows: Rows) -> str:
-    first, last = rows[0], rows[-1]
+    first, last = next(row for row in rows if not row.get("without")), rows[-1]
     return (
         f"{last['cpu_s']:.0f} s CPU in {last['after_s']:.0f} s, "
         f"RSS {first['rss_mb']:.0f} to {last['rss_mb']:.0f} MB, {last['missions']} missions"
@@ -207,8 +207,8 @@ ROWS = (
     Target("idle planner, 120,000 reports stored", "≤ 1 % (router ≤ 1 %)", "idle", _idle_planner),
     Target("idle worker, of a core for each robot", "≤ 0.2 %", "idle", _idle_workers),
     Target("50 robots, MuJoCo, with their workers, of real time", "≥ 4 x", "physics", _physics),
-    Target("500 missions with restarts in between: time, memory, files", "flat after retention",
-           "lifetime", _lifetime),
+    Target("500 missions and more, with restarts in between: time, memory, files",
+           "flat after retention", "lifetime", _lifetime),
     Target("recorder over 600 s of missions", "≤ 60 s CPU, bounded memory; files that roll",
            "recording", _recorder),
     Target("confirmed writes, 64 at once; one alone", "≥ 10,000/s; p99 ≤ 3 ms", "writes", _writes),

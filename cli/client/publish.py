@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -22,7 +23,7 @@ from keyexpr_schema.keyspace import (
     SIM_SCENE,
     STATEMENT,
 )
-from keyexpr_schema.payloads.goals import Goal, GoalAddress
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress
 from keyexpr_schema.payloads.world import (
     Fact,
     FactAddress,
@@ -122,6 +123,8 @@ async def put_goal(
     priority: int = 0,
     within_s: float | None = None,
     speaker: str | None = None,
+    always: Sequence[Condition] = (),
+    never: Sequence[Condition] = (),
 ) -> Goal:
     """Store a goal, confirmed, after all that were given before it; due `within_s` from now [s].
 
@@ -150,6 +153,8 @@ async def put_goal(
             ordinal=ordinal,
             said_s=said_s,
             speaker=speaker,
+            always=tuple(always),
+            never=tuple(never),
         )
         address = GoalAddress(spec.goal)
         if spec.goal not in stored and await session.create(GOAL_SPEC, address, spec):

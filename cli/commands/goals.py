@@ -43,6 +43,14 @@ async def add(
             "--speaker", metavar="PERSON", help='Who says it, of the people in the world: "me".'
         ),
     ] = None,
+    always: Annotated[
+        list[str] | None,
+        typer.Option("--always", metavar="CONDITION", help="What must hold till then; repeatable."),
+    ] = None,
+    never: Annotated[
+        list[str] | None,
+        typer.Option("--never", metavar="CONDITION", help="What must not hold; repeatable."),
+    ] = None,
     plan: Annotated[
         bool, typer.Option("--plan", help="Have it planned and carried out at once.")
     ] = False,
@@ -57,6 +65,7 @@ async def add(
     from cli.client.presence import planner_alive
     from cli.client.publish import put_goal
     from cli.errors import NotRunning, Refused
+    from cli.plans.worlds import parse_condition
     from cli.views.goals import GoalRow
     from keyexpr_schema.keyspace import GOAL_STATUS
     from keyexpr_schema.payloads.goals import GoalState
@@ -68,7 +77,8 @@ async def add(
                 "no planner is running, so the goal was not stored; start one with "
                 "`robotctl planner`, or leave --plan out"
             )
-        spec = await put_goal(session, text, name, priority, within_s, speaker)
+        constraints = [[parse_condition(row) for row in rows or ()] for rows in (always, never)]
+        spec = await put_goal(session, text, name, priority, within_s, speaker, *constraints)
         if not (wait or plan) and not await planner_alive(session):
             call.show(
                 GoalRow(goal=spec.goal, spec=spec, status=None),

@@ -6,6 +6,7 @@ SIGINT or SIGTERM.
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated, TypeVar
 
@@ -50,9 +51,17 @@ def router(
         int | None,
         typer.Option("--journal-entries", min=1, help="Changes its journal keeps: 100000."),
     ] = None,
+    journal_mb: Annotated[
+        float | None,
+        typer.Option("--journal-mb", min=0.01, metavar="MB", help="And of how many MB: 32."),
+    ] = None,
     journal_days: Annotated[
         float | None,
         typer.Option("--journal-days", min=0.01, metavar="DAYS", help="And for how long: 30."),
+    ] = None,
+    tombstones: Annotated[
+        int | None,
+        typer.Option("--tombstones", min=0, metavar="N", help="Deletions it remembers: 50000."),
     ] = None,
     tombstone_days: Annotated[
         float | None,
@@ -60,7 +69,7 @@ def router(
             "--tombstone-days",
             min=0.01,
             metavar="DAYS",
-            help="How long deletions hold against older values that come late: 7.",
+            help="And for how long, against older values that come late: 7.",
         ),
     ] = None,
 ) -> None:
@@ -71,7 +80,9 @@ def router(
 
     given = {
         "journal_entries": journal_entries,
+        "journal_mb": journal_mb,
         "journal_days": journal_days,
+        "tombstones": tombstones,
         "tombstone_days": tombstone_days,
     }
     memory = StoreMemory(**{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
@@ -286,6 +297,8 @@ def record(
     ] = None,
 ) -> None:
     """Record everything that happens for Rerun."""
+    # Read when Rerun is imported; it would warn, of each file, that it has no table of contents.
+    os.environ.setdefault("RUST_LOG", "error")
     from cli.demo.child_processes import end_with_parent
     from cli.errors import BadArgument
     from fleet.timeline.process import run_recorder

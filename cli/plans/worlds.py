@@ -12,6 +12,7 @@ from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import AT, HOLDING, NOTHING, parse_literal
 from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, ROBOT_SPEC
+from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact
 
@@ -70,6 +71,22 @@ def _empty_hands(specs: Iterable[RobotSpec]) -> list[Fact]:
         for spec in specs
         if "grip" in spec.capabilities
     ]
+
+
+def parse_condition(written: str) -> Condition:
+    """`is_open fridge false` or `is_open(fridge) = false`.
+
+    Raises:
+        BadArgument: it is neither.
+    """
+    literal = parse_literal(written)
+    if literal is None:
+        raise BadArgument(
+            "a condition is RELATION SUBJECT VALUE, such as 'is_open fridge false'; "
+            f"got {written!r}"
+        )
+    (relation, subject), value = literal
+    return Condition(relation=relation, subject=subject, value=value)
 
 
 def parse_fact(written: str) -> Fact:

@@ -16,6 +16,10 @@ from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
 from keyexpr_schema.facts import AT
 from keyexpr_schema.payloads.plans import Plan, Violation
 
+SEARCH_SHARE = 0.25
+"""Of what is left until there has to be a plan, how much a search takes at most: checking takes
+some as well, and perhaps it is allocated once more."""
+
 
 @dataclass(frozen=True)
 class Allocated:
@@ -75,6 +79,10 @@ class AllocationProblem:
     def world(self) -> WorldModel:
         """The world that the plan is valid in."""
         return self.checked.world
+
+    def search_s(self, wanted_s: float) -> float:
+        """Seconds that a search which would like `wanted_s` may take now."""
+        return min(wanted_s, SEARCH_SHARE * self.context.limit.left_s)
 
     def first_destinations(self) -> dict[str, str]:
         """By actor, where its first way leads; an actor that drives nowhere has none."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fleet.allocators.base import AllocationProblem, Allocator, Assignment, NotAllocated
 from fleet.allocators.min_max_load import assign_with_least_travel
-from fleet.jobshop.portfolio import solve
+from fleet.jobshop.portfolio import START_UP_S, solve
 from fleet.jobshop.problem import Schedule
 from fleet.jobshop.rescheduling import reschedule
 from fleet.jobshop.time_budget import Clock, TimeBudget
@@ -49,13 +49,16 @@ class MakespanAllocator(Allocator):
 
     def _assign(self, problem: AllocationProblem) -> Assignment | NotAllocated:
         plan = plan_shop(problem.checked, problem.able, problem.apart, problem.context)
+        deadline_s = problem.search_s(self._deadline_s)
         if problem.context.previous_allocation:
-            budget = TimeBudget(RESCHEDULE_SHARE * self._deadline_s, self._clock)
+            budget = TimeBudget(RESCHEDULE_SHARE * deadline_s, self._clock)
             rescheduled = _rescheduled(plan, problem.context, budget)
             if rescheduled is not None:
                 return rescheduled
-        budget = TimeBudget(self._deadline_s, self._clock)
-        schedule = solve(plan.shop, budget, self._exact)
+        budget = TimeBudget(deadline_s, self._clock)
+        exact_s = deadline_s + START_UP_S
+        exact = self._exact and problem.search_s(exact_s) == exact_s
+        schedule = solve(plan.shop, budget, exact)
         if schedule is None:
             # Robots are so few that rules run into a dead end: what is left is a matching problem.
             chosen = assign_with_least_travel(problem)

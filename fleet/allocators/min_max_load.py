@@ -94,6 +94,7 @@ def assign_with_least_travel(
     The program gets the balanced assignment's maximum and bound: identical robots would keep its
     solver busy for ever otherwise. Where the bound is met, travel is all that is left to minimise.
     """
+    time_limit_s = problem.search_s(time_limit_s)
     end_s = time.monotonic() + time_limit_s
     balanced = balance(balancing_problem(problem))
     if isinstance(balanced, BalancedAssignment):

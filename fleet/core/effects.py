@@ -11,11 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from msgspec.structs import asdict
-
-from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.indexes.touches import Part, Touch
-from fleet.core.plan_entry import PlanEntry
 from fleet.core.planning_input import (
     InterpretationInput,
     PlanningInput,
@@ -23,32 +19,26 @@ from fleet.core.planning_input import (
     planning_input,
 )
 from fleet.core.state import State
+from fleet.core.view import TABLES, Over, order_of, status_of
 from keyexpr_schema.key import Address, Key, Payload
 from keyexpr_schema.keyspace import (
     ANSWER,
-    DURATIONS,
     FACT,
     GOAL_STATUS,
     ORDER,
     PLAN_SPEC,
     PLAN_STATUS,
-    STATEMENT_STATUS,
     TASK_RECORD,
 )
-from keyexpr_schema.payloads.goals import OVER_GOALS, GoalAddress, GoalStatus
+from keyexpr_schema.payloads.goals import OVER_GOALS, GoalAddress
 from keyexpr_schema.payloads.history import Ended, GoalRecord, PlanRecord, RequestRecord
-from keyexpr_schema.payloads.plans import PlanAddress, PlanStatus
-from keyexpr_schema.payloads.requests import Answer, RequestAddress
-from keyexpr_schema.payloads.tasks import Order, OrderAddress, TaskAddress, TaskRecord
+from keyexpr_schema.payloads.plans import PlanAddress
+from keyexpr_schema.payloads.requests import RequestAddress
+from keyexpr_schema.payloads.tasks import OrderAddress, TaskAddress, TaskRecord
 from keyexpr_schema.payloads.world import FactAddress
 
 PLANNER_SOURCE = "planner"
 """`source` of facts that the planner concludes itself; statements add a colon and their id."""
-
-DEADLINE_FACTOR = 6.0
-DEADLINE_MARGIN_S = 180.0
-"""An attempt may take this many times its predicted duration, and this long [s] besides: enough for
-three tries and for waiting at doors, little enough that a stuck robot is noticed."""
 
 
 @dataclass(frozen=True)
@@ -116,12 +106,9 @@ def effects_between(old: State, new: State, touches: Iterable[Touch]) -> tuple[E
 
 def all_touches(old: State, new: State) -> tuple[Touch, ...]:
     """Touches of everything that is in one of two states, or over in the newer one."""
-    over = _Over.of(new)
+    over = Over.of(new)
     names: tuple[tuple[Part, Iterable[Any]], ...] = (
-        (Part.GOAL, (*old.goal_states, *new.goal_states, *over.goals)),
-        (Part.STATEMENT, (*old.statement_states, *new.statement_states)),
-        (Part.ANSWER, (*old.answers, *new.answers, *over.answers)),
-        (Part.DURATIONS, (*old.durations, *new.durations)),
+        *((t.part, (*t.of(old), *t.of(new), *t.over(over))) for t in TABLES),
         (Part.PLAN, (*old.plans, *new.plans, *over.plans)),
         (Part.RECORDS, (*old.plans, *new.plans, *over.plans)),
         (Part.FACT, (*old.concluded, *new.concluded)),
@@ -203,49 +190,14 @@ class _Scope:
 
 
 def _documents(old: State, new: State, scope: _Scope) -> Iterator[Effect]:
-    over = _Over.of(new)
-    views: tuple[
-        tuple[
-            Part,
-            Key[Any, Any],
-            Mapping[str, Payload],
-            Mapping[str, Payload],
-            Mapping[str, Payload],
-        ],
-        ...,
-    ] = (
-        (Part.GOAL, GOAL_STATUS, old.goal_states, new.goal_states, over.goals),
-        (Part.STATEMENT, STATEMENT_STATUS, old.statement_states, new.statement_states, {}),
-        (Part.ANSWER, ANSWER, old.answers, new.answers, over.answers),
-        (Part.DURATIONS, DURATIONS, old.durations, new.durations, {}),
-    )
-    for part, key, before, after, gone in views:
-        for name in scope.names.get(part, ()):
+    over = Over.of(new)
+    for table in TABLES:
+        before, after, gone = table.of(old), table.of(new), table.over(over)
+        for name in scope.names.get(table.part, ()):
             now = after.get(name) or gone.get(name)
-            yield from _difference(key, key.address(name), before.get(name), now)
+            yield from _difference(table.key, table.key.address(name), before.get(name), now)
     for plan in scope.plans:
         yield from _plan_documents(plan, old, new, over.plans.get(plan), scope)
-
-
-@dataclass(frozen=True)
-class _Over:
-    """What is over in an event, by the names that its documents go by."""
-
-    goals: dict[str, GoalStatus]
-    answers: dict[str, Answer]
-    plans: dict[str, PlanRecord]
-
-    @classmethod
-    def of(cls, state: State) -> _Over:
-        plans = {r.spec.plan: r for r in state.over if isinstance(r, PlanRecord)}
-        goals = [r for r in state.over if isinstance(r, GoalRecord) and not r.deleted]
-        goals += [goal for plan in plans.values() for goal in plan.goals]
-        answers = [r.answer for r in state.over if isinstance(r, RequestRecord)]
-        return cls(
-            {goal.spec.goal: goal.status for goal in goals if goal.status.state in OVER_GOALS},
-            {answer.request: answer for answer in answers},
-            plans,
-        )
 
 
 def _plan_documents(
@@ -272,7 +224,7 @@ def _plan_documents(
         outstanding = [entry.index.outstanding for entry in (before, after) if entry]
         tasks = dict.fromkeys(task for tasks in outstanding for task in tasks)
     for task in tasks:
-        first, then = _order_of(before, task, old.epoch), _order_of(after, task, new.epoch)
+        first, then = order_of(before, task, old.epoch), order_of(after, task, new.epoch)
         if first and (not then or then.robot != first.robot):
             yield Retract(ORDER, OrderAddress.of(first))
             first = None
@@ -288,49 +240,6 @@ def _difference(
             yield Retract(key, address)
     elif new is not old and new != old:
         yield Publish(key, address, new)
-
-
-def status_of(entry: PlanEntry) -> PlanStatus:
-    """What is published of a plan."""
-    return PlanStatus(
-        plan=entry.plan.plan,
-        revision=entry.plan.revision,
-        state=entry.state,
-        goals=entry.plan.goals,
-        made_by=entry.plan.made_by,
-        allocator=entry.plan.allocator,
-        making=entry.plan.making,
-        change=entry.change,
-        reason=(entry.replan and entry.replan.sentence) or entry.reason,
-        violations=entry.violations,
-        time_s=entry.changed_s,
-        **asdict(entry.outcome),
-    )
-
-
-def _order_of(entry: PlanEntry | None, task: str, epoch: int) -> Order | None:
-    record = entry.records.get(task) if entry is not None else None
-    if entry is None or record is None or record.state not in OUTSTANDING or record.robot is None:
-        return None
-    return _order(record, entry, epoch)
-
-
-def _order(record: TaskRecord, entry: PlanEntry, epoch: int) -> Order:
-    assert record.robot is not None
-    return Order(
-        robot=record.robot,
-        plan=record.plan,
-        revision=record.revision,
-        task=record.task,
-        attempt=record.attempt,
-        epoch=epoch,
-        skill=record.skill,
-        args=record.args,
-        deadline_s=DEADLINE_FACTOR * record.duration_s + DEADLINE_MARGIN_S,
-        cancelled=entry.cancelling or entry.ended or record.task in entry.unwanted,
-        planner=entry.lineage,
-        serial=record.serial,
-    )
 
 
 def _own_facts(old: State, new: State, scope: _Scope) -> Iterator[Effect]:

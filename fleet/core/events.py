@@ -52,6 +52,12 @@ class PlannerStarted(Event, frozen=True, kw_only=True):
     lineage: str = ""
 
 
+class EpochRaised(Event, frozen=True, kw_only=True):
+    """The run goes on with a higher epoch: robots have had orders of one that was not known of."""
+
+    epoch: int
+
+
 class GoalPut(Event, frozen=True, kw_only=True):
     """A goal was put."""
 
@@ -205,6 +211,7 @@ class PlanningFailed(Event, frozen=True, kw_only=True):
 
     `postponed`: nothing is known against one, only the time (or the process) did not suffice.
     `for_robots`: the goals for which there would be one if all robots were connected.
+    `goal_reasons` are those of goals that have one of their own.
     """
 
     job: int
@@ -213,6 +220,11 @@ class PlanningFailed(Event, frozen=True, kw_only=True):
     planning_time_s: float = 0.0
     postponed: bool = False
     for_robots: tuple[str, ...] = ()
+    goal_reasons: dict[str, str] = {}
+
+    def reason_for(self, goal: str) -> str:
+        """Why there is no plan for this goal."""
+        return self.goal_reasons.get(goal, self.reason)
 
 
 class GoalInterpreted(Event, frozen=True, kw_only=True):

@@ -12,7 +12,6 @@ from collections.abc import Iterable
 
 from msgspec.structs import replace
 
-from fleet.core.effects import status_of
 from fleet.core.indexes.touches import UNTOUCHED, Part, Touch
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.state import State
@@ -22,6 +21,7 @@ from fleet.core.state_updates import (
     touch,
 )
 from fleet.core.table import Table
+from fleet.core.view import status_of
 from keyexpr_schema.payloads.goals import OVER_GOALS, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.history import GoalRecord, PlanRecord, RequestRecord
 

@@ -107,7 +107,14 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
         facts=tuple(Literal(variable, value) for variable, value in world.facts.items()),
         durations=tuple(world.durations.values()),
         goals=tuple(
-            replace(goal, conditions=_wanted(state.goal_states[goal.goal], world)) for goal in goals
+            replace(
+                goal,
+                conditions=_wanted(state.goal_states[goal.goal], world),
+                # What must hold until it is reached need not any longer.
+                always=() if goal.goal in reached else goal.always,
+                never=() if goal.goal in reached else goal.never,
+            )
+            for goal in goals
         ),
         reached=tuple(reached),
         searched=_searched(records.values(), state.skills),

@@ -12,14 +12,13 @@ from msgspec.structs import replace
 
 from fleet.core.belief_updates import touched_carriers
 from fleet.core.indexes.fleet_index import (
-    NO_ORDERS,
     UNPLANNED,
-    FleetIndex,
     in_set,
     priority_of,
     subjects_of,
 )
-from fleet.core.indexes.plan_index import OUTSTANDING, robots_of
+from fleet.core.indexes.plan_changes import entry_changed, order_changed
+from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.state import State
@@ -131,7 +130,14 @@ def conditions_of(state: State, goals: Iterable[str]) -> tuple[Condition, ...]:
 def without_goal(state: State, plan: Plan, goal: str) -> Plan:
     """The plan, answering for its other goals only; its tasks stay."""
     rest = tuple(other for other in plan.goals if other != goal)
-    return replace(plan, goals=rest, conditions=conditions_of(state, rest))
+    specs = [state.goals[other] for other in rest if other in state.goals]
+    return replace(
+        plan,
+        goals=rest,
+        conditions=conditions_of(state, rest),
+        always=tuple(dict.fromkeys(row for spec in specs for row in spec.always)),
+        never=tuple(dict.fromkeys(row for spec in specs for row in spec.never)),
+    )
 
 
 # --- plans ---------------------------------------------------------------------------------------
@@ -145,60 +151,15 @@ def set_entry(state: State, entry: PlanEntry) -> State:
     touches = state.touches.and_(Touch(Part.PLAN, name))
     if known is None or known.records is not entry.records:
         touches = touches.and_(Touch(Part.RECORDS, name))
-    index = _entry_changed(state, name, known, entry)
+    index = entry_changed(state.index, name, known, entry, state.goals)
     return replace(state, plans=state.plans.set(name, entry), index=index, touches=touches)
 
 
 def forget_entry(state: State, name: str) -> State:
     """Drop a plan."""
     touches = state.touches.and_(Touch(Part.PLAN, name)).and_(Touch(Part.RECORDS, name))
-    index = _entry_changed(state, name, state.plans.get(name), None)
+    index = entry_changed(state.index, name, state.plans.get(name), None, state.goals)
     return replace(state, plans=state.plans.without(name), index=index, touches=touches)
-
-
-def _entry_changed(
-    state: State, name: str, old: PlanEntry | None, new: PlanEntry | None
-) -> FleetIndex:
-    """The index after an entry changed."""
-    index = state.index
-    was = old.wanted_goals if old is not None and not old.ended else ()
-    now = new.wanted_goals if new is not None and not new.ended else ()
-    if was is not now:
-        plans_of = index.plans_of
-        for goal in set(was) ^ set(now):
-            rest = tuple(plan for plan in plans_of.get(goal, ()) if plan != name)
-            plans = (*rest, name) if goal in now else rest
-            plans_of = plans_of.set(goal, plans) if plans else plans_of.delete(goal)
-        index = replace(index, plans_of=plans_of)
-    if new is None or new.ended:
-        index = replace(index, active=index.active.without(name))
-    elif was is not now or name not in index.active:
-        index = replace(index, active=index.active.set(name, priority_of(new, state.goals)))
-    before = old.index.outstanding if old is not None else Table()
-    after = new.index.outstanding if new is not None else Table()
-    if before is after:
-        return index
-    for task in before:
-        if task not in after:
-            assert old is not None
-            index = _order_changed(index, old.records[task], False)
-    for task in after:
-        if task not in before:
-            assert new is not None
-            index = _order_changed(index, new.records[task], True)
-    return index
-
-
-def _order_changed(index: FleetIndex, record: TaskRecord, there: bool) -> FleetIndex:
-    work, order = index.work, (record.plan, record.task)
-    for robot in robots_of(record):
-        orders = work.get(robot)
-        if there:
-            work = work.set(robot, (orders or NO_ORDERS).set(order, None))
-        elif orders is not None and order in orders:
-            rest = orders.delete(order)
-            work = work.set(robot, rest) if rest else work.delete(robot)
-    return replace(index, work=work)
 
 
 def set_record(state: State, entry: PlanEntry, record: TaskRecord) -> State:
@@ -212,9 +173,17 @@ def set_record(state: State, entry: PlanEntry, record: TaskRecord) -> State:
     entry = replace(entry, records=records, index=entry.index.moved(old, record, records))
     index = state.index
     if (old.state in OUTSTANDING) != (record.state in OUTSTANDING):
-        index = _order_changed(index, record, record.state in OUTSTANDING)
+        index = order_changed(index, record, record.state in OUTSTANDING)
     touches = state.touches.and_(Touch(Part.RECORD, name, record.task))
     return replace(state, plans=state.plans.set(name, entry), index=index, touches=touches)
+
+
+def set_records(state: State, entry: PlanEntry, records: Iterable[TaskRecord]) -> State:
+    """Change what is kept of some tasks of a plan, and of the rest of it as `entry` says."""
+    state = set_entry(state, entry)
+    for record in records:
+        state = set_record(state, state.plans[entry.plan.plan], record)
+    return state
 
 
 def set_late_bound(state: State, entry: PlanEntry, late_s: float) -> State:

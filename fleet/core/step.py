@@ -54,9 +54,16 @@ def _planner_started(state: State, event: events.PlannerStarted) -> State:
     return touch(started, Touch(Part.EPOCH))
 
 
+def _epoch_raised(state: State, event: events.EpochRaised) -> State:
+    if event.epoch <= state.epoch:
+        return state
+    return touch(replace(state, epoch=event.epoch), Touch(Part.EPOCH))
+
+
 _Handler = Callable[[State, Any], State]
 _HANDLERS: dict[type[Event], _Handler] = {
     events.PlannerStarted: _planner_started,
+    events.EpochRaised: _epoch_raised,
     events.PriorStateLoaded: prior_state.prior_state_loaded,
     events.TimerFired: lambda state, event: state,
     events.GoalPut: goals.goal_put,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
 
 from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.core.model.world import WorldModel
 from fleet.jobshop.time_budget import TimeBudget
-from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 BIG_DAG, PER_GOAL, MONOLITHIC = "big-dag", "per-goal", "monolithic"
@@ -36,6 +37,16 @@ class PlanningProblem:
     budget: TimeBudget = field(default_factory=lambda: TimeBudget(inf))
 
     @property
+    def always(self) -> tuple[Condition, ...]:
+        """What must hold all the time."""
+        return tuple(dict.fromkeys(row for goal in self.goals for row in goal.always))
+
+    @property
+    def never(self) -> tuple[Condition, ...]:
+        """What must not hold at any time."""
+        return tuple(dict.fromkeys(row for goal in self.goals for row in goal.never))
+
+    @property
     def not_in_time(self) -> str:
         """What is said of goals for which the `budget` did not suffice."""
         return f"not planned within {self.budget.seconds:g} s"
@@ -45,12 +56,14 @@ class PlanningProblem:
 class NoPlan:
     """Why there is no plan: a sentence, and violations where a plan was found wanting.
 
-    `postponed`: there may be one, and only the time did not suffice to find it.
+    `postponed`: there may be one, and only the time did not suffice to find it. `goal_reasons` are
+    those of goals that have one of their own.
     """
 
     reason: str
     violations: tuple[Violation, ...] = field(default=())
     postponed: bool = False
+    goal_reasons: Mapping[str, str] = field(default_factory=dict)
 
 
 class Planner(ABC):

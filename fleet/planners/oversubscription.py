@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field, replace
 
 from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
+from fleet.planners.contradictions import contradictions, reasons_of
 from keyexpr_schema.payloads.plans import Plan
 
 
@@ -52,10 +53,11 @@ def plan_reachable_goals(
     problem: PlanningProblem,
     reached: frozenset[str] = frozenset(),
 ) -> PartialPlan | NoPlan:
-    """A plan for all goals, or else for all but those that `feasibility` cannot plan even alone.
+    """A plan for all goals, or else for all but those that `feasibility` cannot plan even alone,
+    and those that contradict one before them.
 
     Goals that are `reached` stay in the plan, so that it does not undo them; a plan for nothing
-    else is no plan.
+    else is no plan. A goal that contradicts another is postponed: it can be reached later.
     """
     made = planner.plan(problem)
     if isinstance(made, CheckedPlan):
@@ -66,9 +68,30 @@ def plan_reachable_goals(
             alone = feasibility.plan(replace(problem, goals=(goal,)))
             if isinstance(alone, NoPlan) and not alone.postponed:
                 left_out[goal.goal] = alone.reason
-    rest = tuple(goal for goal in problem.goals if goal.goal not in left_out)
-    if not left_out or all(goal.goal in reached for goal in rest):
+    remaining = _without(problem, left_out)
+    if left_out and _any_wanted(remaining, reached):
+        again = planner.plan(remaining)
+        if isinstance(again, CheckedPlan):
+            return PartialPlan.of(again, remaining, left_out)
+        made = again
+    if made.postponed or len(remaining.goals) < 2:
         return made
-    remaining = replace(problem, goals=rest)
-    again = planner.plan(remaining)
-    return again if isinstance(again, NoPlan) else PartialPlan.of(again, remaining, left_out)
+    against = contradictions(feasibility, remaining, reached)
+    reasons = reasons_of(against, remaining.goals)
+    compatible = _without(remaining, against)
+    if against and _any_wanted(compatible, reached):
+        again = planner.plan(compatible)
+        if isinstance(again, CheckedPlan):
+            partial = PartialPlan.of(again, compatible, left_out)
+            waiting = {goal: reasons[goal] for goal in against}
+            return replace(partial, postponed={**partial.postponed, **waiting})
+        made = again
+    return replace(made, goal_reasons={**reasons, **left_out})
+
+
+def _without(problem: PlanningProblem, goals: Container[str]) -> PlanningProblem:
+    return replace(problem, goals=tuple(g for g in problem.goals if g.goal not in goals))
+
+
+def _any_wanted(problem: PlanningProblem, reached: frozenset[str]) -> bool:
+    return any(goal.goal not in reached for goal in problem.goals)

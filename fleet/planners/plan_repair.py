@@ -86,6 +86,8 @@ def _beside(plan: Plan, other: Plan) -> Plan:
         pins={**plan.pins, **other.pins},
         conditions=tuple(dict.fromkeys([*plan.conditions, *other.conditions])),
         seeks=tuple(dict.fromkeys([*plan.seeks, *other.seeks])),
+        always=tuple(dict.fromkeys([*plan.always, *other.always])),
+        never=tuple(dict.fromkeys([*plan.never, *other.never])),
     )
 
 
@@ -103,6 +105,8 @@ def _for_goals(plan: Plan, goals: Iterable[Goal]) -> Plan:
         plan,
         goals=tuple(goal.goal for goal in wanted),
         conditions=tuple(dict.fromkeys(conditions)),
+        always=tuple(dict.fromkeys(row for goal in wanted for row in goal.always)),
+        never=tuple(dict.fromkeys(row for goal in wanted for row in goal.never)),
     )
 
 
@@ -112,7 +116,7 @@ def _broken_goals(invalid: InvalidPlan, goals: Iterable[Goal]) -> frozenset[str]
     goal_of = {task.task: task.goal for task in plan.tasks}
     wants: dict[Condition, list[str]] = {}
     for goal in goals:
-        for condition in goal.conditions:
+        for condition in (*goal.conditions, *goal.always, *goal.never):
             wants.setdefault(condition, []).append(goal.goal)
     if invalid.graph is None:
         return frozenset()

@@ -23,6 +23,7 @@ from fleet.core.events import Event, decode_event, encode_event
 from fleet.core.state import LOGIC, State
 from fleet.errors import FleetError
 from fleet.service.snapshots import KEPT, Snapshot, SnapshotFiles, decode_snapshot
+from keyexpr_schema.data_folder import usable_folder
 
 SET_ASIDE_KEPT = 1000
 """Events set aside that are remembered; the oldest are forgotten first."""
@@ -47,7 +48,7 @@ class JournalInUse(FleetError):
 
 
 class JournalUnreadable(FleetError):
-    """The journal needs another version of this program."""
+    """The journal cannot be opened, or needs another version of this program."""
 
 
 class JournalEntry(NamedTuple):
@@ -62,16 +63,18 @@ class EventJournal:
 
     Raises:
         JournalInUse: on entering, if another process has it.
+        JournalUnreadable: on entering, if the folder or the file cannot be used.
     """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        self._file = folder / "events.db"
         self._lock: TextIO | None = None
         self._snapshots = SnapshotFiles(folder)
 
     def __enter__(self) -> EventJournal:
-        self._folder.mkdir(parents=True, exist_ok=True)
-        lock = (self._folder / "lock").open("w")
+        with usable_folder(self._folder, "planner's", JournalUnreadable):
+            lock = (self._folder / "lock").open("w")
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -80,7 +83,18 @@ class EventJournal:
                 f"another planner works with {self._folder}: end it, or use another --data"
             ) from None
         self._lock = lock
-        self._db = sqlite3.connect(self._folder / "events.db", isolation_level=None)
+        try:
+            self._open()
+        except sqlite3.Error as error:
+            lock.close()
+            raise JournalUnreadable(
+                f"the journal {self._file} cannot be used ({error}): move it away, with the "
+                "snapshots beside it, to begin with an empty one"
+            ) from None
+        return self
+
+    def _open(self) -> None:
+        self._db = sqlite3.connect(self._file, isolation_level=None)
         self._db.execute("PRAGMA journal_mode=WAL")
         self._db.execute("PRAGMA synchronous=NORMAL")
         self._db.execute("PRAGMA journal_size_limit=4194304")
@@ -95,7 +109,6 @@ class EventJournal:
                 "SELECT digest FROM set_aside WHERE logic = ?", (LOGIC,)
             )
         }
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._db.close()

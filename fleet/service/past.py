@@ -10,42 +10,31 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import time
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterable
-from contextlib import AsyncExitStack, asynccontextmanager
-from sqlite3 import Connection
-from typing import Any, TypeVar
+from contextlib import asynccontextmanager
+from typing import Any
 
 from fleet.core import events
 from fleet.core.effects import Archive as ToArchive
 from fleet.core.effects import Effect, Retract, documents_of
 from fleet.core.events import Event
 from fleet.core.state import State
-from fleet.history.archive import PLAN, Archive
+from fleet.history.archive import Archive
 from fleet.history.inheritance import inherited
-from fleet.history.queries import page, stats
 from fleet.history.retention import Retention, Retirement
+from fleet.service.history_questions import HistoryQuestions, rejected
 from fleet.service.outbox import Outbox
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.key import Address
 from keyexpr_schema.keyspace import (
     GOAL_STATUS,
-    HISTORY,
-    HISTORY_STATS,
-    RETIREMENT,
 )
-from keyexpr_schema.payloads.goals import GoalAddress, GoalState
+from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.history import (
     Ended,
-    HistoryPage,
-    HistoryQuery,
-    HistoryStats,
-    HistoryStatsQuery,
     PastEntry,
     PlanRecord,
     RequestRecord,
-    Retired,
-    RetireQuery,
 )
 from keyexpr_schema.payloads.plans import PlanState, PlanStatus
 from keyexpr_schema.payloads.requests import (
@@ -55,15 +44,9 @@ from keyexpr_schema.payloads.requests import (
     PlanRequest,
     ReplanRequest,
 )
-from keyexpr_schema.payloads.system import PlannerAddress
 from keyexpr_schema.transport.session import Session
 
 Request = PlanRequest | ReplanRequest | ControlRequest
-Q = TypeVar("Q")
-R = TypeVar("R")
-RETIRED_AT_ONCE = 50
-"""Of what a person wants deleted; robotctl asks again until nothing is left."""
-EVERY = 2**62
 SETTLE_S = 5.0
 RETRY_S = 0.5
 
@@ -83,17 +66,19 @@ class Past:
     ) -> None:
         self._session, self._archive, self._outbox = session, archive, outbox
         self._state = state
-        self._retirement = Retirement(session, archive, retention or Retention(), self._rejected)
+        self._retirement = Retirement(
+            session, archive, retention or Retention(), lambda *which: rejected(state(), *which)
+        )
+        self._questions = HistoryQuestions(session, archive, self._retirement, state, self._settled)
         self._tasks: set[asyncio.Task[None]] = set()
         self._settling: set[asyncio.Task[None]] = set()
+        self._to_delete: dict[str, dict[str, events.ControlRequested]] = {}
+        """Requests, by plan and name, to delete plans that are about to be over."""
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Tell of what is over, and do what is asked about it, until the block ends."""
-        async with AsyncExitStack() as stack:
-            await stack.enter_async_context(self._session.serve(HISTORY, self._page))
-            await stack.enter_async_context(self._session.serve(HISTORY_STATS, self._stats))
-            await stack.enter_async_context(self._session.serve(RETIREMENT, self._retire))
+        async with self._questions.answered():
             try:
                 yield
             finally:
@@ -153,6 +138,9 @@ class Past:
         task = self._in_background(self._settle(record))
         self._settling.add(task)
         task.add_done_callback(self._settling.discard)
+        if isinstance(record, PlanRecord):
+            for event in self._to_delete.pop(record.spec.plan, {}).values():
+                self._in_background(self._delete(event.request, event))
 
     async def _settle(self, record: Ended) -> None:
         await self._outbox.written(d.key.build(d.address) for d in documents_of(record))
@@ -185,6 +173,9 @@ class Past:
             case events.PlanRequested() | events.ReplanRequested() | events.ControlRequested():
                 ask = event.request
                 if self._archive.answered(ask.request) or self._deal_with(ask, event, state):
+                    return None
+                if isinstance(event, events.ControlRequested) and _soon_deletable(state, ask):
+                    self._to_delete.setdefault(event.request.plan, {})[ask.request] = event
                     return None
             case _:
                 pass
@@ -259,55 +250,21 @@ class Past:
                 await asyncio.sleep(RETRY_S)
         self._answer(ask, event, True, f"plan {ask.plan} is deleted")
 
-    # --- what is asked of it ---------------------------------------------------------------------
-
-    async def _page(self, _: PlannerAddress, query: HistoryQuery) -> HistoryPage:
-        return await asyncio.to_thread(self._read, page, query)
-
-    async def _stats(self, _: PlannerAddress, query: HistoryStatsQuery) -> HistoryStats:
-        return await asyncio.to_thread(self._read, stats, query)
-
-    def _read(self, read: Callable[[Connection, Q], R], query: Q) -> R:
-        with self._archive.reading() as db:
-            return read(db, query)
-
-    async def _retire(self, _: PlannerAddress, query: RetireQuery) -> Retired:
-        """Delete keys that a person does not want to see any more, some at a time."""
-        await self._settled()
-        before_s = time.time() - query.older_than_s
-        plans = self._archive.due(PLAN, EVERY, before_s, RETIRED_AT_ONCE) if query.plans else []
-        await self._retirement.end(plans)
-        goals = list[str]()
-        if query.goals:
-            goals = [*self._archive.live_goals(before_s), *self._rejected(before_s, EVERY)]
-        now = goals[:RETIRED_AT_ONCE]
-        for goal in now:
-            await self._retirement.end_goal(goal)
-        return Retired(
-            plans=len(plans),
-            goals=sum(len(live.goals) for live in plans) + len(now),
-            left=len(plans) == RETIRED_AT_ONCE or len(goals) > len(now),
-        )
-
-    def _rejected(self, before_wall_s: float, keep: int) -> list[str]:
-        """Goals that were rejected before a Unix time [s], and all but the newest `keep`."""
-        statuses = [
-            status
-            for status in self._state().goal_states.values()
-            if status.state is GoalState.REJECTED
-        ]
-        newest_first = sorted(statuses, key=lambda s: s.wall_time_s or 0.0, reverse=True)
-        return [
-            status.goal
-            for number, status in enumerate(newest_first)
-            if number >= keep
-            or (status.wall_time_s is not None and status.wall_time_s < before_wall_s)
-        ]
-
     async def _settled(self) -> None:
         """Wait, for a while, until the keys of what is over have their last values."""
         if self._settling:
             await asyncio.wait(tuple(self._settling), timeout=SETTLE_S)
+
+
+def _soon_deletable(state: State, ask: Request) -> bool:
+    """Whether somebody wants a plan deleted that is being given up, and is over as soon as robots
+    that are there have said how they left off. Until then, the request has no answer."""
+    if not (isinstance(ask, ControlRequest) and ask.control is Control.DELETE):
+        return False
+    entry = state.plans.get(ask.plan)
+    if entry is None or not (entry.cancelling or entry.ended):
+        return False
+    return all(record.robot in state.connected for record in entry.outstanding())
 
 
 def _records(effects: Iterable[Effect]) -> list[Ended]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import signal
+import sqlite3
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -55,6 +56,12 @@ def run(
         asyncio.run(_run(endpoints, realm, data_dir, pool, skills, policy, retention))
     except (FleetError, SchemaError) as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201
+        raise SystemExit(1) from None
+    except sqlite3.Error as error:
+        print(  # noqa: T201
+            f"error: what the planner keeps in {data_dir} can be read or written no more: {error}",
+            file=sys.stderr,
+        )
         raise SystemExit(1) from None
 
 

@@ -29,6 +29,7 @@ from fleet.service.catch_up import (
     stale_documents,
     until_synced,
 )
+from fleet.service.charge import Charge
 from fleet.service.diagnostics import Diagnostics
 from fleet.service.event_journal import EventJournal
 from fleet.service.event_translation import WATCHED, event_of
@@ -49,15 +50,13 @@ from keyexpr_schema.keyspace import (
     SIM_CLOCK,
     SIM_SCENE,
 )
-from keyexpr_schema.payloads.system import PlannerAddress, PlannerAliveAddress, PlannerStatus
+from keyexpr_schema.payloads.system import PlannerAliveAddress
 from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.session import Narrowed, Session, TokenWatch, Watch
 
 SNAPSHOT_CHECK_S = 0.5
 
 log = logging.getLogger(__name__)
-CHARGE_S = 3600.0
-"""How long a planner that starts waits for a store."""
 
 
 class PlannerService:
@@ -80,6 +79,9 @@ class PlannerService:
         self._skills = dict(skills)
         self._policy = replace(policy, skill_phrases=phrases_of(skills))
         self._incarnation = uuid.uuid4().hex[:12]
+        self._charge = Charge(
+            session, self._incarnation, tuple(skills), lambda: self._core.state.epoch
+        )
         self._clock = FleetClock()
         self._outbox = Outbox(session)
         self._diagnostics = Diagnostics(session, self._outbox)
@@ -89,7 +91,6 @@ class PlannerService:
         )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
         self._held: list[Effect] | None = []
-        self._status_lost = asyncio.Event()
         """Effects held back until everything stored is known; afterwards `None`."""
 
     @property
@@ -102,6 +103,7 @@ class PlannerService:
 
         Raises:
             Superseded: a planner with a higher epoch is in charge.
+            sqlite3.Error: what it keeps can be read or written no more.
         """
         first_run = self._journal.empty
         recovered = self._core.recover(self._skills, self._past.keep)
@@ -139,14 +141,14 @@ class PlannerService:
                 ready.set()
             try:
                 async with asyncio.TaskGroup() as tasks:
-                    tasks.create_task(self._tell_what_it_can())
+                    tasks.create_task(self._charge.keep(self._pool.ready, self._epoch_raised))
                     tasks.create_task(self._listen(watch))
                     tasks.create_task(self._watch_workers(tokens))
                     tasks.create_task(self._take_events())
                     tasks.create_task(self._take_answers())
                     tasks.create_task(self._keep_snapshots())
                     tasks.create_task(self._past.delete_keys_in_time())
-            except* Superseded as group:
+            except* (Superseded, sqlite3.Error) as group:
                 raise group.exceptions[0] from None
             finally:
                 self._past.sync()
@@ -156,28 +158,13 @@ class PlannerService:
         return self._clock.at()
 
     async def _take_charge(self, first_run: bool) -> None:
-        """Take the next epoch: no two planners ever have the same, however they were started.
-
-        What is there that is no status counts for nothing: it must not keep a planner from
-        starting. Until the planning process says what it can do, what an earlier run could stands.
-        """
+        """Take the next epoch, and begin with it."""
         if first_run:
             await self._pool.ready()
-
-        def next_epoch(status: PlannerStatus | None) -> PlannerStatus:
-            return replace(
-                status or PlannerStatus(epoch=0, incarnation=self._incarnation),
-                epoch=1 + max(self.state.epoch, status.epoch if status else 0),
-                incarnation=self._incarnation,
-                skills=tuple(self._skills),
-            )
-
-        ours = await self._session.update(
-            PLANNER_STATUS, PlannerAddress(), next_epoch, timeout_s=CHARGE_S
-        )
+        epoch = await self._charge.take()
         self._apply(
             events.PlannerStarted(
-                epoch=ours.epoch,
+                epoch=epoch,
                 incarnation=self._incarnation,
                 policy=self._policy,
                 skills=self._skills,
@@ -187,29 +174,8 @@ class PlannerService:
             )
         )
 
-    async def _tell_what_it_can(self) -> None:
-        """Publish what planners and allocators there are, as soon as the planning process knows;
-        again when the store has lost the planner's status."""
-        can = await self._pool.ready()
-
-        def with_parts(status: PlannerStatus | None) -> PlannerStatus:
-            if status is not None and status.incarnation != self._incarnation:
-                return status
-            return PlannerStatus(
-                epoch=self.state.epoch,
-                incarnation=self._incarnation,
-                skills=tuple(self._skills),
-                planners=tuple(can.planners_wait_s),
-                strategies=can.strategies,
-                allocators=tuple(can.allocators_wait_s),
-            )
-
-        while True:
-            self._status_lost.clear()
-            await self._session.update(
-                PLANNER_STATUS, PlannerAddress(), with_parts, timeout_s=CHARGE_S
-            )
-            await self._status_lost.wait()
+    def _epoch_raised(self, epoch: int) -> None:
+        self._inbox.put_nowait(events.EpochRaised(epoch=epoch, **self._at()))
 
     async def _catch_up(
         self, watch: Watch, tokens: TokenWatch[Any], concluded: Collection[FactKey]
@@ -271,18 +237,13 @@ class PlannerService:
             if change.value is not None:
                 self._clock.ticked(change.value.time_s)
         elif change.key is PLANNER_STATUS:
-            other = change.value
-            if other is None:
-                self._status_lost.set()
-            elif other.epoch > self.state.epoch:
-                raise Superseded(
-                    f"planner {other.incarnation} took charge of realm "
-                    f"{self._session.config.realm} (epoch {other.epoch}); this one stops"
-                )
+            self._charge.status_changed(change.value)
         elif (event := event_of(change, self._at())) is not None:
-            if self._held is None and isinstance(event, events.ReportReceived):
+            if isinstance(event, events.ReportReceived):
                 report = event.report
-                self._clock.reported(report.ended_s or report.started_s or 0.0)
+                self._charge.reported(report)
+                if self._held is None:
+                    self._clock.reported(report.ended_s or report.started_s or 0.0)
             self._inbox.put_nowait(event)
 
     async def _watch_workers(self, tokens: TokenWatch[Any]) -> None:

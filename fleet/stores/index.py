@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import lru_cache
+from heapq import merge
+from operator import itemgetter
 from typing import Any
 
 from keyexpr_schema.transport.store.storage import Write
@@ -45,55 +47,121 @@ def matcher(*patterns: str) -> re.Pattern[str]:
     return re.compile("|".join(wholes))
 
 
+class _Changes:
+    """The newest changes of some keys: by key, and in the order of their numbers."""
+
+    def __init__(self) -> None:
+        self._of: dict[str, Numbered] = {}
+        self._numbers: list[int] = []
+        self._keys: list[str] = []
+
+    def __len__(self) -> int:
+        return len(self._of)
+
+    @property
+    def in_order(self) -> int:
+        """Changes held in order, with those replaced since that were not tidied away yet."""
+        return len(self._numbers)
+
+    def get(self, keyexpr: str) -> Numbered | None:
+        return self._of.get(keyexpr)
+
+    def set(self, number: int, write: Write) -> bool:
+        """Keep the newest change of all; whether it is of a key that was not here."""
+        fresh = write.keyexpr not in self._of
+        self._of[write.keyexpr] = (number, write)
+        self._numbers.append(number)
+        self._keys.append(write.keyexpr)
+        self._tidy()
+        return fresh
+
+    def drop(self, keyexpr: str) -> bool:
+        """Whether the key was here."""
+        there = self._of.pop(keyexpr, None) is not None
+        if there:
+            self._tidy()
+        return there
+
+    def count_after(self, number: int) -> int:
+        """How many changes `after` would look at."""
+        return len(self._numbers) - bisect_right(self._numbers, number)
+
+    def after(self, number: int) -> Iterator[Numbered]:
+        """The changes above a number, in order."""
+        for at in range(bisect_right(self._numbers, number), len(self._numbers)):
+            found = self._of.get(self._keys[at])
+            if found is not None and found[0] == self._numbers[at]:
+                yield found
+
+    def _tidy(self) -> None:
+        """Drop what later changes of the same keys have replaced."""
+        if len(self._numbers) <= 2 * len(self._of) + _WORTH_TIDYING:
+            return
+        kept = list(self.after(0))
+        self._numbers = [number for number, _ in kept]
+        self._keys = [write.keyexpr for _, write in kept]
+
+
 class Index:
-    """The newest write of every key, deletions included, in buckets by the first chunks.
+    """The newest write of every key, deletions included; values in buckets by the first chunks.
 
     A pattern looks only into the buckets of keys that it can match, so that the orders of all
-    robots are found without a look at their reports. `last` is the number of the newest change.
+    robots are found without a look at their reports, and at no key that is deleted. `last` is the
+    number of the newest change.
     """
 
     def __init__(self, last: int = 0) -> None:
-        self._entries: dict[str, Numbered] = {}
+        self._values, self._tombstones = _Changes(), _Changes()
         self._root: dict[str, Any] = {}
-        self._numbers: list[int] = []
-        self._keys: list[str] = []
         self.last = last
 
     def __len__(self) -> int:
-        return len(self._entries)
+        return len(self._values) + len(self._tombstones)
 
     @property
     def remembered(self) -> int:
         """Changes held in order, with those replaced since that were not tidied away yet."""
-        return len(self._numbers)
+        return self._values.in_order + self._tombstones.in_order
+
+    @property
+    def tombstones(self) -> int:
+        """How many deletions are remembered."""
+        return len(self._tombstones)
+
+    def _find(self, keyexpr: str) -> Numbered | None:
+        return self._values.get(keyexpr) or self._tombstones.get(keyexpr)
 
     def get(self, keyexpr: str) -> Write | None:
         """The newest write of a key: its value, or its tombstone."""
-        found = self._entries.get(keyexpr)
+        found = self._find(keyexpr)
         return found[1] if found is not None else None
 
     def number(self, keyexpr: str) -> int:
         """The number of the newest change of a key; 0: there is none."""
-        return self._entries[keyexpr][0] if keyexpr in self._entries else 0
+        found = self._find(keyexpr)
+        return found[0] if found is not None else 0
 
     def set(self, number: int, write: Write) -> None:
-        """Keep `write`, the change of that number, as the newest of its key."""
-        keyexpr = write.keyexpr
-        if keyexpr not in self._entries:
-            node = self._root
-            for chunk in _path(keyexpr):
-                node = node.setdefault(chunk, {})
-            node[keyexpr] = None
-        self._entries[keyexpr] = (number, write)
-        self._numbers.append(number)
-        self._keys.append(keyexpr)
+        """Keep `write`, the newest change of all, as that of its key."""
         self.last = max(self.last, number)
-        if len(self._numbers) > 2 * len(self._entries) + _WORTH_TIDYING:
-            self._tidy()
+        if write.deleted:
+            self._drop_value(write.keyexpr)
+            self._tombstones.set(number, write)
+            return
+        self._tombstones.drop(write.keyexpr)
+        if self._values.set(number, write):
+            node = self._root
+            for chunk in _path(write.keyexpr):
+                node = node.setdefault(chunk, {})
+            node[write.keyexpr] = None
 
     def forget(self, keyexpr: str) -> None:
         """Know nothing of a key any more."""
-        if self._entries.pop(keyexpr, None) is None:
+        if not self._tombstones.drop(keyexpr):
+            self._drop_value(keyexpr)
+
+    def _drop_value(self, keyexpr: str) -> None:
+        if not self._values.drop(keyexpr):
             return
         path = _path(keyexpr)
         nodes = [self._root]
@@ -108,11 +176,10 @@ class Index:
     def matching(self, pattern: str) -> list[Write]:
         """The values of every key that `pattern` matches, in order of key."""
         if "*" not in pattern:
-            found = self.get(pattern)
-            return [found] if found is not None and not found.deleted else []
-        fits = matcher(pattern).fullmatch
-        keys = (k for bucket in self._buckets(pattern) for k in bucket if fits("/" + k))
-        return [write for key in sorted(keys) if not (write := self._entries[key][1]).deleted]
+            found = self._values.get(pattern)
+            return [found[1]] if found is not None else []
+        entries = [(write.keyexpr, write) for _, write in self._in_buckets([pattern])]
+        return [write for _, write in sorted(entries, key=itemgetter(0))]
 
     def since(
         self, patterns: Sequence[str], after: int, limit: int, ignored: int
@@ -124,9 +191,10 @@ class Index:
         """
         taken: list[Numbered] = []
         size = 0
-        for number, write in self._newer(patterns, after):
-            if write.deleted and number <= ignored:
-                continue
+        fits = matcher(*patterns).fullmatch
+        deleted = self._tombstones.after(max(after, ignored))
+        gone = (change for change in deleted if fits("/" + change[1].keyexpr))
+        for number, write in merge(self._newer(patterns, after), gone, key=itemgetter(0)):
             if len(taken) >= limit or size > MAX_BYTES:
                 return taken, True
             taken.append((number, write))
@@ -134,19 +202,25 @@ class Index:
         return taken, False
 
     def _newer(self, patterns: Sequence[str], after: int) -> Iterator[Numbered]:
-        """Goes through the changes or through the buckets, whichever are fewer."""
+        """Values; goes through the changes or through the buckets, whichever are fewer."""
+        buckets = self._all_buckets(patterns)
+        if self._values.count_after(after) <= 2 * sum(map(len, buckets)):
+            fits = matcher(*patterns).fullmatch
+            return (c for c in self._values.after(after) if fits("/" + c[1].keyexpr))
+        found = (change for change in self._in_buckets(patterns) if change[0] > after)
+        return iter(sorted(found, key=itemgetter(0)))
+
+    def _in_buckets(self, patterns: Sequence[str]) -> Iterator[Numbered]:
         fits = matcher(*patterns).fullmatch
-        start = bisect_right(self._numbers, after)
-        buckets = {id(b): b for pattern in patterns for b in self._buckets(pattern)}.values()
-        if len(self._numbers) - start <= 2 * sum(map(len, buckets)):
-            for at in range(start, len(self._numbers)):
-                keyexpr = self._keys[at]
-                found = self._entries.get(keyexpr)
-                if found is not None and found[0] == self._numbers[at] and fits("/" + keyexpr):
+        for bucket in self._all_buckets(patterns):
+            for keyexpr in bucket:
+                if fits("/" + keyexpr):
+                    found = self._values.get(keyexpr)
+                    assert found is not None
                     yield found
-            return
-        entries = (self._entries[key] for b in buckets for key in b if fits("/" + key))
-        yield from sorted((e for e in entries if e[0] > after), key=lambda entry: entry[0])
+
+    def _all_buckets(self, patterns: Sequence[str]) -> Collection[dict[str, None]]:
+        return {id(b): b for pattern in patterns for b in self._buckets(pattern)}.values()
 
     def _buckets(self, pattern: str) -> list[dict[str, None]]:
         chunks = pattern.split("/")
@@ -160,16 +234,6 @@ class Index:
             else:
                 nodes = [node[chunk] for node in nodes if chunk in node]
         return nodes
-
-    def _tidy(self) -> None:
-        """Drop what later changes of the same keys have replaced."""
-        kept = [
-            (number, keyexpr)
-            for number, keyexpr in zip(self._numbers, self._keys, strict=True)
-            if keyexpr in self._entries and self._entries[keyexpr][0] == number
-        ]
-        self._numbers = [number for number, _ in kept]
-        self._keys = [keyexpr for _, keyexpr in kept]
 
 
 def _path(keyexpr: str) -> list[str]:

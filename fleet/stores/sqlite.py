@@ -8,6 +8,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice, takewhile
 from pathlib import Path
@@ -17,7 +18,15 @@ from typing import Literal, Self
 from fleet.errors import StoreError
 from fleet.stores.index import Index
 from fleet.stores.journal import StoreJournal
-from fleet.stores.state_file import blob_of, forgotten_of, identity_of, open_file, take_lock
+from fleet.stores.state_file import (
+    PAGES_AT_ONCE,
+    blob_of,
+    forgotten_of,
+    identity_of,
+    open_file,
+    shrink,
+    take_lock,
+)
 from keyexpr_schema.transport.store.storage import (
     AppliedWrite,
     Changes,
@@ -37,11 +46,15 @@ class StoreMemory:
     A tombstone keeps an older value from coming back that arrives late: from a writer that tries
     again, or whose clock is behind. So it must outlive both by far, and clocks that differ by days
     are seen and set right; somebody who has not looked for longer than that lists everything anew.
-    The journal is for people who ask what happened, and for earlier revisions of plans.
+    They are in memory, so a busy store forgets the oldest of more than `tombstones`.
+    The journal is for people who ask what happened, and for earlier revisions of plans. What it
+    takes in the file is its keys and values, and as much as a tenth besides.
     """
 
     journal_entries: int = 100_000
+    journal_mb: float = 32.0
     journal_days: float = 30.0
+    tombstones: int = 50_000
     tombstone_days: float = 7.0
 
 
@@ -67,7 +80,7 @@ class SqliteStore:
     ) -> None:
         memory = memory or StoreMemory()
         self._wall_time_s = wall_time_s
-        self._tombstone_s = memory.tombstone_days * _DAY_S
+        self._memory = memory
         self._lock = threading.Lock()
         self._guard = take_lock(data_dir)
         path = data_dir / "state.sqlite"
@@ -78,7 +91,11 @@ class SqliteStore:
             self._tombstones: deque[tuple[float, int, str]] = deque()
             self._index = self._load()
             self._journal = StoreJournal(
-                self._db, path, memory.journal_entries, memory.journal_days * _DAY_S
+                self._db,
+                path,
+                entries=memory.journal_entries,
+                size_bytes=memory.journal_mb * 2**20,
+                age_s=memory.journal_days * _DAY_S,
             )
         except sqlite3.Error as error:
             os.close(self._guard)
@@ -128,12 +145,12 @@ class SqliteStore:
                             for n, w in fresh
                         ],
                     )
-                    self._journal.add(journaled, now_s)
+                    pruned = self._journal.add(journaled, now_s)
                     faded = self._fade(now_s)
             except sqlite3.Error as error:
                 raise StoreError(f"the store could not write: {error}") from error
             # Only now: what a reader sees must be durable.
-            self._journal.added(len(journaled))
+            self._journal.added()
             for number, write in fresh:
                 self._index.set(number, write)
                 if write.deleted:
@@ -143,6 +160,9 @@ class SqliteStore:
                 if self._index.number(keyexpr) == number:
                     self._index.forget(keyexpr)
                 self._forgotten = max(self._forgotten, number)
+            if pruned:
+                with suppress(sqlite3.Error):  # another time will do
+                    shrink(self._db, PAGES_AT_ONCE)
             return len(changes)
 
     def _decide(self, batch: Sequence[Write]) -> list[Write]:
@@ -172,9 +192,13 @@ class SqliteStore:
         ]
 
     def _fade(self, now_s: float) -> list[tuple[int, str]]:
-        """Delete from the file the tombstones that are old enough, some at a time: which."""
-        old = takewhile(lambda each: each[0] < now_s - self._tombstone_s, self._tombstones)
-        faded = [(number, keyexpr) for _, number, keyexpr in islice(old, _AT_ONCE)]
+        """Delete from the file tombstones that are too old or too many, some at a time: which."""
+        before_s = now_s - self._memory.tombstone_days * _DAY_S
+        spare = len(self._tombstones) - self._memory.tombstones
+        old = takewhile(
+            lambda each: each[0] < spare or each[1][0] < before_s, enumerate(self._tombstones)
+        )
+        faded = [(number, keyexpr) for _, (_, number, keyexpr) in islice(old, _AT_ONCE)]
         if faded:
             self._db.executemany("DELETE FROM latest WHERE number = ? AND keyexpr = ?", faded)
             self._db.execute(

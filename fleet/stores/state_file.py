@@ -13,8 +13,16 @@ import uuid
 from pathlib import Path
 
 from fleet.errors import StoreError, StoreInUse
+from keyexpr_schema.data_folder import usable_folder
 
 FORMAT = 2
+PAGES_AT_ONCE = 256
+"""So many unused pages are given back at a time while the store is in use: a millisecond or two."""
+_PAGES_WORTH_IT = 1000
+"""A file with so many unused pages, more than are in use, is worth making smaller."""
+_WAL_BYTES = 4_194_304
+"""What is left of a write-ahead log that was larger for once."""
+_INCREMENTAL = 2
 _STAMP_BYTES = 24
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 _LATEST = """
@@ -50,13 +58,8 @@ def take_lock(data_dir: Path) -> int:
         StoreInUse: another process has it.
         StoreError: the directory cannot be used.
     """
-    try:
-        data_dir.mkdir(parents=True, exist_ok=True)
+    with usable_folder(data_dir, "store", StoreError):
         guard = os.open(data_dir / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-    except OSError as error:
-        raise StoreError(
-            f"the store directory {data_dir} cannot be used: {error.strerror}"
-        ) from None
     try:
         # The kernel drops the lock with the process, however it ends.
         fcntl.flock(guard, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -84,15 +87,38 @@ def open_file(path: Path, synchronous: str) -> sqlite3.Connection:
                 f"the store {path} has format {version}, but this program knows formats up to "
                 f"{FORMAT}: update it"
             )
+        db.execute(f"PRAGMA auto_vacuum = {_INCREMENTAL}")  # of a file that is new
         db.execute("PRAGMA journal_mode = WAL")
+        db.execute(f"PRAGMA journal_size_limit = {_WAL_BYTES}")
         db.execute(f"PRAGMA synchronous = {synchronous}")
         if version == 1:
             _number_the_latest(db)
         db.executescript(_TABLES)
+        shrink(db)
     except BaseException:
         db.close()
         raise
     return db
+
+
+def shrink(db: sqlite3.Connection, pages: int | None = None) -> None:
+    """Give the file system pages back that are not used, if there are more than are used.
+
+    At most so many `pages`; None: all, which takes as long as what is in use takes to copy. Other
+    unused pages are used again. Files of earlier versions can only give back all at once. Not in a
+    transaction.
+    """
+    (unused,) = db.execute("PRAGMA freelist_count").fetchone()
+    (there,) = db.execute("PRAGMA page_count").fetchone()
+    if unused < _PAGES_WORTH_IT or 2 * unused < there:
+        return
+    (mode,) = db.execute("PRAGMA auto_vacuum").fetchone()
+    if pages is None and mode != _INCREMENTAL:
+        db.execute(f"PRAGMA auto_vacuum = {_INCREMENTAL}")
+        db.execute("VACUUM")
+    elif mode == _INCREMENTAL:
+        # Not by `execute`, which takes one step, of one page.
+        db.executescript(f"PRAGMA incremental_vacuum({pages or unused})")
 
 
 def _number_the_latest(db: sqlite3.Connection) -> None:

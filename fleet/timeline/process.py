@@ -29,7 +29,10 @@ LIVE_FLUSH_S = 0.25
 BACKLOG_S = 2.0
 """Values are put in the order of their timestamps for so long, if they do not cease before."""
 
-IDLE_S = 0.05
+COLLECT_S = 0.1
+"""Values are taken together, every so often: nobody waits for them."""
+
+IDLE_S = 2 * COLLECT_S
 
 
 def _print_line(sentence: str) -> None:
@@ -77,7 +80,7 @@ async def _record(config: SessionConfig, out: Path, view: bool, files: RollingFi
             if port is not None:
                 shown = _show(port)
             try:
-                async with session.watch(*RECORDED) as watch:
+                async with session.watch(*RECORDED, collect_s=COLLECT_S) as watch:
                     _print_line(f"recording to {first}")
                     await _follow(watch, recorder, view, lambda: _roll(recorder, files, name))
             finally:

@@ -124,7 +124,7 @@ def _chunks(path: Path) -> Iterator[Any]:
         raise UnreadableRecording(f"there is no recording at {path}")
     try:
         with warnings.catch_warnings():
-            # A recorder that was killed could not write the table of contents; the rest is good.
+            # The recorder writes none; the rest is good.
             warnings.filterwarnings("ignore", message="RRD file has no footer")
             reader = RrdReader(path)
         yield from reader.stream()

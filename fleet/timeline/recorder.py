@@ -15,6 +15,7 @@ import rerun as rr
 from fleet.timeline.clock import Clock, wall_of
 from fleet.timeline.drawing.palette import Palette
 from fleet.timeline.drawing.picture import Picture
+from fleet.timeline.drawing.sink import end_unused_streams
 from fleet.timeline.known import Known
 from keyexpr_schema.key import Key
 from keyexpr_schema.keyspace import (
@@ -83,6 +84,11 @@ class Recorder:
         return len(self._known) + len(self._picture)
 
     @property
+    def calls(self) -> int:
+        """How often something was handed to Rerun for this recording."""
+        return self._picture.calls
+
+    @property
     def now_s(self) -> float:
         """Fleet time [s] of the newest value."""
         return self._clock.now_s
@@ -146,6 +152,7 @@ class Recorder:
         """Close this recording and go on in another; it begins with what is known now."""
         self._picture.close()
         self._picture = Picture(stream, self._clock, self._palette)
+        end_unused_streams()
         now_s, wall_s = self._clock.now_s, time.time()
         for (key, _), value in self._known:
             self._picture.show_known(key, value, now_s, wall_s)

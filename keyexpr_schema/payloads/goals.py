@@ -46,6 +46,7 @@ class Goal(Payload, frozen=True, kw_only=True):
     the fleet's clock [s]; plans are made so that goals are as little late as can be. `said_s` is
     when it was said, on the same clock; 0: it does not say. The same words said again later, after
     the goal was deleted, are another wish. `speaker` is the person who says it: "me" in the text.
+    `always` must hold all the time until it is reached, and of `never` nothing may.
     """
 
     goal: Id
@@ -57,6 +58,8 @@ class Goal(Payload, frozen=True, kw_only=True):
     due_s: float | None = None
     said_s: float = 0.0
     speaker: Id | None = None
+    always: tuple[Condition, ...] = ()
+    never: tuple[Condition, ...] = ()
 
 
 class GoalState(str, Enum):

@@ -66,7 +66,7 @@ class Detection(Payload, frozen=True, kw_only=True):
     object: Id
     kind: Id
     point_m: PointM
-    """Centre of the object's base; of furniture, of its footprint."""
+    """Centre of the object's base; of furniture, where one comes up to it to look into it."""
     place: Id | None = None
     support: str = "floor"
     """What it lies on or in directly: `floor`, a surface, a thing, or a robot (in its basket)."""

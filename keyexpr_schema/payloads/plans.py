@@ -62,7 +62,8 @@ class Plan(Payload, frozen=True, kw_only=True):
     """Goals, tasks, dependencies and actors.
 
     `revision` counts replans of the same plan from 1. `made_by` names planner and strategy.
-    `conditions` are the facts that hold when the plan is done, goal by goal.
+    `conditions` are the facts that hold when the plan is done, goal by goal; `always` hold
+    before and after each of its tasks, and `never` at no such time.
     `pins` maps actors to the robot that they must be; every other actor is free to allocate.
     """
 
@@ -79,6 +80,8 @@ class Plan(Payload, frozen=True, kw_only=True):
     making: Making = Making()
     seeks: tuple[Id, ...] = ()
     """Objects that this plan only looks for; once one is found, a new revision goes on."""
+    always: tuple[Condition, ...] = ()
+    never: tuple[Condition, ...] = ()
 
     @property
     def actors(self) -> tuple[str, ...]:

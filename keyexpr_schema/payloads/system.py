@@ -16,6 +16,10 @@ class PlannerAliveAddress(Address, frozen=True):
     incarnation: str
 
 
+LARGEST_EPOCH = 2**53
+"""One that is higher was not counted up to by any planner, and counts for nothing."""
+
+
 class PlannerStatus(Payload, frozen=True, kw_only=True):
     """Who plans in this realm. A planner that sees a higher `epoch` than its own stops."""
 

@@ -146,7 +146,8 @@ class Report(Payload, frozen=True, kw_only=True):
 
     `facts` are what the attempt changed or discovered. `retryable` says whether the same order
     could succeed if it were given again. `planner` is that of the attempt's order: a planner hears
-    reports of its own lineage, and those that name none.
+    reports of its own lineage, and those that name none. `fence` is set where the order was refused
+    because its epoch is too low: the highest that the worker has had orders of.
     """
 
     robot: Id
@@ -164,3 +165,4 @@ class Report(Payload, frozen=True, kw_only=True):
     started_s: float | None = None
     ended_s: float | None = None
     planner: Id | None = None
+    fence: int = 0

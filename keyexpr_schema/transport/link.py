@@ -14,16 +14,22 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 import zenoh
 from zenoh import handlers
 
+from keyexpr_schema.transport.hand_over import HandOver
 from keyexpr_schema.transport.router_presence import RouterPresence
 from keyexpr_schema.transport.samples import Encoded, Sample, read_sample
 
 _T = TypeVar("_T")
 _log = logging.getLogger(__name__)
+
+COLLECTED = 4096
+"""So many values of one subscription wait to be collected; of more the oldest are dropped. Zenoh
+makes room for all of them, a quarter of a kB each."""
 
 _TIMED_OUT = b"Timeout"
 """What Zenoh puts into the error reply of a query that ran into its timeout."""
@@ -90,6 +96,7 @@ class Link:
         self._session = session
         self._executor = executor
         self._loop = asyncio.get_running_loop()
+        self._call_soon = HandOver(self._loop)
         self.router = RouterPresence()
         self._events = session.info.declare_transport_events_listener(
             handlers.Callback(self._on_transport, indirect=False), history=True
@@ -101,14 +108,6 @@ class Link:
             self._call_soon(self.router.count, str(event.transport.zid), opened)
 
     # --- threads ---------------------------------------------------------------------------------
-
-    def _call_soon(self, function: Callable[..., object], *args: Any) -> bool:
-        """Call `function(*args)` soon on the loop, from any thread; whether the loop still runs."""
-        try:
-            self._loop.call_soon_threadsafe(function, *args)
-        except RuntimeError:
-            return False
-        return True
 
     async def call(self, function: Callable[..., _T], *args: Any) -> _T:
         """Run a blocking Zenoh call on the link's thread, after those made before it."""
@@ -250,17 +249,50 @@ class Link:
             lambda: self._session.liveliness().declare_subscriber(keyexpr, callback, history=True)
         )
 
+    @asynccontextmanager
+    async def collected(
+        self, receivers: Sequence[tuple[str, Callable[[Sample], None]]]
+    ) -> AsyncIterator[Callable[[], bool]]:
+        """Subscribe to key expressions; values wait until the function that this yields is called.
+
+        It passes on all that wait, by their timestamps, and says whether some may be lost. Zenoh's
+        threads wait for no Python, and the loop is not woken for each value: for those who are in
+        no hurry, and ask for what they missed.
+        """
+        async with contextlib.AsyncExitStack() as stack:
+            subscribers = []
+            for keyexpr, receive in receivers:
+                declare = partial(
+                    self._session.declare_subscriber, keyexpr, handlers.RingChannel(COLLECTED)
+                )
+                subscribers.append(
+                    (await stack.enter_async_context(self._declared(declare)), receive)
+                )
+
+            def collect() -> bool:
+                lost = False
+                waiting: list[tuple[Sample, Callable[[Sample], None]]] = []
+                for subscriber, receive in subscribers:
+                    had = len(waiting)
+                    while (sample := subscriber.try_recv()) is not None:
+                        waiting.append((read_sample(sample), receive))
+                    lost |= len(waiting) - had >= COLLECTED
+                for value, receive in sorted(waiting, key=lambda one: one[0].stamp):
+                    receive(value)
+                return lost
+
+            yield collect
+
     def _callback(self, receive: Callable[[Sample], None]) -> Any:
         return handlers.Callback(
             lambda sample: self._call_soon(receive, read_sample(sample)), indirect=False
         )
 
     @asynccontextmanager
-    async def _declared(self, declare: Callable[[], Any]) -> AsyncIterator[None]:
+    async def _declared(self, declare: Callable[[], Any]) -> AsyncIterator[Any]:
         future = self._executor.submit(declare)
         try:
-            await asyncio.wrap_future(future)
-            yield
+            yield await asyncio.wrap_future(future)
         finally:
             # The declaration may have happened although its waiter was cancelled.
             future.cancel()

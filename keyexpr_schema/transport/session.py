@@ -253,12 +253,14 @@ class Session:
         *selections: Key[Any, Any] | tuple[Key[Any, Any], dict[str, str | int]] | Narrowed,
         known: Iterable[tuple[Key[Any, Any], Address]] = (),
         on_trouble: Callable[[str | None], None] | None = None,
+        collect_s: float | None = None,
     ) -> AbstractAsyncContextManager[Watch]:
         """Watch keys, or `(key, {field: value})`: first all that is stored, then what changes.
 
         `known` are keys that had a value when it was looked last: those that have none any more
         are shown as deleted. `on_trouble` hears why what is stored cannot be read, and None when
-        it can be again.
+        it can be again. Where nobody is in a hurry, `collect_s` saves much: what came is taken
+        together, every so many seconds, by its timestamps.
         """
         patterns: list[tuple[Key[Any, Any], str, Narrowed | None]] = []
         for selection in selections:
@@ -270,7 +272,7 @@ class Session:
             patterns.append((key, key.pattern(**fixed), narrowed))
             self._trace.note("watch", key, key.pattern(**fixed))
         return Watch(
-            self.link, self._store, self._undecodable, patterns, known, on_trouble
+            self.link, self._store, self._undecodable, patterns, known, on_trouble, collect_s
         ).running()
 
     # --- tokens ----------------------------------------------------------------------------------

@@ -47,7 +47,8 @@ class Watch(ChangeStream[Change[Any, Any]]):
 
     Values of `STREAM` and `LATEST` keys that were not taken yet are replaced by newer ones of the
     same key; of other keys every change that was seen is delivered. `on_trouble` hears why the
-    stored values cannot be read, once for each spell, and None when they can be again.
+    stored values cannot be read, once for each spell, and None when they can be again. Values are
+    collected every `collect_s`, if that is given, instead of one by one.
     """
 
     def __init__(
@@ -58,8 +59,10 @@ class Watch(ChangeStream[Change[Any, Any]]):
         selections: Sequence[tuple[Key[Any, Any], str, Narrowed | None]],
         known: Iterable[tuple[Key[Any, Any], Address]] = (),
         on_trouble: Callable[[str | None], None] | None = None,
+        collect_s: float | None = None,
     ) -> None:
         super().__init__()
+        self._collect_s = collect_s
         self._link, self._store = link, store
         self._selections = [
             Selection(*selection, undecodable, self._deliver, self.relist)
@@ -101,12 +104,22 @@ class Watch(ChangeStream[Change[Any, Any]]):
     async def running(self) -> AsyncIterator[Watch]:
         """Subscribe, then list and keep up to date, until the block ends."""
         async with AsyncExitStack() as stack:
-            for selection in self._selections:
-                await stack.enter_async_context(
-                    self._link.subscribed(selection.pattern, selection.offer)
-                )
+            receivers = [(selection.pattern, selection.offer) for selection in self._selections]
+            if self._collect_s is None:
+                for receiver in receivers:
+                    await stack.enter_async_context(self._link.subscribed(*receiver))
+            else:
+                collect = await stack.enter_async_context(self._link.collected(receivers))
+                collecting = self._collect(collect, self._collect_s)
+                await stack.enter_async_context(self._in_background(collecting))
             stack.enter_context(self._link.router.listening(self.relist))
             yield await stack.enter_async_context(self._in_background(self._keep_up_to_date()))
+
+    async def _collect(self, collect: Callable[[], bool], every_s: float) -> None:
+        while True:
+            if collect():
+                self.relist()
+            await asyncio.sleep(every_s)
 
     async def _keep_up_to_date(self) -> None:
         if not self._stored:

@@ -21,6 +21,7 @@ HANDLE_MOST_M = 0.74
 """No handle is higher: hands get to 0.8 m."""
 DOOR_OPEN_RAD = 2.0
 DRAWER_OPEN_M = 0.28
+DRAWER_DEEP_M = 0.15
 PALM_M = (0.0, -0.34, 0.78)
 """Where a person holds out a hand: the middle of its palm."""
 BUTTON_HALF_M = 0.025
@@ -212,8 +213,9 @@ def _drawers(name: str, entry: FurnitureEntry, hx: float, hy: float, height: flo
     for number in range(1, count + 1):
         thing = drawer_name(name, number)
         bottom = high - number * pitch
-        half_wall = min(0.5 * pitch - 0.03, 0.05)
-        floor = bottom + 0.02
+        # No deeper below its front's edge than a hand gets in over that.
+        floor = bottom + max(0.02, pitch - DRAWER_DEEP_M)
+        half_wall = min((bottom + pitch - floor) / 2 - 0.02, 0.04)
         # A hand comes from above, with its arm to the left: lower handles are farther left.
         aside = ((count + 1) / 2 - number) * min(0.2, (2 * hx - 0.2) / count)
         handle = (aside, -hy - PANEL_M - STANDOFF_M, bottom + pitch / 2)
@@ -243,7 +245,7 @@ def _drawers(name: str, entry: FurnitureEntry, hx: float, hy: float, height: flo
                     Carrier(
                         thing,
                         (0, -0.005, floor),
-                        (2 * inner_x - 0.02, 2 * deep - 0.02, pitch - 0.03),
+                        (2 * inner_x - 0.02, 2 * deep - 0.02, bottom + pitch - floor),
                         inside=True,
                     ),
                 ),

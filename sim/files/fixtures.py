@@ -17,6 +17,7 @@ from sim.files.furniture_schema import Rgba
 PANEL_M = 0.02
 ROOF_M = 0.05
 """What is not deeper than this below the top of a piece of furniture lies on it."""
+BEHIND_FRONT_M = 0.12
 
 Look = Literal["wood", "dark", "front", "metal", "block", "soft", "light", "skin", "cloth", "hair"]
 COLOURS: dict[Look, Rgba] = {
@@ -203,6 +204,15 @@ class Fixtures:
         """
         fixture, mover = self.movers[thing]
         return fixture.point_m(mover.moved_m(local_m, opening * mover.open_at))
+
+    def face_m(self, thing: str, opening: float) -> PointM:
+        """The point of a fixture or a part that one comes up to in order to see how it is: where
+        things are in it, a little behind its front; else the middle of its footprint."""
+        if thing in self.carriers:
+            carrier = self.carriers[thing][1]
+            across = min(0.0, BEHIND_FRONT_M - carrier.size_m[1] / 2) if carrier.roofed else 0.0
+            return self.carrier_point_m(thing, 0.0, across, opening)
+        return (*self.by_name[thing].center_m, 0.0)
 
     def carrier_point_m(
         self, thing: str, along_m: float, across_m: float, opening: float = 0.0

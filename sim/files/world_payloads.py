@@ -9,7 +9,7 @@ from sim.files.fixtures import Fixture
 from sim.files.world_schema import WorldFile
 from sim.navigation.travel import travel_m
 
-_KINDS = {"drawers": "dresser"}
+_KINDS = {"drawers": "dresser", "block": "furniture"}
 """What a piece of furniture is called that has another name in files."""
 _NUMERALS = ("first", "second", "third", "fourth", "fifth", "sixth")
 
@@ -31,12 +31,6 @@ def place_payloads(world: WorldFile) -> tuple[Place, ...]:
 
 
 def object_payloads(world: WorldFile) -> tuple[Object, ...]:
-    """The things as they are registered: all but plain furniture (`PLAIN`)."""
-    plain = {name for name, item in world.furniture.items() if item.kind in PLAIN}
-    return tuple(thing for thing in all_things(world) if thing.object not in plain)
-
-
-def all_things(world: WorldFile) -> tuple[Object, ...]:
     """The things: what they are, and not where. Movable ones first, then furniture and people."""
     counts: dict[str, int] = {}
 
@@ -68,10 +62,6 @@ def all_things(world: WorldFile) -> tuple[Object, ...]:
         for thing in (_fixture(world, fixture), *_parts(world, fixture)):
             found.append(msgspec.structs.replace(thing, ordinal=ordinal(thing.kind)))
     return tuple(found)
-
-
-PLAIN = ("table", "block")
-"""Furniture that is only a surface of its place, or in the way: no thing of its own."""
 
 
 def _fixture(world: WorldFile, fixture: Fixture) -> Object:

@@ -8,15 +8,11 @@ from collections.abc import Mapping
 from keyexpr_schema.payloads.motions import PointM
 from keyexpr_schema.payloads.robots import PoseMRad
 from keyexpr_schema.payloads.simulation import Body, Frame, QuaternionWxyz, Scene, Shape, ShapeKind
-from sim.files.solids import solids
+from sim.files.solids import walls
 from sim.files.world_schema import WorldFile
 
 _UPRIGHT: QuaternionWxyz = (1.0, 0.0, 0.0, 0.0)
-_COLOURS = {
-    "wall": (0.85, 0.85, 0.82, 1.0),
-    "table": (0.65, 0.48, 0.32, 1.0),
-    "block": (0.55, 0.58, 0.6, 1.0),
-}
+_WALL = (0.85, 0.85, 0.82, 1.0)
 _ROBOT = (0.2, 0.5, 0.55, 1.0)
 _ROBOT_SIZE_M = (0.2, 0.25, 0.0)  # radius, half-height
 
@@ -25,11 +21,25 @@ def draw_scene(world: WorldFile, robots: tuple[str, ...]) -> Scene:
     """The shapes of walls, furniture, robots and objects."""
     bodies: list[Body] = []
     fixed: dict[str, tuple[PointM, QuaternionWxyz]] = {}
-    for solid in solids(world):
+    for solid in walls(world):
         size = (solid.half_m[0], solid.half_m[1], solid.height_m / 2)
-        colour = _COLOURS.get(solid.kind, _COLOURS["block"])
-        bodies.append(_body(solid.name, None, ShapeKind.BOX, size, colour))
+        bodies.append(_body(solid.name, None, ShapeKind.BOX, size, _WALL))
         fixed[solid.name] = ((*solid.center_m, 0.0), _turned(solid.yaw_rad))
+    for fixture in world.fixtures.by_name.values():
+        # Doors and drawers are drawn closed.
+        panels = (*fixture.panels, *(p for mover in fixture.movers for p in mover.panels))
+        shapes = tuple(
+            Shape(
+                kind=ShapeKind(panel.shape),
+                size_m=panel.half_m,
+                point_m=panel.center_m,
+                quaternion_wxyz=_UPRIGHT,
+                rgba=fixture.colour(panel),
+            )
+            for panel in panels
+        )
+        bodies.append(Body(body=fixture.name, owner=None, shapes=shapes))
+        fixed[fixture.name] = ((*fixture.center_m, 0.0), _turned(fixture.yaw_rad))
     bodies += [_body(name, name, ShapeKind.CYLINDER, _ROBOT_SIZE_M, _ROBOT) for name in robots]
     for name, entry in world.object_entries.items():
         kind = world.kind_of(name)

@@ -85,12 +85,12 @@ class KinematicState(Whereabouts):
     def _look(self, me: KinematicRobot, time_s: float) -> tuple[Detection, ...]:
         place = self.world.place_at(*me.pose[:2])
 
-        def seen(name: str, kind: str, point: PointM, support: str) -> bool:
+        def see(name: str, kind: str, point: PointM, support: str) -> None:
             if (
                 math.dist(point[:2], me.pose[:2]) > me.capabilities.get("see", 0.0)
                 or self.world.place_at(*point[:2]) != place
             ):
-                return False
+                return
             found.append(
                 Detection(
                     object=name,
@@ -101,15 +101,14 @@ class KinematicState(Whereabouts):
                     states=self.states.of(name),
                 )
             )
-            return True
 
         found: list[Detection] = []
         for thing in self.objects.values():
             if self.held_by(self.root(thing)) is None and self.shut_in(thing.name) is None:
-                seen(thing.name, thing.kind, self.point(thing, time_s), thing.support)
+                see(thing.name, thing.kind, self.point(thing, time_s), thing.support)
         for name in self.noticed:
-            x, y = self.world.fixture_of[name].center_m
-            seen(name, self.things[name].kind, (x, y, 0.0), FLOOR)
+            point = self.world.fixtures.face_m(name, self.opening(name))
+            see(name, self.things[name].kind, point, FLOOR)
         return tuple(found)
 
     def _grasp(self, me: KinematicRobot, motion: Motion, time_s: float) -> str | None:

@@ -98,13 +98,14 @@ class Whereabouts:
     def point_at(self, carrier: str, offset_m: tuple[float, float], time_s: float) -> PointM:
         """A point on or in a thing, given from its middle."""
         if carrier in self.world.fixtures.carriers:
-            return self.world.fixtures.carrier_point_m(carrier, *offset_m, self._opening(carrier))
+            return self.world.fixtures.carrier_point_m(carrier, *offset_m, self.opening(carrier))
         x, y, z = self.point(self.objects[carrier], time_s)
         kind = self.world.kind_of(carrier)
         level = FLOOR_M if kind.hollow else kind.extent_m[2]
         return (x + offset_m[0], y + offset_m[1], z + level)
 
-    def _opening(self, thing: str) -> float:
+    def opening(self, thing: str) -> float:
+        """How far something is open, 0 or 1."""
         return 1.0 if self.states.get(thing, IS_OPEN) is True else 0.0
 
     def thing_point(self, thing: str, time_s: float) -> PointM:
@@ -115,7 +116,7 @@ class Whereabouts:
         fixtures = self.world.fixtures
         if thing in fixtures.movers:
             fixture, mover = fixtures.movers[thing]
-            return fixtures.moved_m(thing, mover.handle_m, self._opening(thing))
+            return fixtures.moved_m(thing, mover.handle_m, self.opening(thing))
         if thing in fixtures.buttons:
             fixture, button = fixtures.buttons[thing]
             return fixture.point_m(button.top_m)
@@ -176,7 +177,7 @@ class Whereabouts:
         for name, (fixture, carrier) in self.world.fixtures.carriers.items():
             if self.states.get(name, IS_OPEN) is False:
                 continue
-            middle = self.world.fixtures.carrier_point_m(name, 0.0, 0.0, self._opening(name))
+            middle = self.world.fixtures.carrier_point_m(name, 0.0, 0.0, self.opening(name))
             a, b, _ = fixture.local_m(point_m)
             c, d, _ = fixture.local_m(middle)
             off = (a - c, b - d)

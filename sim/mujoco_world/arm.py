@@ -37,6 +37,7 @@ class Arm:
         self._ctrl = [int(model.actuator(prefix + name).id) for name in entry.actuators]
         self._site = int(model.site(prefix + entry.grip_site).id)
         self._robot_root = int(model.body_rootid[model.site_bodyid[self._site]])
+        self._stow = list(entry.stow)
         self.setpoint = list(entry.stow)
         self.goal = list(entry.stow)
         self.slowness = 1.0
@@ -68,10 +69,16 @@ class Arm:
 
     def stowed(self) -> bool:
         """Whether setpoints and goal are the folded pose."""
-        return self.goal == self.setpoint == list(self.entry.stow)
+        return self.goal == self.setpoint == self._stow
 
-    def tick(self, ctrl: Any) -> None:
+    def tick(self, ctrl: list[float]) -> None:
         """Write the commands for the next control period."""
+        if self.setpoint != self.goal:
+            self._approach_goal()
+        for motor, value in zip(self._ctrl, self.setpoint, strict=True):
+            ctrl[motor] = value
+
+    def _approach_goal(self) -> None:
         steps = max(
             self.slowness * abs(goal - now) / (speed * PERIOD_S)
             for goal, now, speed in zip(self.goal, self.setpoint, self.entry.speeds, strict=True)
@@ -81,7 +88,6 @@ class Arm:
             goal if share == 1.0 else now + (goal - now) * share
             for goal, now in zip(self.goal, self.setpoint, strict=True)
         ]
-        ctrl[self._ctrl] = self.setpoint
 
     def solve(
         self,
@@ -185,7 +191,7 @@ class Gripper:
         touched = all(float(self._data.sensordata[at]) > TOUCH_N for at in self._touch)
         return touched and self.opening_m() > CLOSED_M
 
-    def tick(self, ctrl: Any) -> None:
+    def tick(self, ctrl: list[float]) -> None:
         """Write the command for the next control period."""
         most = FINGER_SPEED_M_S * PERIOD_S
         change = max(-most, min(most, self._goal - self._setpoint))

@@ -108,7 +108,7 @@ class MujocoBackend(Backend):
         self._context = MotionContext(world, self._bodies, navigator, observer, self._mechanisms)
         self._collisions = Collisions(self._model, self._data, self._bodies)
         self._runs: dict[str, MotionRun] = {}
-        self._ctrl = self._data.ctrl.copy()
+        self._ctrl: list[float] = self._data.ctrl.tolist()
         self._scene = draw_scene(self._model, world.world, self.robots)
         self._frames = FrameDrawer(self._model, self._data, self._scene)
         mujoco.mj_forward(self._model, self._data)
@@ -213,8 +213,9 @@ class MujocoBackend(Backend):
 
     def _physics(self) -> None:
         import mujoco
+        import numpy as np
 
-        old = self._ctrl.copy()
+        old = np.array(self._ctrl)
         for body in self._bodies.values():
             body.tick(self._ctrl)
         change = (self._ctrl - old) / STEPS

@@ -34,7 +34,11 @@ def wrap(angle_rad: float) -> float:
 
 
 class Drive(ABC):
-    """A robot's base. `ctrl` values are written into the array given to `tick`."""
+    """A robot's base. Its commands are written into the list given to `tick`, one for each motor.
+
+    A list, since single numbers are what controllers read and write: of an array they cost more
+    than the controller.
+    """
 
     def __init__(self, data: Any, speed_m_s: float, acceleration: float, yaw_rate: float) -> None:
         self._data = data
@@ -66,7 +70,7 @@ class Drive(ABC):
         """How fast it moves: m/s, rad/s (both not negative)."""
 
     @abstractmethod
-    def tick(self, ctrl: Any) -> None:
+    def tick(self, ctrl: list[float]) -> None:
         """Write the commands for the next control period."""
 
     def drive(
@@ -134,7 +138,7 @@ class Planar(Drive):
         vx, vy, rate = (float(self._data.qvel[address]) for address in self._dofs)
         return (math.hypot(vx, vy), abs(rate))
 
-    def tick(self, ctrl: Any) -> None:
+    def tick(self, ctrl: list[float]) -> None:
         x, y, yaw = self.pose()
         if self._target is None:
             self.halt()
@@ -161,7 +165,8 @@ class Planar(Drive):
         most = 3.0 * self._acceleration * PERIOD_S
         rate = old_rate + max(-most, min(most, rate - old_rate))
         self._command = (vx, vy, rate)
-        ctrl[self._ctrl] = self._command
+        for motor, value in zip(self._ctrl, self._command, strict=True):
+            ctrl[motor] = value
 
 
 class Differential(Drive):
@@ -182,8 +187,8 @@ class Differential(Drive):
 
     def _read_pose(self) -> PoseMRad:
         at = self._qpos
-        qpos = self._data.qpos
-        return (float(qpos[at]), float(qpos[at + 1]), yaw_of(qpos[at + 3 : at + 7]))
+        x, y, _, *turn = self._data.qpos[at : at + 7].tolist()
+        return (x, y, yaw_of(turn))
 
     def put(self, pose_m_rad: PoseMRad) -> None:
         x, y, yaw = pose_m_rad
@@ -202,7 +207,7 @@ class Differential(Drive):
         self._target = None
         self._spin = None
 
-    def tick(self, ctrl: Any) -> None:
+    def tick(self, ctrl: list[float]) -> None:
         speed, rate = self._wanted()
         old_speed, old_rate = self._command
         most = self._acceleration * PERIOD_S

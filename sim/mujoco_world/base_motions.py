@@ -14,6 +14,9 @@ LOOK_RATE_RAD_S = 1.0
 REACH_MARGIN_M = 0.015
 """The base stops within this of where it was to stand."""
 
+STRETCHED_M = 0.03
+"""An arm within this of its reach is stretched out."""
+
 BESIDE_M = (0.15, 0.6)
 """How far from its own rim a robot without a hand stops before a point."""
 
@@ -46,7 +49,7 @@ def approach(context: MotionContext, run: MotionRun) -> Steps:
         # that reaches into its basket.
         run.guest_of = host
         yield
-    reach = reach_m(run) if host is None else BESIDE_ROBOT_M
+    reach = reach_to_m(context, run, point) if host is None else BESIDE_ROBOT_M
     yield from navigate(
         context, run, lambda: context.navigator.approach(run.robot.name, point, reach)
     )
@@ -69,6 +72,20 @@ def reach_m(run: MotionRun) -> tuple[float, float]:
         return (about.radius_m + BESIDE_M[0], about.radius_m + BESIDE_M[1])
     least, greatest = about.arm.reach_m
     return (least + REACH_MARGIN_M, greatest - REACH_MARGIN_M)
+
+
+def reach_to_m(context: MotionContext, run: MotionRun, point: PointM) -> tuple[float, float]:
+    """How far from a point to stand: over an edge, or under a roof, with the arm stretched out.
+
+    A stretched arm is level; one that bends has its elbow, or its shoulder, in the way.
+    """
+    least, greatest = reach_m(run)
+    if run.robot.arm is not None and (
+        context.observer.rim_m(point) is not None
+        or any(fixture.roofs(point) for fixture in context.world.fixtures.by_name.values())
+    ):
+        least = greatest - STRETCHED_M
+    return (least, greatest)
 
 
 def look(context: MotionContext, run: MotionRun) -> Steps:

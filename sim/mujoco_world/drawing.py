@@ -50,19 +50,18 @@ class FrameDrawer:
     """Reads the poses of the scene's bodies that can move."""
 
     def __init__(self, model: Any, data: Any, scene: Scene) -> None:
+        import numpy as np
+
         self._data = data
         self._names = [body.body for body in scene.bodies if body.body not in scene.fixed]
-        self._numbers = [int(model.body(name).id) for name in self._names]
+        self._numbers = np.array([int(model.body(name).id) for name in self._names], dtype=int)
 
     def draw(self, time_s: float) -> Frame:
         """Where they are now, rounded as much as nobody sees."""
         points = self._data.xpos[self._numbers].round(5).tolist()
         turns = self._data.xquat[self._numbers].round(6).tolist()
-        poses = {
-            name: ((x, y, z), (w, i, j, k))
-            for name, (x, y, z), (w, i, j, k) in zip(self._names, points, turns, strict=True)
-        }
-        return Frame(time_s=time_s, poses=poses)
+        poses = zip(map(tuple, points), map(tuple, turns), strict=True)
+        return Frame(time_s=time_s, poses=dict(zip(self._names, poses, strict=True)))
 
 
 def _shape(model: Any, geom: int) -> Shape | None:

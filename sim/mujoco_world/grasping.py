@@ -6,6 +6,7 @@ finger pads, and success is what the hand's own sensors say.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -30,6 +31,9 @@ from sim.mujoco_world.robot_body import RobotBody
 
 HOVERS_M = (0.15, 0.12, 0.09, 0.06)
 """How far above its last position the hand comes in, the first that the arm can reach."""
+
+RIM_M = 0.03
+"""How far fingers pass above an edge."""
 
 GRIP_SHARE = 0.6
 """Where an object is taken, as a share of its height: above its middle, so that it hangs."""
@@ -85,7 +89,8 @@ def grasp(context: MotionContext, run: MotionRun) -> Steps:
     yield from face(run, point[0], point[1])
     grip_m = _grip_above_base(gripper, context.world.kind_of(name).extent_m[2])
     target = (point[0], point[1], point[2] + grip_m)
-    path = reach_down(arm, target, context.observer.opening_rad(name))
+    hovers = _hovers_m(context, point, target[2], gripper.entry.finger_depth_m)
+    path = reach_down(arm, target, context.observer.opening_rad(name), hovers)
     robot.grip_above_base_m = grip_m
     opening_m = gripper.entry.open_m
     if run.motion.robot is not None:
@@ -147,7 +152,7 @@ def set_down(
             or lost.
     """
     robot = run.robot
-    arm, _ = hand_of(robot)
+    arm, gripper = hand_of(robot)
     held = held_by(robot)
     yield from stow(run)
     _check_reach(run, point)
@@ -155,7 +160,9 @@ def set_down(
     yield from face(run, point[0], point[1])
     _check_free(context, robot, held, point, into)
     lift = robot.grip_above_base_m + RELEASE_LIFT_M + above_m
-    path = reach_down(arm, (point[0], point[1], point[2] + lift), None)
+    target = (point[0], point[1], point[2] + lift)
+    below = max(robot.grip_above_base_m, gripper.entry.finger_depth_m)
+    path = reach_down(arm, target, None, _hovers_m(context, point, target[2], below))
     try:
         yield from reach_over(context, run, point, path, slower=1.5)
         # folded, the arm hid from the camera what is straight ahead
@@ -284,7 +291,26 @@ def _grip_above_base(gripper: Gripper, height_m: float) -> float:
     return max(lowest, GRIP_SHARE * height_m, height_m - PALM_ROOM_M)
 
 
-def reach_down(arm: Arm, target: PointM, opening_rad: float | None) -> Reach:
+def _hovers_m(
+    context: MotionContext, point: PointM, grip_z_m: float, below_m: float
+) -> tuple[float, ...]:
+    """How far above its last position the hand comes in.
+
+    In a drawer or basin, so that fingers and load, which reach `below_m` below the grip, are clear
+    of the edge.
+    """
+    rim_m = context.observer.rim_m(point)
+    if rim_m is None:
+        return HOVERS_M
+    return (max(rim_m + RIM_M + below_m - grip_z_m, HOVERS_M[-1]),)
+
+
+def reach_down(
+    arm: Arm,
+    target: PointM,
+    opening_rad: float | None,
+    hovers_m: tuple[float, ...] = HOVERS_M,
+) -> Reach:
     """Joint values for a target and above it, clear of obstacles: the first seed that works.
 
     Raises:
@@ -300,8 +326,8 @@ def reach_down(arm: Arm, target: PointM, opening_rad: float | None) -> Reach:
         if hit is not None:
             touched = hit
             continue
-        for hover in HOVERS_M:
-            above = arm.solve((x, y, z + hover), at, opening_rad)
+        for hover, start in itertools.product(hovers_m, (at, *arm.entry.seeds)):
+            above = arm.solve((x, y, z + hover), start, opening_rad)
             if above is not None:
                 hit = arm.obstacle(above)
                 if hit is None:

@@ -24,6 +24,8 @@ OPEN_SHARE = 0.5
 AJAR_SHARE = 0.05
 """What is open further than this is in the way of those who drive."""
 PRESS_N = 1.0
+PROCESS_S = 0.25
+"""How often it is looked what is in appliances that are on."""
 RELEASED_S = 0.3
 """A finger that has been off a button for this long presses it anew."""
 
@@ -73,6 +75,7 @@ class Mechanisms:
             elif head == "object":
                 self._object_of[geom] = tail
         self._pressed_s: dict[str, float] = {}
+        self._advanced_s = 0.0
         self.given: dict[str, str] = {}
         """What people have in their hands: by object, the person."""
 
@@ -157,7 +160,8 @@ class Mechanisms:
 
     def advance(self, time_s: float, contents: Any) -> None:
         """Let appliances go on with what is in them."""
-        if self.states.processing:
+        if time_s - self._advanced_s >= PROCESS_S and self.states.processing:
+            self._advanced_s = time_s
             for thing in self._joints:
                 self.states.set(thing, IS_OPEN, self.is_open(thing))
             self.states.advance(time_s, contents)

@@ -37,6 +37,9 @@ NEAR_M = 0.02
 """A base this close to where it was driven by hand is there."""
 
 
+HELD_UP_S = 5.0
+
+
 class MotionFailed(Exception):
     """A motion fails. The message is one sentence for a person."""
 
@@ -127,8 +130,13 @@ def stow(run: MotionRun) -> Step:
     robot = run.robot
     arm = robot.arm
     if arm is None or arm.stowed():
+        robot.way_out = None
         return
     run.phase = "folding the arm"
+    if robot.way_out is not None and robot.held is None and robot.gripper is not None:
+        # It was stopped with its fingers round a handle, or about to take something.
+        robot.gripper.open()
+        yield from wait(0.6)
     x, y, z = arm.grip_point()
     radius = math.dist(robot.pose()[:2], (x, y))
     if radius > robot.description.clearance_m:
@@ -146,14 +154,23 @@ def stow(run: MotionRun) -> Step:
 
 
 def drive_straight(run: MotionRun, goal: PoseMRad, phase: str, speed_m_s: float = 0.25) -> Step:
-    """Move the base without the navigator, slowly, to a pose close by."""
+    """Move the base without the navigator, slowly, to a pose close by.
+
+    Raises:
+        MotionFailed: it stands still before it is there.
+    """
     run.phase = phase
     run.manual = True
     drive = run.robot.drive
     drive.drive(*goal, speed_m_s)
+    still_s = 0.0
     while True:
         yield
         x, y, yaw = run.robot.pose()
         near = math.dist((x, y), goal[:2]) < NEAR_M and abs(wrap(yaw - goal[2])) < 0.02
         if near and not run.robot.moving():
             return
+        still_s = 0.0 if run.robot.moving() else still_s + PERIOD_S
+        if still_s > HELD_UP_S:
+            drive.halt()
+            raise MotionFailed(f"something holds {run.robot.name} up while {phase}")

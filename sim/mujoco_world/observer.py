@@ -11,14 +11,18 @@ from keyexpr_schema.payloads.motions import Detection
 from keyexpr_schema.payloads.simulation import Truth
 from keyexpr_schema.payloads.world import Object
 from sim.files.world_schema import FLOOR, FLOOR_M, WorldFile
+from sim.mujoco_world.baskets import Baskets
 from sim.mujoco_world.carriers import Carriers
 from sim.mujoco_world.mechanisms import Mechanisms
 from sim.mujoco_world.robot_body import RobotBody
 
 SETTLED_M_S = 0.02
 SETTLED_RAD_S = 0.3
-VISIBLE_SHARE = 0.3
-"""A thing is recognised when this share of the points looked for on it can be seen."""
+POINTS = tuple((up, across) for up in (0.15, 0.5, 0.85) for across in (-1.0, 0.0, 1.0))
+"""Of a thing that is looked at: shares of its height, and of its half width to either side."""
+
+VISIBLE = 3
+"""A thing is recognised when so many of its `POINTS` can be seen."""
 
 NEAR_ENOUGH_M = 0.5
 """The base of an object can be that much farther off than its middle."""
@@ -61,7 +65,10 @@ class Observer:
         self._objects = {
             name: int(model.body(f"object/{name}").id) for name in world.object_entries
         }
-        self._bodies = list(self._objects.values())
+        self._bodies = np.array(list(self._objects.values()), dtype=int)
+        first = model.body_dofadr[self._bodies].reshape(-1, 1)
+        self._dofs = first + np.arange(6)  # (n, 6): of all objects, velocities and turning rates
+        self._baskets = Baskets(model, data, robots.values(), self._objects)
         self._trees = model.body_treeid[self._bodies]
         self._asleep = data.tree_asleep[self._trees] >= 0
         self._at_rest: dict[str, set[tuple[str, str]]] = {}
@@ -98,11 +105,8 @@ class Observer:
         return math.atan2(float(axis[1]), float(axis[0]))
 
     def basket(self, robot: RobotBody) -> tuple[str, ...]:
-        """What lies in a robot's basket, as its sensor says, in the order of the world file."""
-        if robot.basket < 0 or not self._objects:
-            return ()
-        inside = robot.in_basket(self._data.xpos[self._bodies])
-        lying = tuple(itertools.compress(self._objects, inside))
+        """What lies in a robot's basket and not on anything in it, in the world file's order."""
+        lying = self._baskets.contents().get(robot.name, ())
         return tuple(name for name in lying if self._carriers.object_below(name, lying) is None)
 
     def note_sleepers(self) -> None:
@@ -145,11 +149,10 @@ class Observer:
     def truths(self, time_s: float) -> tuple[Truth, ...]:
         """Where every object really is, and how everything is that has states."""
         supports, touching = self._supports()
+        points_m = self._data.xpos[self._bodies].tolist()
+        speeds = self._data.qvel[self._dofs].tolist()
         found = []
-        for name, body in self._objects.items():
-            x, y, z = self.base_point(name)
-            address = int(self._model.body_dofadr[body])
-            speed = self._data.qvel[address : address + 6]
+        for name, (x, y, z), speed in zip(self._objects, points_m, speeds, strict=True):
             support = supports[name]
             found.append(
                 Truth(
@@ -198,6 +201,21 @@ class Observer:
                 found.append((x + dx, y + dy, z + dz))
         return found
 
+    def rim_m(self, point_m: tuple[float, float, float]) -> float | None:
+        """How high the edge is over which a hand gets to a point in a drawer or a basin [m]."""
+        for name, fixture in self._world.fixtures.by_name.items():
+            thing = self._carriers.at_fixture(name, point_m)
+            if thing is None:
+                continue
+            carrier = self._world.fixtures.carriers[thing][1]
+            if carrier.inside and not carrier.roofed:
+                mover = fixture.mover(thing)
+                if mover is None:
+                    return fixture.height_m
+                front = mover.panels[0]
+                return front.center_m[2] + front.half_m[2]
+        return None
+
     def contents(self, carrier: str) -> list[str]:
         """What is directly on or in a thing."""
         return [name for name, support in self._supports()[0].items() if support == carrier]
@@ -206,7 +224,9 @@ class Observer:
         """What carries each object directly, and what it touches."""
         touching = self.touching()
         baskets = {
-            name: robot.name for robot in self._robots.values() for name in self.basket(robot)
+            name: robot
+            for robot in self._baskets.contents()
+            for name in self.basket(self._robots[robot])
         }
         return {
             name: self._support(name, baskets.get(name), touching) for name in self._objects
@@ -244,9 +264,9 @@ class Observer:
         return None
 
     def _holder(self, touches: set[tuple[str, str]]) -> str | None:
-        for name, robot in self._robots.items():
-            pads = len(robot.pads)
-            if pads and all(("pad", f"{name}:{number}") in touches for number in range(pads)):
+        for name in sorted({pad.rpartition(":")[0] for kind, pad in touches if kind == "pad"}):
+            pads = range(len(self._robots[name].pads))
+            if all(("pad", f"{name}:{number}") in touches for number in pads):
                 return name
         return None
 
@@ -290,18 +310,19 @@ class Observer:
             return False
         side = np.array([-to[1], to[0], 0.0]) / max(math.hypot(to[0], to[1]), 1e-6)
         half = 0.4 * min(length, width)
-        frame = self._data.xmat[self._objects[object]].reshape(3, 3)
+        upwards = self._data.xmat[self._objects[object]].reshape(3, 3)[:, 2]
         own_head = int(self._model.site_bodyid[robot.camera])
         geom = np.zeros(1, dtype=np.int32)
         hits = 0
-        points = [(up, across) for up in (0.15, 0.5, 0.85) for across in (-1.0, 0.0, 1.0)]
-        for up, across in points:
-            point = base + frame @ (0.0, 0.0, up * height) + across * half * side
-            ray = point - eye
+        for number, (up, across) in enumerate(POINTS):
+            if hits + len(POINTS) - number < VISIBLE:
+                return False
+            ray = base + upwards * (up * height) + across * half * side - eye
             mujoco.mj_ray(self._model, self._data, eye, ray, None, 1, own_head, geom)
-            if self._of_geom.get(int(geom[0])) == ("object", object):
-                hits += 1
-        return hits >= VISIBLE_SHARE * len(points)
+            hits += self._of_geom.get(int(geom[0])) == ("object", object)
+            if hits == VISIBLE:
+                return True
+        return False
 
     def detect(self, robot: RobotBody, object: str) -> Detection:
         """What the camera reports of an object that it sees (see `sees`)."""
@@ -360,11 +381,13 @@ class Observer:
 
     def detect_fixture(self, thing: str) -> Detection:
         """What the camera reports of furniture or a person that it notices."""
+        movers = self._world.fixtures.movers
+        opening = self._mechanisms.opening(thing) if thing in movers else 0.0
         x, y = self._world.fixture_of[thing].center_m
         return Detection(
             object=thing,
             kind=self.noticed[thing],
-            point_m=(x, y, 0.0),
+            point_m=self._world.fixtures.face_m(thing, opening),
             place=self._world.place_at(x, y),
             states=self._mechanisms.state_of(thing),
         )

@@ -153,6 +153,8 @@ def _pull(context: MotionContext, run: MotionRun, goal: float) -> Step:
         share = goal if abs(goal - share) <= abs(step) else share + step
         at = moved(thing, mover.handle_m, share)
         drive.drive(x + at[0] - start[0], y + at[1] - start[1], yaw, LIMIT_M_S)
+        # Where to go from here, should it be stopped.
+        run.robot.way_out = behind(run.robot.pose(), BACK_M)
         yield
         late_s = late_s + PERIOD_S if share == goal else 0.0
         if late_s > STUCK_S:

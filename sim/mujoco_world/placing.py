@@ -7,7 +7,7 @@ import math
 from keyexpr_schema.payloads.motions import PointM
 from sim.errors import NoPath, NoStance
 from sim.files.world_schema import FLOOR_M
-from sim.mujoco_world.base_motions import navigate, reach_m
+from sim.mujoco_world.base_motions import navigate, reach_m, reach_to_m
 from sim.mujoco_world.grasping import (
     BASKET_OPENING_M,
     RELEASE_OPENING_M,
@@ -42,7 +42,8 @@ def place_at(context: MotionContext, run: MotionRun) -> Steps:
     why = ""
     for candidate in spots[:MOST_SPOTS]:
         try:
-            context.navigator.approach(run.robot.name, candidate, reach_m(run))
+            reach = reach_to_m(context, run, candidate)
+            context.navigator.approach(run.robot.name, candidate, reach)
         except (NoStance, NoPath) as error:
             why = str(error)
         else:
@@ -53,7 +54,9 @@ def place_at(context: MotionContext, run: MotionRun) -> Steps:
     at = spot
     run.phase = f"driving up to {target}"
     yield from navigate(
-        context, run, lambda: context.navigator.approach(run.robot.name, at, reach_m(run))
+        context,
+        run,
+        lambda: context.navigator.approach(run.robot.name, at, reach_to_m(context, run, at)),
     )
     hollow = target in context.world.object_entries and context.world.kind_of(target).hollow
     rim_m = context.world.kind_of(target).extent_m[2] - FLOOR_M if hollow else 0.0

@@ -62,7 +62,6 @@ class RobotBody:
         self.basket_half_m = tuple(
             float(v) for v in (model.site_size[self.basket] if self.basket >= 0 else (0, 0, 0))
         )
-        self._basket_reach_m = [half + 0.003 for half in self.basket_half_m]
         self.drive.put(start)
         if self.arm is not None:
             self.arm.put_stowed()
@@ -86,7 +85,7 @@ class RobotBody:
         if self.arm is not None:
             self.arm.freeze()
 
-    def tick(self, ctrl: Any) -> None:
+    def tick(self, ctrl: list[float]) -> None:
         """Read the hand's sensors, write all commands for the next control period."""
         self.drive.carrying = self.held is not None
         self.drive.tick(ctrl)
@@ -104,16 +103,6 @@ class RobotBody:
     def let_go(self) -> None:
         """The hand is empty from now on."""
         self.held = self.reaching_for = None
-
-    def in_basket(self, points_m: Any) -> list[bool]:
-        """Which of the points `(n, 3)` lie within the volume of the basket."""
-        if self.basket < 0:
-            return [False] * len(points_m)
-        frame = self._data.site_xmat[self.basket].reshape(3, 3)
-        local = abs((points_m - self._data.site_xpos[self.basket]) @ frame)  # (n, 3)
-        # Contacts give way by a fraction of this.
-        inside: list[bool] = (local <= self._basket_reach_m).all(axis=1).tolist()
-        return inside
 
     def basket_point(self, x_m: float, y_m: float) -> tuple[float, float, float]:
         """A point of the basket's floor, given from its centre, in the world frame."""

@@ -31,6 +31,7 @@ class Clearance:
         self._half = np.array([s.half_m for s in boxes])  # (n, 2) m
         yaw = np.array([s.yaw_rad for s in boxes])
         self._cos, self._sin = np.cos(yaw), np.sin(yaw)  # (n,)
+        self._radius = np.hypot(self._half[:, 0], self._half[:, 1])  # (n,) m
         self._height = np.array([s.height_m for s in boxes])
 
     def at(self, points_m: ArrayLike, above_m: float = 0.0) -> Floats:
@@ -39,14 +40,28 @@ class Clearance:
         0 inside a solid and outside the building.
         """
         points = np.asarray(points_m, dtype=np.float64)
-        tall = self._height > above_m
-        delta = points[..., None, :] - self._centre[tall]  # (…, n, 2)
-        cos, sin = self._cos[tall], self._sin[tall]
-        along = np.abs(cos * delta[..., 0] + sin * delta[..., 1]) - self._half[tall, 0]
-        across = np.abs(cos * delta[..., 1] - sin * delta[..., 0]) - self._half[tall, 1]
+        near = self._nearest(points.reshape(-1, 2), self._height > above_m)
+        delta = points[..., None, :] - self._centre[near]  # (…, n, 2)
+        cos, sin = self._cos[near], self._sin[near]
+        along = np.abs(cos * delta[..., 0] + sin * delta[..., 1]) - self._half[near, 0]
+        across = np.abs(cos * delta[..., 1] - sin * delta[..., 0]) - self._half[near, 1]
         distance: Floats = np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0)).min(axis=-1)
         inside = ((points >= 0.0) & (points <= self._size)).all(axis=-1)
         return np.where(inside, distance, 0.0)
+
+    def _nearest(self, points: Floats, among: NDArray[np.bool_]) -> NDArray[np.intp]:
+        """Those `among` the solids that may be the nearest one to one of the points `(k, 2)`.
+
+        No solid is farther off than its centre, nor nearer than its centre less its radius.
+        """
+        if not len(points):
+            return np.flatnonzero(among)
+        low, high = points.min(axis=0), points.max(axis=0)
+        least = np.maximum(np.maximum(low - self._centre, self._centre - high), 0.0)
+        most = np.maximum(high - self._centre, self._centre - low)
+        nearer = np.hypot(least[:, 0], least[:, 1]) - self._radius
+        farther = np.hypot(most[:, 0], most[:, 1])
+        return np.flatnonzero(among & (nearer <= farther[among].min()))
 
     def along(self, start_m: ArrayLike, ends_m: ArrayLike, above_m: float = 0.0) -> Floats:
         """Least distance to a solid on the straight lines from `start_m` to each of `ends_m`, m.

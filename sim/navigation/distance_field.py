@@ -21,11 +21,23 @@ class DistanceField:
     def __init__(
         self, steps: Sequence[Sequence[Step]], goals: frozenset[int], blocked: frozenset[int]
     ) -> None:
-        self._steps, self._goals, self._blocked = steps, goals, blocked
+        self._steps, self.goals, self._blocked = steps, goals, blocked
         self._least: dict[int, float] = dict.fromkeys(sorted(goals), 0.0)
         """The shortest way found so far."""
         self._final: dict[int, float] = {}
         self._heap = [(0.0, goal) for goal in sorted(goals)]
+
+    def holds_with(self, blocked: frozenset[int]) -> bool:
+        """Whether what was worked out is true with other nodes `blocked`; if so, go on with those.
+
+        The corners that a step cuts are neighbours of where it begins: the search has come to them.
+        """
+        if blocked is self._blocked:
+            return True
+        if not self._least.keys().isdisjoint(blocked ^ self._blocked):
+            return False
+        self._blocked = blocked
+        return True
 
     def __getitem__(self, node: int) -> float:
         final = self._final.get(node)
@@ -42,7 +54,7 @@ class DistanceField:
             if node in final:
                 continue
             final[node] = cost
-            if node in blocked and node not in self._goals:
+            if node in blocked and node not in self.goals:
                 continue
             for other, length, corners in self._steps[node]:
                 if corners and not blocked.isdisjoint(corners):

@@ -28,7 +28,8 @@ WALL_M = LARGEST_RADIUS_M + TRACKING_M
 class Lattice:
     """A square lattice laid over a world so that its lines go through the doors.
 
-    `points_m` is `(n, 2)`. `neighbours[u]` lists the nodes one straight step away;
+    `points_m` is `(n, 2)`, `points` the same as pairs. `neighbours[u]` lists the nodes one straight
+    step away;
     `diagonals[u]` maps a node one slanted step away to the two corners it cuts: such a step exists
     where the whole square is free, and whoever takes it needs the corners too.
     """
@@ -50,7 +51,8 @@ class Lattice:
         self._slant(self._lay(world, best[1]))
         self.parts = self._parts()
         self._steps = self._all_steps()
-        self._field = lru_cache(maxsize=512)(self._new_field)
+        self._field = lru_cache(maxsize=512)(self.new_field)
+        self.points = [(float(x), float(y)) for x, y in self.points_m]
 
     def _lay(self, world: WorldFile, offset: tuple[float, float]) -> dict[tuple[int, int], int]:
         """Nodes and straight edges of the lattice at `offset`; the nodes by column and row."""
@@ -116,7 +118,8 @@ class Lattice:
         """Driven distance from every node to the nearest of `goals`; `blocked` are not entered."""
         return self._field(goals, blocked)
 
-    def _new_field(self, goals: frozenset[int], blocked: frozenset[int]) -> DistanceField:
+    def new_field(self, goals: frozenset[int], blocked: frozenset[int]) -> DistanceField:
+        """As `field`, of which nobody else has the same."""
         return DistanceField(self._steps, goals, blocked)
 
     def _all_steps(self) -> list[tuple[Step, ...]]:
@@ -138,12 +141,18 @@ class Lattice:
         """
         start, end = np.asarray(start_m), np.asarray(end_m)
         gap_m -= 1e-6  # a neighbour exactly that far away is far enough
-        far = _segment_gaps(self.points_m, self.points_m, start, end)
-        owned = set(np.flatnonzero(far < gap_m).tolist())
-        if len(self.edges):
-            a, b = self.edges[:, 0], self.edges[:, 1]
+        reach_m = gap_m + float(np.linalg.norm(end - start)) / 2 + PITCH_M
+        off = self.points_m - (start + end) / 2
+        close = (off**2).sum(axis=1) <= reach_m**2  # an end of whatever comes within the gap
+        nodes = np.flatnonzero(close)
+        gaps = _segment_gaps(self.points_m[nodes], self.points_m[nodes], start, end)
+        owned = set(nodes[gaps < gap_m].tolist())
+        edges = self.edges[close[self.edges[:, 0]] & close[self.edges[:, 1]]]
+        if len(edges):
+            far = dict(zip(nodes.tolist(), gaps.tolist(), strict=True))
+            a, b = edges[:, 0], edges[:, 1]
             gaps = _segment_gaps(self.points_m[a], self.points_m[b], start, end)
-            for u, v in self.edges[gaps < gap_m].tolist():
+            for u, v in edges[gaps < gap_m].tolist():
                 if u not in owned and v not in owned:
                     owned.add(u if far[u] <= far[v] else v)
         return frozenset(owned)

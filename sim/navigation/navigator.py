@@ -194,8 +194,10 @@ class Navigator:
                     else time_s < self._lingers.get(name, -math.inf)
                 )
             )
+        static = [traveller for traveller in self._robots.values() if traveller.static]
+        blocked = frozenset().union(*(traveller.claims for traveller in static))
         for name in list(self._tasks):
-            self._resolve(name)
+            self._resolve(name, blocked)
         self._traffic.decide(self._robots, LOOKAHEAD_NODES)
         return {name: self._leg(name) for name in self._robots if name not in self._pinned}
 
@@ -205,7 +207,7 @@ class Navigator:
 
     def _release(self, traveller: Traveller) -> None:
         x, y, _ = self._poses[traveller.name]
-        points = self._lattice.points_m
+        points = self._lattice.points
         changed = False
         if traveller.parked is not None and traveller.leaving:
             node = points[traveller.track[0]]
@@ -247,25 +249,27 @@ class Navigator:
         ways = ((dock.point_m, points[dock.node]), (stance.point_m, points[stance.node]))
         return segment_gap(*ways) - radius_m - other.radius_m
 
-    def _resolve(self, name: str) -> None:
-        """Choose the spot or stance to go to, or another one if somebody stands there now."""
+    def _resolve(self, name: str, blocked: frozenset[int]) -> None:
+        """Choose the spot or stance to go to, or another one if somebody stands there now.
+
+        `blocked` are the nodes of robots that stay where they are.
+        """
         task, traveller = self._tasks[name], self._robots[name]
         if name in self._failed or name in self._pinned:
             return
         x, y, _ = self._poses[name]
         if task.moved_s is None or math.dist(task.moved_at, (x, y)) > 0.1:
             task.moved_s, task.moved_at = self._time_s, (x, y)
-        others = [other for other in self._robots.values() if other is not traveller]
-        blocked = frozenset().union(*(other.claims for other in others if other.static))
         if traveller.goal is not None:
-            wanted = {traveller.goal} | (traveller.dock.owned if traveller.dock else frozenset())
-            if not wanted & blocked:
-                self._give_up_late(name, task, others)
+            owned = traveller.dock.owned if traveller.dock else frozenset()
+            if traveller.goal not in blocked and blocked.isdisjoint(owned):
+                self._give_up_late(name, task)
                 return
             traveller.goal = traveller.dock = None
             self._yaws.pop(name, None)
         elif traveller.parked is not None and not traveller.leaving and name in self._yaws:
             return  # on its way into the stance
+        others = [other for other in self._robots.values() if other is not traveller]
         taken = set(blocked)
         for other in others:
             if other.goal is not None:
@@ -278,7 +282,7 @@ class Navigator:
         else:
             self._choose_dock(name, task, around, frozenset(taken))
         if traveller.goal is None and name in self._tasks:
-            self._give_up_late(name, task, others)
+            self._give_up_late(name, task)
 
     def _choose_spot(
         self,
@@ -339,10 +343,11 @@ class Navigator:
                 self._yaws[name] = dock.yaw_rad
                 return
 
-    def _give_up_late(self, name: str, task: _Task, others: list[Traveller]) -> None:
+    def _give_up_late(self, name: str, task: _Task) -> None:
         if task.moved_s is None or self._time_s - task.moved_s < PATIENCE_S:
             return
         traveller = self._robots[name]
+        others = [other for other in self._robots.values() if other is not traveller]
         x, y, _ = self._poses[name]
         near = sorted(
             (other.name for other in others if other.static or traveller.goal is None),
@@ -364,8 +369,8 @@ class Navigator:
 
     def _leg(self, name: str) -> Leg:
         traveller = self._robots[name]
-        points = self._lattice.points_m
-        ahead = [(float(points[n][0]), float(points[n][1])) for n in traveller.track]
+        points = self._lattice.points
+        ahead = [points[node] for node in traveller.track]
         yaw = self._yaws.get(name)
         parked = traveller.parked
         if parked is not None:
@@ -385,10 +390,5 @@ class Navigator:
                 self._arrive(name)
             elif traveller.dock is None and traveller.goal == traveller.frontier and parked is None:
                 self._arrive(name)
-        return Leg(
-            leg.target_m,
-            leg.yaw_rad,
-            leg.speed_limit_m_s,
-            arrived=name not in self._tasks and leg.failed is None and name not in self._failed,
-            failed=leg.failed,
-        )
+        arrived = name not in self._tasks and leg.failed is None
+        return leg if leg.arrived == arrived else leg._replace(arrived=arrived)

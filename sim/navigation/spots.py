@@ -26,6 +26,9 @@ TABLE_FRONT_M = 0.9
 FAR_M = 3.0
 """How far around a point that nobody can reach it is looked for the nearest free floor."""
 
+ASKEW_M = 0.6
+"""What facing furniture askew counts for, a radian: neighbours' handles are in the arm's way."""
+
 DOCK_M = 1.3
 """Longest straight way from the lattice to a stance."""
 
@@ -170,6 +173,7 @@ class Spots:
             distances = np.linspace(low, high, max(2, round((high - low) / 0.02) + 1))
         d, angle = (a.ravel() for a in np.meshgrid(distances, angles, indexing="ij"))
         points = np.stack([x + d * np.cos(angle), y + d * np.sin(angle)], axis=1)
+        front = self._front_of(point_m)
         good = self._clearance.at(points) >= radius_m + 0.03
         good &= self._reach.along((x, y), points, above_m=z + 0.02) > 0.0
         found: list[Dock] = []
@@ -181,6 +185,8 @@ class Spots:
                     stance, ways[0], radius_m, math.atan2(y - stance[1], x - stance[0])
                 )
                 off = 2.0 * abs(float(d[k]) - middle) + 0.2 * len(dock.owned)
+                if front is not None:
+                    off += ASKEW_M * abs(math.remainder(dock.yaw_rad - front, math.tau))
                 found.append(Dock(dock.node, stance, dock.yaw_rad, dock.owned, dock.cost_m + off))
         return found
 
@@ -189,6 +195,15 @@ class Spots:
         return next(
             (f.inward_rad for f in self._fixtures.by_name.values() if f.roofs(point_m)), None
         )
+
+    def _front_of(self, point_m: tuple[float, float, float]) -> float | None:
+        """How one faces furniture that stands with its back to a wall, if a point is over such."""
+        for fixture in self._fixtures.by_name.values():
+            x, y, _ = fixture.local_m(point_m)
+            over = abs(x) < fixture.half_m[0] and abs(y) < fixture.half_m[1] + fixture.front_m
+            if over and fixture.kind not in ("table", "block"):
+                return fixture.inward_rad
+        return None
 
     def why_not(
         self, point_m: tuple[float, float, float], radius_m: float, reach_m: tuple[float, float]

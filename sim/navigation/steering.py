@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from keyexpr_schema.payloads.robots import PoseMRad
 
@@ -25,8 +25,7 @@ STAND_RAD = 0.06
 XY = tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Leg:
+class Leg(NamedTuple):
     """What one robot shall do now.
 
     Drive straight towards `target_m` (world frame, m) at `speed_limit_m_s`, which already brakes

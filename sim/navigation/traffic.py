@@ -61,6 +61,8 @@ class Traffic:
 
     def __init__(self, lattice: Lattice, retreat: DistanceField) -> None:
         self._lattice, self._retreat = lattice, retreat
+        self._ways: dict[str, DistanceField] = {}
+        """By robot, the distances to where it wants to be."""
 
     def decide(self, robots: dict[str, Traveller], lookahead: int) -> None:
         """Give robots the next nodes they may enter, `lookahead` ahead of where each is.
@@ -97,9 +99,12 @@ class Traffic:
             distance = self._distance(robot)
             if parent is None and self._slant(robot, distance):
                 return True
-            options = [*self._lattice.neighbours[here], here]
-            options.sort(key=lambda v: (distance[v], self._held(v, robot), v != here, v))
-            for node in options:
+            options = [
+                (distance[node], self._held(node, robot), node != here, node)
+                for node in (*self._lattice.neighbours[here], here)
+            ]
+            options.sort()
+            for _, _, _, node in options:
                 if node in self._reserved and self._reserved[node] != robot.name:
                     continue
                 if parent is not None and node in parent.claims:
@@ -120,13 +125,19 @@ class Traffic:
         if robot.goal is None:
             return self._retreat
         goals = frozenset({robot.goal})
-        around = self._lattice.field(goals, self._blocked - robot.claims)
+        blocked = self._blocked
+        if not blocked.isdisjoint(robot.claims):
+            blocked -= robot.claims
+        around = self._ways.get(robot.name)
+        if around is None or around.goals != goals or not around.holds_with(blocked):
+            around = self._ways[robot.name] = self._lattice.new_field(goals, blocked)
         if math.isfinite(around[robot.frontier]):
             return around
         return self._lattice.field(goals)  # no way round: go up to who stands there, and wait
 
     def _held(self, node: int, robot: Traveller) -> bool:
-        return any(owner is not robot for owner in self._owners.get(node, ()))
+        owners = self._owners.get(node)
+        return owners is not None and (len(owners) > 1 or owners[0] is not robot)
 
     def _obtain(self, robot: Traveller, node: int, *, wished: bool) -> bool:
         """Take `node`, or see to it that it will become free."""

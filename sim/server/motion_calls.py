@@ -36,6 +36,10 @@ class MotionCalls:
         """A motion runs."""
         return self._active is not None
 
+    def holds(self, now_s: float) -> bool:
+        """The world waits for the robot's next call, as far as it can afford that."""
+        return not self.active and now_s < self.held_until_s
+
     def accept(self, call: MotionCall, now_s: float) -> MotionOutcome | None:
         """Do what `call` says; its answer, or `None` while its motion runs."""
         if call.incarnation in self._superseded:

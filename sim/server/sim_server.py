@@ -17,17 +17,18 @@ from keyexpr_schema.transport.session import Session
 from sim.backend import Backend
 from sim.server.motion_calls import MotionCalls
 from sim.server.publisher import WorldPublisher
+from sim.server.wait_budget import WaitBudget
 
 CHUNK_S = 0.004
 """Wall time for which the world goes on before calls are looked at."""
+
+PACE_S, IDLE_S = 0.005, 0.05
+"""How often a world looks around that has a pace, and one that waits for calls."""
 
 LAG_S = 0.5
 """A world that is further behind the wall clock stops trying to catch up."""
 
 GRACE_S = 0.25
-WAIT_SHARE, WAIT_S = 0.1, 5.0
-"""A world without a pace waits for robots that think for no longer than this share of the time that
-it has gone on for, beyond so much at first [s]: of many robots there is always one that thinks."""
 WATCHDOG_S = 2.0
 
 
@@ -37,7 +38,7 @@ class SimServer:
     `speed` is simulated seconds a second of wall time. `None` is as fast as it goes: then time
     advances only while some robot moves, and after a motion has ended it waits up to `grace_s` of
     wall time for that robot's next call, so that the thinking of workers and planners takes no
-    simulated time; with many robots, as far as that can be afforded (`WAIT_SHARE`).
+    simulated time; with many robots, as far as that can be afforded (`WaitBudget`).
 
     A motion that nobody has asked about for `watchdog_s` (beyond the wait of the last call) is
     stopped, as a driver would stop a robot whose worker is gone. While our own link to the router
@@ -57,8 +58,7 @@ class SimServer:
         self._calls = {robot: MotionCalls(backend, robot) for robot in backend.robots}
         self._publisher = WorldPublisher(session, backend, speed)
         self._called = asyncio.Event()
-        self._waits_s = WAIT_S
-        """How long the world may still wait for robots that think."""
+        self._budget = WaitBudget()
         self._ready = asyncio.Event()
 
     async def ready(self) -> None:
@@ -104,34 +104,38 @@ class SimServer:
                 await self._advance_until(loop, max(due_s, self._backend.time_s))
             self._poll_motions(loop.time())
             self._called.clear()
-            held = self._held(loop.time())
-            pause_s = 0.005 if speed > 0.0 or held else 0.05
             paused_s = loop.time()
+            held_s = self._held_s(paused_s)
+            moving = sum(calls.active for calls in self._calls.values())
+            thinking = sum(calls.holds(paused_s) for calls in self._calls.values())
+            if speed == 0.0 and moving and not held_s:
+                continue
+            pause_s = PACE_S if speed > 0.0 else max(PACE_S, min(held_s or IDLE_S, IDLE_S))
             try:
                 async with asyncio.timeout(pause_s):
                     await self._called.wait()
             except TimeoutError:
                 pass
-            if held and self._anybody_moves():
-                self._waits_s -= loop.time() - paused_s
+            if held_s:
+                self._budget.spend(loop.time() - paused_s, moving, thinking)
 
     def _speed_now(self, wall_s: float) -> float | None:
         if self._speed is not None:
             return self._speed
-        return None if self._anybody_moves() and not self._held(wall_s) else 0.0
+        return None if self._anybody_moves() and not self._held_s(wall_s) else 0.0
 
     def _anybody_moves(self) -> bool:
         return any(calls.active for calls in self._calls.values())
 
-    def _held(self, wall_s: float) -> bool:
-        """The world waits for the next call of a robot whose motion just ended."""
-        return (
-            self._waits_s > 0.0
-            and self._speed is None
-            and any(
-                not calls.active and wall_s < calls.held_until_s for calls in self._calls.values()
-            )
-        )
+    def _held_s(self, wall_s: float) -> float:
+        """How long the world waits at most for the next calls of robots whose motions just ended.
+
+        A call wakes it up earlier.
+        """
+        if self._speed is not None or self._budget.left_s <= 0.0:
+            return 0.0
+        until_s = (c.held_until_s for c in self._calls.values() if c.holds(wall_s))
+        return max(0.0, min(max(until_s, default=0.0) - wall_s, self._budget.left_s))
 
     async def _advance_until(self, loop: asyncio.AbstractEventLoop, until_s: float | None) -> None:
         """Let the world go on for a few milliseconds, at most to `until_s`."""
@@ -141,7 +145,7 @@ class SimServer:
             self._backend.advance()
             if self._poll_motions(loop.time()) or loop.time() >= end_wall_s:
                 break
-        self._waits_s = min(WAIT_S, self._waits_s + WAIT_SHARE * (loop.time() - began_wall_s))
+        self._budget.earn(loop.time() - began_wall_s)
         await asyncio.sleep(0)
 
     def _poll_motions(self, wall_s: float) -> bool:

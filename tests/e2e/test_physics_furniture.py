@@ -151,9 +151,24 @@ def test_what_cannot_be_done_with_furniture_is_said(tmp_path: Path) -> None:
     assert truth(backend, "mug_1").held_by == "hsr"
 
 
+@pytest.mark.parametrize("periods", [170, 230, 300])
+def test_an_opening_that_was_stopped_is_taken_up_again(tmp_path: Path, periods: int) -> None:
+    backend = MujocoBackend(furnished(tmp_path), [hsr()])
+    backend.begin("hsr", Motion(kind=K.OPEN, object="cupboard"))
+    for _ in range(periods):
+        backend.advance()
+    backend.stop("hsr")
+    for _ in range(20):
+        backend.advance()
+    do(backend, K.STOW)
+    do(backend, K.OPEN, object="cupboard")
+    assert truth(backend, "cupboard").states == {"is_open": True}
+    take(backend, "cup_1")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
-def test_doors_and_drawers_open_and_close_wherever_a_robot_comes_from(
+def test_doors_and_drawers_work_and_give_out_a_cup_wherever_a_robot_comes_from(
     tmp_path: Path, seed: int
 ) -> None:
     chance = random.Random(seed)
@@ -166,8 +181,19 @@ def test_doors_and_drawers_open_and_close_wherever_a_robot_comes_from(
         furniture[name] = msgspec.structs.replace(
             furniture[name], center_m=(x + chance.uniform(-0.25, 0.25), y), hinge=side
         )
-    backend = MujocoBackend(msgspec.structs.replace(world, furniture=furniture), [hsr(start)], seed)
-    for thing in ("cupboard", "dresser_drawer_1", "dresser_drawer_2"):
+    objects = dict(world.object_entries)
+    x, y = objects["cup_1"].at_m
+    objects["cup_1"] = msgspec.structs.replace(
+        objects["cup_1"], at_m=(x + chance.uniform(-0.08, 0.08), y + chance.uniform(-0.03, 0.05))
+    )
+    world = msgspec.structs.replace(world, furniture=furniture, object_entries=objects)
+    backend = MujocoBackend(world, [hsr(start)], seed)
+    do(backend, K.OPEN, object="cupboard")
+    take(backend, "cup_1")
+    do(backend, K.PLACE_AT, object="table")
+    assert truth(backend, "cup_1").support == "table"
+    do(backend, K.CLOSE, object="cupboard")
+    for thing in ("dresser_drawer_1", "dresser_drawer_2"):
         do(backend, K.OPEN, object=thing)
         assert truth(backend, thing).states == {"is_open": True}
         do(backend, K.CLOSE, object=thing)

@@ -10,6 +10,7 @@ from fleet.core.checker.plan_checker import check_allocation, check_plan
 from fleet.core.model.preconditions import applicable, made_true
 from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel, condition_holds
+from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.ids import bare_name
 from keyexpr_schema.payloads.plans import Plan
 from tests.support import random_kitchen_plans
@@ -45,13 +46,23 @@ def works(plan: Plan, world: WorldModel, allocation: dict[str, str]) -> bool:
         shared = set(actions[one].participants) & set(actions[other].participants)
         if shared and not graph.precedes(one, other):  # their order is the graph's
             return False
+
+    def kept(facts: dict[FactKey, Value]) -> bool:
+        return all(condition_holds(facts, row, world) for row in plan.always) and not any(
+            condition_holds(facts, row, world) for row in plan.never
+        )
+
     for order in orders(graph):
         facts = dict(world.facts)
+        if not kept(facts):
+            return False
         for name in order:
             action = actions[name]
             if not applicable(action, facts, world):
                 return False
             facts.update(made_true(action, facts, world))
+            if not kept(facts):
+                return False
         if not all(condition_holds(facts, condition, world) for condition in plan.conditions):
             return False
     return True
@@ -87,8 +98,9 @@ def test_a_plan_passes_exactly_if_every_order_works(
 
 
 @reaches(
-    "goal-unmet",
+    *("goal-unmet", "constraint-violated"),
     least={
+        "good with a constraint": 20,
         "good": 100,
         "bad": 100,
         **dict.fromkeys(("good and open", "condition-undone", "condition-unmet"), 5),
@@ -113,6 +125,7 @@ def test_formulas_hold_exactly_if_they_do_in_every_order(
     skills = {task.task: task.skill for task in plan.tasks}
     reached["good" if good else "bad"] += 1
     reached["good and open"] += good and is_partial(plan)
+    reached["good with a constraint"] += good and bool(plan.always or plan.never)
     reached.update({violation.code for violation in violations})
     if good:
         reached.update({f"good with {skill}" for skill in skills.values()})

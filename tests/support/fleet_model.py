@@ -6,6 +6,7 @@ order. No key, no clock, no process.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +17,7 @@ from fleet.core import events
 from fleet.core.effects import Archive, Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
 from fleet.core.indexes.plan_index import OUTSTANDING
+from fleet.core.model.skills import SkillModel
 from fleet.core.plan_entry import PlanEntry, PlanOutcome
 from fleet.core.planning_input import PlanningInput
 from fleet.core.state import LOGIC, Policy, State
@@ -57,9 +59,15 @@ class FleetModel:
     """
 
     def __init__(
-        self, robots: tuple[RobotSpec, ...], cups: int, late: bool = False, logic: int = LOGIC
+        self,
+        robots: tuple[RobotSpec, ...],
+        cups: int,
+        late: bool = False,
+        logic: int = LOGIC,
+        skills: Mapping[str, SkillModel] = SKILLS,
     ) -> None:
         self._logic = logic
+        self._skills = skills
         self.late = late
         self.answers: list[Answer] = []
         self.given_answers: list[Answer] = []
@@ -95,7 +103,7 @@ class FleetModel:
             events.PlannerStarted,
             epoch=epoch,
             incarnation=incarnation,
-            skills=dict(SKILLS),
+            skills=dict(self._skills),
             logic=self._logic,
             lineage=incarnation,
         )
@@ -280,7 +288,7 @@ class FleetModel:
 
     def facts_after(self, order: Order) -> tuple[Fact, ...]:
         """The facts that hold once the order has been carried out."""
-        action = SKILLS[order.skill].ground(order.args)
+        action = self._skills[order.skill].ground(order.args)
         return tuple(
             Fact(
                 subject=literal.variable.subject,

@@ -6,6 +6,7 @@ its causal links ask for, and then hurt a little or not at all.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import product
 
 from hypothesis import strategies as st
@@ -136,6 +137,24 @@ STARTS: tuple[dict[FactKey, Value], ...] = (
 )
 
 
+GOALS = [
+    *(
+        Condition(relation=relation, subject=thing, value=where)
+        for thing in ("cup", "jug", "box")
+        for relation in ("at", "in")
+        for where in ("box", "washer", "table", "kitchen")
+    ),
+    *(Condition(relation="clean", subject=x, value=v) for x in ("cup", "jug", "box")
+      for v in (True, False)),
+    *(Condition(relation="reachable", subject=x, value=v) for x in ("cup", "jug", "box")
+      for v in (True, False)),
+    *(Condition(relation="level", subject="jug", value=v) for v in (0, 1, 2)),
+    Condition(relation="is_open", subject="washer", value=False),
+    Condition(relation="seen", subject="box", value=True),
+    Condition(relation="at", subject="cup", value="washer", any_of=("cup", "jug", "box")),
+]  # fmt: skip
+
+
 def _possible() -> list[Action]:
     found = []
     for skill in SKILLS.values():
@@ -152,14 +171,18 @@ POSSIBLE = _possible()
 
 @st.composite
 def kitchen_plans(draw: st.DrawFn) -> tuple[Plan, WorldModel]:
-    """A plan whose actors are the robots of `ALLOCATION`, right or a little wrong, and a world."""
+    """A plan whose actors are the robots of `ALLOCATION`, right or a little wrong, and a world.
+    Some of the plans keep or avoid something all the time.
+    """
     start = draw(st.sampled_from(STARTS))
     facts: dict[FactKey, Value] = {**WORLD.facts, **start}
     walk: list[Action] = []
+    between: list[Mapping[FactKey, Value]] = []
     for _ in range(draw(st.integers(1, 6))):
         ready = [action for action in POSSIBLE if applicable(action, facts, WORLD)]
         skill = draw(st.sampled_from(sorted({action.skill.name for action in ready})))
         walk.append(draw(st.sampled_from([a for a in ready if a.skill.name == skill])))
+        between.append(dict(facts))
         facts.update(made_true(walk[-1], facts, WORLD))
     if not draw(st.integers(0, 3)):
         nearly = [a for a in POSSIBLE if first_unmet(a, facts, WORLD) is None]
@@ -169,8 +192,30 @@ def kitchen_plans(draw: st.DrawFn) -> tuple[Plan, WorldModel]:
         if tasks:
             _hurt(draw, tasks)
     goal = _goal(draw, facts)
-    made = Plan(plan="p", goals=("g",), conditions=(goal,), tasks=tuple(tasks))
+    states = [WORLD.with_facts(start).facts, *between, facts]
+    made = Plan(
+        plan="p",
+        goals=("g",),
+        conditions=(goal,),
+        tasks=tuple(tasks),
+        always=_constraint(draw, states, True),
+        never=_constraint(draw, states, False),
+    )
     return made, WORLD.with_facts(start)
+
+
+def _constraint(
+    draw: st.DrawFn, states: list[Mapping[FactKey, Value]], wanted: bool
+) -> tuple[Condition, ...]:
+    """Now and then one condition, mostly one that holds, or does not, all along the walk."""
+    if draw(st.integers(0, 3)):
+        return ()
+    kept = [
+        goal
+        for goal in GOALS
+        if all(condition_holds(facts, goal, WORLD) is wanted for facts in states)
+    ]
+    return (draw(st.sampled_from(kept if kept and draw(st.integers(0, 3)) else GOALS)),)
 
 
 def _lifted(walk: list[Action], world: WorldModel) -> tuple[Task, ...]:
@@ -212,21 +257,5 @@ def _hurt(draw: st.DrawFn, tasks: list[Task]) -> None:
 
 
 def _goal(draw: st.DrawFn, facts: dict[FactKey, Value]) -> Condition:
-    goals = [
-        *(
-            Condition(relation=relation, subject=thing, value=where)
-            for thing in ("cup", "jug", "box")
-            for relation in ("at", "in")
-            for where in ("box", "washer", "table", "kitchen")
-        ),
-        *(Condition(relation="clean", subject=x, value=v) for x in ("cup", "jug", "box")
-          for v in (True, False)),
-        *(Condition(relation="reachable", subject=x, value=v) for x in ("cup", "jug", "box")
-          for v in (True, False)),
-        *(Condition(relation="level", subject="jug", value=v) for v in (0, 1, 2)),
-        Condition(relation="is_open", subject="washer", value=False),
-        Condition(relation="seen", subject="box", value=True),
-        Condition(relation="at", subject="cup", value="washer", any_of=("cup", "jug", "box")),
-    ]  # fmt: skip
-    holding = [goal for goal in goals if condition_holds(facts, goal, WORLD)]
-    return draw(st.sampled_from(holding if draw(st.integers(0, 5)) else goals))
+    holding = [goal for goal in GOALS if condition_holds(facts, goal, WORLD)]
+    return draw(st.sampled_from(holding if draw(st.integers(0, 5)) else GOALS))

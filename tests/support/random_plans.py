@@ -63,11 +63,15 @@ def _truth(subject: str, relation: str, value: bool):  # type: ignore[no-untyped
     return replace(fact(subject, relation, None), value=value)
 
 
+def _names(model: WorldModel, kind: str) -> tuple[str, ...]:
+    return tuple(name for name in model.of_type(kind) if name != "living_room")
+
+
 def _possible(model: WorldModel) -> list[Action]:
-    names = {"robot": ROBOTS, "object": tuple(model.objects), "place": ("kitchen", "hallway")}
     found = []
     for skill in model.skills.values():
-        for values in product(*(names[kind] for kind in skill.parameters.values())):
+        names = (_names(model, kind) for kind in skill.parameters.values())
+        for values in product(*names):
             action = skill.ground(dict(zip(skill.parameters, values, strict=True)))
             apart = len(set(action.participants)) == len(action.participants)
             if apart and not any(
@@ -179,8 +183,8 @@ def _hurt(draw: st.DrawFn, tasks: list[Task]) -> None:
     elif how == "argument":
         name = draw(st.sampled_from(sorted(set(task.args) - {"robot"}) or ["robot"]))
         kind = ALL_SKILLS[task.skill].parameters[name]
-        choices = {"object": list(WORLD.objects), "place": ["kitchen", "hallway"]}.get(kind)
-        if choices:
+        choices = _names(WORLD, kind)
+        if kind != "robot" and choices:
             tasks[number] = replace(task, args={**task.args, name: draw(st.sampled_from(choices))})
     elif how == "gone":
         del tasks[number]

@@ -123,9 +123,13 @@ class Repeat:
 
 @dataclass(frozen=True)
 class Refuse:
-    """Report the attempt as refused; `reason` is a sentence."""
+    """Report the attempt as refused; `reason` is a sentence.
+
+    `fence`: it is because of the order's epoch, and this is the highest that was seen.
+    """
 
     reason: str
+    fence: int = 0
 
 
 @dataclass(frozen=True)
@@ -208,7 +212,7 @@ def decide(ledger: Ledger, order: Order) -> Decision:
     if objection is None:
         objection = _forgotten(ledger, order)
     if objection is not None:
-        return Refuse(objection)
+        return Refuse(objection, ledger.epoch if order.epoch < ledger.epoch else 0)
     return Cancel() if order.cancelled else Accept()
 
 

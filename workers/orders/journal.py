@@ -18,6 +18,7 @@ from typing import Self
 
 import msgspec
 
+from keyexpr_schema.data_folder import usable_folder
 from keyexpr_schema.key import Payload
 from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact
@@ -37,14 +38,10 @@ _KINDS: dict[str, type[Payload]] = {"fact": Fact, "report": Report}
 
 @dataclass(frozen=True)
 class Unsent:
-    """Something that must be read back from the store before it may be forgotten.
-
-    `earlier_run`: a run of the worker before this one wrote it.
-    """
+    """Something that must be read back from the store before it may be forgotten."""
 
     number: int
     payload: Fact | Report
-    earlier_run: bool
 
 
 @dataclass(frozen=True)
@@ -82,7 +79,6 @@ class Journal:
         self._retention = retention
         self._wall_s = wall_s
         self._db: sqlite3.Connection | None = None
-        self._earlier = 0
         self._reports: dict[int, AttemptName] = {}
         """The attempts of the reports that wait to be sent, by number."""
         self._last_report: dict[AttemptName, int] = {}
@@ -94,7 +90,8 @@ class Journal:
             JournalBusy: another process has it open.
             JournalUnreadable: it is not a journal, or one of another version.
         """
-        self.path.parent.mkdir(parents=True, exist_ok=True)
+        with usable_folder(self.path.parent, "worker's", JournalUnreadable):
+            self.path.touch()
         db = sqlite3.connect(self.path, timeout=0.5, isolation_level=None, check_same_thread=False)
         try:
             db.execute("PRAGMA locking_mode=EXCLUSIVE")
@@ -217,7 +214,7 @@ class Journal:
             payload = msgspec.json.decode(data, type=_KINDS[kind])
             assert isinstance(payload, (Fact, Report))
             if not self._overtaken(number, payload):
-                return Unsent(number, payload, earlier_run=number <= self._earlier)
+                return Unsent(number, payload)
             self.sent(number)
 
     def sent(self, number: int) -> None:
@@ -354,7 +351,6 @@ class Journal:
             "SELECT number, payload FROM outbox WHERE kind='report' ORDER BY number"
         ):
             self._note_waiting(number, msgspec.json.decode(payload, type=Report))
-        (self._earlier,) = db.execute("SELECT coalesce(max(number), 0) FROM outbox").fetchone()
 
 
 def _row_of(name: AttemptName) -> tuple[str, str, str, int]:

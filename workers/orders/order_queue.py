@@ -138,6 +138,7 @@ class OrderQueue:
             refusal = make_report(
                 order, self._incarnation, ReportState.REFUSED, reason=decision.reason
             )
+            refusal = replace(refusal, fence=decision.fence)
             await self._report_unless_stored(refusal, or_any=True)
 
     def _cancel(self, name: AttemptName, why: str = "the order was cancelled") -> None:

@@ -45,3 +45,13 @@ async def looks(ctx: SkillContext, viewing: Viewing) -> AsyncGenerator[dict[str,
                 break
         else:
             return
+
+
+async def look_at(ctx: SkillContext, thing: Detection) -> dict[str, Detection]:
+    """Come up to a thing and look; what was seen from there, or nothing if one cannot get there."""
+    try:
+        await ctx.do(MotionKind.APPROACH, point_m=thing.point_m)
+    except SkillFailed as failure:
+        ctx.log(f"does not get up to {thing.object}: {failure.reason}")
+        return {}
+    return {detection.object: detection for detection in await ctx.look()}

@@ -9,7 +9,7 @@ from keyexpr_schema.payloads.motions import Detection, MotionKind
 from workers.errors import SkillFailed
 from workers.skill_context import SkillContext
 from workers.skill_registry import ParameterKind, skill
-from workers.skills.looking_around import looks
+from workers.skills.looking_around import look_at, looks
 from workers.skills.viewpoints import Viewing
 
 LEAST_LOOKS = 2
@@ -44,6 +44,11 @@ async def _find(ctx: SkillContext, object: str, place: str) -> Detection:
     viewing = Viewing.of(ctx.world.places[place], ctx.spec)
     async with aclosing(looks(ctx, viewing)) as every:
         async for seen in every:
+            if object not in seen and viewing.looks == 1:
+                # What is in something is seen from before it.
+                inside = [seen[c] for c in ctx.world.carriers(object) if c in seen]
+                for container in inside[:1]:
+                    seen |= await look_at(ctx, container)
             if (found := seen.get(object)) is not None:
                 where = ctx.world.whereabouts(found)
                 if ctx.world.place_of(where) in (place, None):

@@ -1,4 +1,4 @@
-"""A fleet kept up through 500 missions with restarts in between: see `benchmarks.scale.soak`."""
+"""A fleet kept up through 2,500 missions with restarts in between: see `benchmarks.scale.soak`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 
 from benchmarks.scale.soak import live, summed_up
 
-MISSIONS = 500
-KILL_EVERY = 20
+MISSIONS = 2500
+KILL_EVERY = 50
 LIMIT_S = 1200.0
 
 

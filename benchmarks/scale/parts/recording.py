@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import tempfile
 import time
 from pathlib import Path
@@ -12,18 +13,32 @@ from benchmarks.scale.processes import folder_mb
 from benchmarks.scale.soak import soaking
 
 SECONDS = 600.0
+WITHOUT_S = 60.0
+"""So long the same missions are lived through without a recorder beforehand."""
 FOLDER = "recording"
 
 
 def measure(quick: bool) -> list[dict[str, Any]]:
-    """A row for each sixth of the time."""
-    return asyncio.run(_run(60.0 if quick else SECONDS))
+    """A row for the missions without a recorder, and one for each sixth of the time with it."""
+    return asyncio.run(_run(*(10.0, 60.0) if quick else (WITHOUT_S, SECONDS)))
 
 
-async def _run(seconds: float) -> list[dict[str, Any]]:
+async def _run(without_s: float, seconds: float) -> list[dict[str, Any]]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         async with soaking(folder) as soak:
+            before, began_s = 0, time.perf_counter()
+            while time.perf_counter() - began_s < without_s:
+                await soak.mission(before)
+                before += 1
+            rows: list[dict[str, Any]] = [
+                {
+                    "without": True,
+                    "after_s": time.perf_counter() - began_s,
+                    "missions": before,
+                    "load": os.getloadavg()[0],
+                }
+            ]
             recordings = folder / FOLDER
             recordings.mkdir()
             recorder = soak.fleet.robotctl(
@@ -31,15 +46,17 @@ async def _run(seconds: float) -> list[dict[str, Any]]:
             )
             await recorder.start()
             try:
-                rows, missions, began_s = [], 0, time.perf_counter()
+                missions, began_s = 0, time.perf_counter()
                 for sixth in range(1, 7):
                     while time.perf_counter() - began_s < seconds * sixth / 6:
-                        await soak.mission(missions)
+                        await soak.mission(before + missions)
                         missions += 1
                     rows.append(
                         {
+                            "without": False,
                             "after_s": time.perf_counter() - began_s,
                             "missions": missions,
+                            "load": os.getloadavg()[0],
                             "cpu_s": recorder.cpu_s(),
                             "rss_mb": recorder.rss_mb(),
                             "files": sum(1 for _ in recordings.iterdir()),

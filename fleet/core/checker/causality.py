@@ -10,8 +10,9 @@ from collections.abc import Mapping
 from functools import cached_property
 
 from fleet.core.checker.actor_requirements import Requirement
+from fleet.core.checker.plan_goals import PlanGoals
 from fleet.core.checker.quantities import BasketLoads
-from fleet.core.checker.reachable_states import MOST_NAMED, Failure, ReachableStates, Undecided
+from fleet.core.checker.reachable_states import ReachableStates, Undecided, listed
 from fleet.core.checker.writers import Writers
 from fleet.core.model.derived import holds, read_by
 from fleet.core.model.formulas.nodes import (
@@ -22,7 +23,6 @@ from fleet.core.model.formulas.nodes import (
     Formula,
     Holds,
     Not,
-    Or,
     Stored,
     Sum,
     Total,
@@ -30,9 +30,9 @@ from fleet.core.model.formulas.nodes import (
 from fleet.core.model.formulas.text import formula_text
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
-from fleet.core.model.world import WorldModel, capacity, condition_holds, known_value
+from fleet.core.model.world import WorldModel, capacity, known_value
 from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value, render_value
-from keyexpr_schema.ids import actor_arg, actor_in, bare_name
+from keyexpr_schema.ids import actor_in, bare_name
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan, Violation
 
@@ -80,30 +80,8 @@ class Causality:
                 self._check_formula(task, formula)
             for carrier in action.space_in:
                 self._check_space(task, carrier)
-        self._check_goals()
-
-    def _check_goals(self) -> None:
-        final = self._final_facts() if self._unbound else {}
-        for condition in self._plan.conditions:
-            rows = (
-                Literal(FactKey(condition.relation, s), condition.value) for s in condition.subjects
-            )
-            formula = Or(tuple(Holds(row) for row in rows))
-            try:
-                failure = self._states.failure(formula, None, aboard=True)
-            except Undecided:
-                failure = Failure(formula, ())
-            if failure is None:
-                continue
-            if self._unbound and condition_holds(final, condition, self._world):
-                continue
-            sentence = f"{condition} does not hold when the plan is done"
-            if failure.open:
-                sentence = (
-                    f"whether {condition} holds when the plan is done depends on the order of too "
-                    f"many tasks: say which of {', '.join(failure.after)} come first"
-                )
-            self._report("goal-unmet", sentence, condition=condition)
+        goals = PlanGoals(self._plan, self._world, self._graph, self._writers, self._states)
+        self.violations += goals.violations(self.requirements if self._unbound else None)
 
     def _is_plain(self, literal: Literal) -> bool:
         """Whether it depends on its own variable alone, and on tasks that write it in any case."""
@@ -149,9 +127,7 @@ class Causality:
         if failure is None:
             return
         needs = f"{task} needs {what or formula_text(failure.part)}"
-        names = ", ".join(failure.after[:MOST_NAMED])
-        if (more := len(failure.after) - MOST_NAMED) > 0:
-            names += f" and {more} more"
+        names = listed(failure.after)
         if failure.open:
             code, why = (
                 "too-many-orders",
@@ -193,18 +169,21 @@ class Causality:
 
     def _check_condition(self, task: str, literal: Literal) -> None:
         graph, variable = self._graph, literal.variable
-        rows = [row for row in self._writers.plain.get(variable, ()) if row[0] != task]
-        good = {value for _, value in rows if self._holds(literal, value)}
-        restorers = [w for w, value in rows if value in good and graph.precedes(w, task)]
-        for writer, value in rows:
-            if value in good or graph.precedes(task, writer):
-                continue
-            if not any(graph.precedes(writer, restorer) for restorer in restorers):
-                verb = "makes" if graph.precedes(writer, task) else "may make"
-                undone = f"{writer} {verb} it {render_value(value)} before"
-                self._unmet("condition-undone", task, literal, undone)
-                return
-        if not restorers:
+        every = same = 0
+        for value, mask in self._writers.by_value(variable).items():
+            every |= mask
+            if self._holds(literal, value):
+                same |= mask
+        restorers = graph.last_before(task, same)
+        others = every & ~same
+        for restorer in restorers:
+            others &= ~graph.before(restorer)
+        writer = graph.first_not_after(task, others)
+        if writer is not None:
+            verb = "makes" if graph.precedes(writer, task) else "may make"
+            made = render_value(self._writers.value(writer, variable))
+            self._unmet("condition-undone", task, literal, f"{writer} {verb} it {made} before")
+        elif not restorers:
             self._check_at_start(task, literal)
 
     def _check_at_start(self, task: str, literal: Literal) -> None:
@@ -270,26 +249,3 @@ class Causality:
                 there = And((there, Not(held)))
             rows.append(Total("", "", there, Constant(1)))
         return Compare(Sum(tuple(rows)), "<", Constant(room))
-
-    def _final_facts(self) -> dict[FactKey, Value]:
-        """Every variable at the end; unknown where the order of its last writers is open."""
-        final: dict[FactKey, Value] = dict(self._world.facts)
-        # What is required of an actor at the start holds of the robot that will be it.
-        for actor, requirement in self.requirements.items():
-            for relation, (value, _) in requirement.facts.items():
-                final[FactKey(relation, actor)] = value
-        for variable, rows in self._writers.plain.items():
-            last = {
-                value
-                for writer, value in rows
-                if not any(self._graph.precedes(writer, other) for other, _ in rows)
-            }
-            final[variable] = last.pop() if len(last) == 1 else None
-        pinned = {actor_arg(actor): robot for actor, robot in self._plan.pins.items()}
-        for variable in self._writers.plain:
-            value = final[variable]
-            if isinstance(value, str) and value in pinned:
-                value = final[variable] = pinned[value]
-            if variable.subject in pinned:
-                final[FactKey(variable.relation, pinned[variable.subject])] = value
-        return final

@@ -21,6 +21,12 @@ class BasketLoads:
         self._moves = {
             thing: rows for thing in world.objects if (rows := writes.get(FactKey(AT, thing)))
         }
+        self._things: dict[Value, set[str]] = {}
+        """By where they are at the start, or come to be."""
+        for thing in world.objects:
+            places = {world.value(AT, thing), *(to for _, to in self._moves.get(thing, ()))}
+            for place in places:
+                self._things.setdefault(place, set()).add(thing)
 
     def before(self, task: str, action: Action, carrier: str) -> tuple[int, int]:
         """Objects in the carrier's basket when the task begins: that are there at the start, and
@@ -33,7 +39,7 @@ class BasketLoads:
             if literal.variable.relation == AT and literal.value == carrier
         }
         at_start = planned = 0
-        for thing in self._world.objects.keys() - own:
+        for thing in self._things.get(carrier, set()) - own:
             rows = self._moves.get(thing, ())
             if any(
                 value == carrier

@@ -10,7 +10,7 @@ order of some tasks must be said.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -34,6 +34,13 @@ State = tuple[Value, ...]
 
 class Undecided(Exception):
     """It depends on which robot an actor will be."""
+
+
+def listed(tasks: Sequence[str]) -> str:
+    """Tasks as a sentence names them, if there are many the first few."""
+    names = ", ".join(tasks[:MOST_NAMED])
+    more = len(tasks) - MOST_NAMED
+    return f"{names} and {more} more" if more > 0 else names
 
 
 @dataclass(frozen=True)
@@ -82,6 +89,21 @@ class ReachableStates:
                 return found
         if undecided:
             raise Undecided
+        return None
+
+    def failure_at_any_time(self, formula: Formula, *, aboard: bool = False) -> Failure | None:
+        """What of the formula does not hold all the time, before and after each task.
+
+        Raises:
+            Undecided: it depends on which robots actors will be.
+        """
+        for part in conjuncts(expanded(formula, self._world)):
+            _, may_not = outcomes(part, self._ever, self._world, aboard=aboard)
+            if not may_not:
+                continue
+            read = self._closure(reads(part, self._ever, self._world, aboard=aboard))
+            if (found := self._in_all_states(part, None, read, aboard, at_end=False)) is not None:
+                return found
         return None
 
     def _part(self, part: Formula, task: str | None, aboard: bool) -> Failure | None:
@@ -181,9 +203,15 @@ class ReachableStates:
         return self._too_many(part, mask) if self._gave_up else None
 
     def _in_all_states(
-        self, part: Formula, task: str | None, read: frozenset[FactKey], aboard: bool
+        self,
+        part: Formula,
+        task: str | None,
+        read: frozenset[FactKey],
+        aboard: bool,
+        at_end: bool = True,
     ) -> Failure | None:
-        """Where effects depend on what holds: every state from the start on."""
+        """Every state from the start on, where effects depend on what holds: those before the task,
+        or (`None`) those when all is done, or without `at_end` all that there are."""
         graph = self._graph
         mask = 0
         for variable in read:
@@ -202,6 +230,8 @@ class ReachableStates:
         if task is not None:
             must &= graph.before(task)
             never = graph.behind(task) | graph.mask((task,))
+        elif not at_end:
+            must = 0
         judged: dict[State, bool] = {}
         for done, states_then in explored.items():
             if done & must != must or done & never:

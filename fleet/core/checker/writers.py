@@ -20,6 +20,7 @@ class Writers:
         self._graph, self._actions = graph, actions
         self.plain: dict[FactKey, list[tuple[str, Value]]] = defaultdict(list)
         self.guarded: dict[str, tuple[Guarded, ...]] = {}
+        self._by_value: dict[FactKey, dict[Value, int]] = defaultdict(dict)
         self._plain_mask: dict[FactKey, int] = defaultdict(int)
         self._guarded_mask: dict[FactKey, int] = defaultdict(int)
         self._values: dict[FactKey, dict[str, Value]] = defaultdict(dict)
@@ -31,6 +32,8 @@ class Writers:
             for variable, value in actions[task].after:
                 self.plain[variable].append((task, value))
                 self._plain_mask[variable] |= bit
+                same = self._by_value[variable]
+                same[value] = same.get(value, 0) | bit
                 self._values[variable][task] = value
             rows = tuple(row for e in actions[task].conditional for row in instances(e, world))
             if rows:
@@ -49,6 +52,14 @@ class Writers:
     def mask(self, variable: FactKey) -> int:
         """Every task that writes it, or may."""
         return self._plain_mask.get(variable, 0) | self._guarded_mask.get(variable, 0)
+
+    def plain_mask(self, variable: FactKey) -> int:
+        """The tasks that write it in any case."""
+        return self._plain_mask.get(variable, 0)
+
+    def by_value(self, variable: FactKey) -> Mapping[Value, int]:
+        """The tasks that write it in any case, as a bit set for each value."""
+        return self._by_value.get(variable, {})
 
     def guarded_mask(self, variable: FactKey) -> int:
         """The tasks that write it depending on what holds."""
@@ -78,6 +89,6 @@ class Writers:
             here &= ~(graph.behind(task) | graph.mask((task,)))
             before = here & graph.before(task)
         sure = before & self._plain_mask.get(variable, 0)
-        for last in graph.last(sure):
+        for last in graph.last_of(sure):
             here &= ~graph.before(last)
         return here, sure == 0

@@ -15,10 +15,7 @@ from fleet.core.indexes.plan_index import robots_of
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.replan_reasons import ReplanScope
 from fleet.core.state import State
-from fleet.core.state_updates import (
-    set_entry,
-    touch,
-)
+from fleet.core.state_updates import set_records, touch
 from keyexpr_schema.payloads.tasks import TaskState
 
 SINCE_LOGIC = 1
@@ -84,22 +81,21 @@ def _give_up(state: State, plan: str, robot: str, reason: str) -> State:
         given_up = [replace(record, reason=reason) for record in under_way]
         unwanted = (*entry.unwanted, *(record.task for record in given_up))
         entry = replace(entry, unwanted=unwanted)
-    entry = replace(entry, records=entry.records.updated({r.task: r for r in given_up}))
     entry = entry.to_replan(ReplanScope.REALLOCATE, reason, robots=(robot,))
-    return set_entry(state, entry)
+    return set_records(state, entry, given_up)
 
 
 def _write_off(state: State, robot: str, reason: str) -> State:
     """Nobody will ever report on these orders."""
     for plan in sorted({plan for plan, _ in state.index.work.get(robot, ())}):
         entry = state.plans[plan]
-        written_off = {
-            record.task: replace(record, state=TaskState.CANCELLED, reason=reason)
+        written_off = [
+            replace(record, state=TaskState.CANCELLED, reason=reason)
             for record in entry.outstanding()
             if record.robot == robot
-        }
+        ]
         if written_off:
-            state = set_entry(state, replace(entry, records=entry.records.updated(written_off)))
+            state = set_records(state, entry, written_off)
     return state
 
 

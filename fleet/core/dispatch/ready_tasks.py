@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
 from fleet.core.indexes.fleet_index import carried_by
-from fleet.core.model.preconditions import action_of, unmet_before, variables_of
+from fleet.core.model.preconditions import action_of, first_broken, unmet_before, variables_of
 from fleet.core.model.skills import Action
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import ReplanScope
@@ -82,7 +82,9 @@ def order_if_ready(state: State, plan: str, task: str, reservations: bool = True
         return state
     if _touches_unwanted_work(state, action):
         return state
-    if (unmet := unmet_before(action, state.world())) is not None:
+    world, plan_ = state.world(), entry.plan
+    unmet = unmet_before(action, world) or first_broken(action, plan_.always, plan_.never, world)
+    if unmet is not None:
         reason = f"{record.task} ({record.skill}) cannot start: {unmet}"
         goals, tasks = (record.goal,), (record.task,)
         entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=goals, tasks=tasks)
@@ -110,7 +112,8 @@ def _touches_unwanted_work(state: State, action: Action) -> bool:
     """
     world = state.world()
     variables = variables_of(action, world)
-    for entry in state.plans.values():
+    for plan in state.index.dropping:
+        entry = state.plans[plan]
         for task in entry.unwanted:
             if task in entry.index.outstanding:
                 other = action_of(entry.records[task], state.skills)

@@ -42,7 +42,7 @@ def contradicted(state: State, entry: PlanEntry, fact: Fact) -> PlanEntry | None
     for task, needed in _needs_about(state, entry, fact.key):
         record = entry.records[task]
         if evaluate(needed, world.facts.get, world) or _is_still_to_be_made(
-            entry, needed, fact.key, world
+            entry, task, needed, world
         ):
             continue
         if record.state in OUTSTANDING and fact.source == record.robot:
@@ -79,21 +79,20 @@ def _needs_about(state: State, entry: PlanEntry, known: FactKey) -> Iterator[tup
                     yield task, formula
 
 
-def _is_still_to_be_made(
-    entry: PlanEntry, needed: Formula, known: FactKey, world: WorldModel
-) -> bool:
-    """Whether what the need is read off, other than the variable that has become known, is yet to
-    change."""
+def _is_still_to_be_made(entry: PlanEntry, task: str, needed: Formula, world: WorldModel) -> bool:
+    """Whether something that the need is read off is yet to change: of what it names, by tasks
+    before, and of what else it is read off, by any other."""
+    graph = entry.index.graph
     formula = expanded(needed, world)
-    read = reads(formula, lambda key: (world.facts.get(key),), world) - {known}
-    if isinstance(needed, Holds):
-        read.discard(needed.literal.variable)
-    setters = entry.index.graph.setters
-    return any(
-        entry.records[task].state not in ENDED_TASKS
-        for variable in read
-        for task in (*setters.get(variable, ()), *setters.get(FactKey(variable.relation, ANY), ()))
-    )
+    read = reads(formula, lambda key: (world.facts.get(key),), world)
+    for variable in read:
+        names: Iterable[str] = graph.suppliers.get((task, variable), ())
+        if variable not in graph.needs[task]:
+            of_any = FactKey(variable.relation, ANY)
+            names = (*graph.setters.get(variable, ()), *graph.setters.get(of_any, ()))
+        if any(n != task and entry.records[n].state not in ENDED_TASKS for n in names):
+            return True
+    return False
 
 
 def _is_being_made(state: State, entry: PlanEntry, fact: Fact) -> bool:
@@ -127,7 +126,29 @@ def _is_of_its_making(record: TaskRecord, action: Action, fact: Fact, world: Wor
 
 def unforeseen(state: State, entry: PlanEntry) -> PlanEntry | None:
     """The entry with what has come up that the plan does not provide for, if anything has."""
-    return _found_or_not_done(state, entry) or _new_robots(state, entry)
+    return (
+        _found_or_not_done(state, entry)
+        or _constraint_broken(state, entry)
+        or _new_robots(state, entry)
+    )
+
+
+def _constraint_broken(state: State, entry: PlanEntry) -> PlanEntry | None:
+    """With what must always, or never, hold and is otherwise: no plan for those goals is left."""
+    if not (entry.plan.always or entry.plan.never):
+        return None
+    world = state.world()
+    for goal in entry.plan.goals:
+        status, spec = state.goal_states.get(goal), state.goals.get(goal)
+        if spec is None or status is None or status.state is GoalState.REACHED:
+            continue
+        for rows, wanted in ((spec.always, True), (spec.never, False)):
+            for condition in rows:
+                if world.holds(condition) is not wanted:
+                    often, does = ("always", "does not") if wanted else ("never", "does now")
+                    sentence = f"{condition} must {often} hold, and {does}"
+                    return entry.to_replan(ReplanScope.REPAIR, sentence, goals=(goal,))
+    return None
 
 
 def _found_or_not_done(state: State, entry: PlanEntry) -> PlanEntry | None:

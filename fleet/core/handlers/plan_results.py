@@ -8,7 +8,6 @@ from msgspec.structs import replace
 
 from fleet.core import events
 from fleet.core.dispatch.replan_triggers import contradicted
-from fleet.core.effects import status_of
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.replan_reasons import ReplanReason, TaskAdded, Wish
@@ -25,6 +24,7 @@ from fleet.core.state_updates import (
     without_goal,
 )
 from fleet.core.table import Table
+from fleet.core.view import status_of
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
 from keyexpr_schema.payloads.requests import Answer
@@ -200,11 +200,10 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
         assert preview.request is not None
         state = _without_preview(state, preview.request)
         return answer(state, preview.request, False, event.reason, violations=event.violations)
-    entry = next(
-        (b for b in state.plans.values() if b.job is not None and b.job.job == event.job), None
-    )
-    if entry is None or entry.job is None:
+    if (plan := state.index.job_of.get(event.job)) is None:
         return state
+    entry = state.plans[plan]
+    assert entry.job is not None
     job, first = entry.job, entry.plan.revision == 1 and not entry.records
     entry, reasons, wishes = replace(
         entry,
@@ -218,15 +217,16 @@ def planning_failed(state: State, event: events.PlanningFailed) -> State:
     if first:
         entry = replace(entry, state=PlanState.REJECTED, reason=event.reason)
         state = set_entry(state, entry)
-        state = mark_goals(state, entry.plan.goals, GoalState.WAITING, None, event.reason)
+        for goal in entry.plan.goals:
+            state = mark_goals(state, (goal,), GoalState.WAITING, None, event.reason_for(goal))
         if job.partial:  # nobody has asked for this plan who now knows better
             state = _wait_for_robots(state, job, dict.fromkeys(event.for_robots, event.reason))
         return answer(state, job.request, False, event.reason, entry.plan.plan, event.violations)
     for wish in wishes:
         sentence = f"{wish.refusal}: {event.reason}"
-        plan = entry.plan.plan
         state = answer(state, wish.request, False, sentence, plan, event.violations)
-        state = mark_goals(state, wish.goals, GoalState.WAITING, None, event.reason)
+        for goal in wish.goals:
+            state = mark_goals(state, (goal,), GoalState.WAITING, None, event.reason_for(goal))
         if wish.request is None:
             waiting = [goal for goal in wish.goals if goal in event.for_robots]
             state = _wait_for_robots(state, job, dict.fromkeys(waiting, event.reason))

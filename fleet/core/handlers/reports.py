@@ -25,6 +25,7 @@ from fleet.core.state_updates import (
     without_goal,
 )
 from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.system import LARGEST_EPOCH
 from keyexpr_schema.payloads.tasks import Report, ReportState, TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact
 
@@ -63,6 +64,8 @@ def report_received(state: State, event: events.ReportReceived) -> State:
             return _failed(state, entry, record, report)
         case ReportState.INTERRUPTED:
             return _interrupted(state, entry, record, report)
+        case ReportState.REFUSED if report.epoch < report.fence <= LARGEST_EPOCH:
+            return state  # of this planner's epoch, not of the attempt: it is ordered with a higher
         case ReportState.REFUSED:
             if entry.ended or record.task in entry.unwanted:
                 return set_record(state, entry, _ended(record, report, TaskState.CANCELLED))

@@ -99,15 +99,7 @@ def _start_planning(state: State, ask: PlanRequest) -> State:
 
 def _is_known(state: State, request: str) -> bool:
     """Whether a request was answered, or is in work."""
-    return (
-        request in state.answers
-        or request in state.previews
-        or any(
-            (entry.job is not None and entry.job.request == request)
-            or any(wish.request == request for wish in entry.wishes)
-            for entry in state.plans.values()
-        )
-    )
+    return request in state.answers or request in state.previews or request in state.index.asked
 
 
 def _planning(state: State, plan: Plan, job: PlanningJob) -> State:

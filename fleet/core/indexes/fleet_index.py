@@ -40,7 +40,9 @@ class FleetIndex(msgspec.Struct, frozen=True, eq=False):
     `at` facts by value, `said_on` the variables of facts that say `on` or `in`, `parts` things by
     what they are parts of, `goals_about` the goals that have not ended by the subjects of their
     conditions, `plans_of` the active plans by goal. `in_state` has the goals that wait, or were
-    rejected. `team` are the robots that can be planned with.
+    rejected. `job_of` has the plans by the number of their planning job, `asked` by the requests
+    that are in work for them, `dropping` those that have tasks which they do without. `team` are
+    the robots that can be planned with.
     """
 
     active: Table[str, int] = Table()
@@ -51,6 +53,9 @@ class FleetIndex(msgspec.Struct, frozen=True, eq=False):
     goals_about: Sets = immutables.Map()
     plans_of: immutables.Map[str, tuple[str, ...]] = immutables.Map()
     in_state: immutables.Map[GoalState, Names] = immutables.Map()
+    job_of: immutables.Map[int, str] = immutables.Map()
+    asked: Sets = immutables.Map()
+    dropping: Names = EMPTY
     team: Names = EMPTY
 
     def __eq__(self, other: object) -> bool:
@@ -115,6 +120,21 @@ def priority_of(entry: PlanEntry, goals: Mapping[str, Goal]) -> int:
     return max((goals[goal].priority for goal in entry.plan.goals if goal in goals), default=0)
 
 
+def requests_of(entry: PlanEntry | None) -> frozenset[str]:
+    """The requests that are in work for a plan."""
+    if entry is None:
+        return frozenset()
+    found = {wish.request for wish in entry.wishes}
+    if entry.job is not None:
+        found.add(entry.job.request)
+    return frozenset(request for request in found if request is not None)
+
+
+def job_of(entry: PlanEntry | None) -> int | None:
+    """The number of a plan's planning job."""
+    return None if entry is None or entry.job is None else entry.job.job
+
+
 def index_of(
     plans: Mapping[str, PlanEntry],
     goals: Mapping[str, Goal],
@@ -126,7 +146,10 @@ def index_of(
     """The index of these plans, goals and facts, derived anew."""
     work: dict[str, dict[Order, None]] = {}
     plans_of: dict[str, list[str]] = {}
+    asked: Sets = immutables.Map()
     for plan, entry in plans.items():
+        for request in requests_of(entry):
+            asked = in_set(asked, request, plan, True)
         for record in entry.outstanding():
             for robot in robots_of(record):
                 work.setdefault(robot, {})[plan, record.task] = None
@@ -160,6 +183,9 @@ def index_of(
         goals_about=goals_about,
         plans_of=immutables.Map({goal: tuple(names) for goal, names in plans_of.items()}),
         in_state=in_state,
+        job_of=immutables.Map({e.job.job: p for p, e in plans.items() if e.job is not None}),
+        asked=asked,
+        dropping=immutables.Map({p: None for p, e in plans.items() if e.unwanted}),
         team=immutables.Map(dict.fromkeys(team)),
     )
 

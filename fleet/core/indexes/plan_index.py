@@ -80,15 +80,11 @@ class PlanGraph:
         self.suppliers: dict[tuple[str, FactKey], tuple[str, ...]] = {}
         self.consumers: dict[str, list[tuple[str, FactKey]]] = defaultdict(list)
         masks: dict[FactKey, int] = defaultdict(int)
-        of_relation: dict[str, int] = defaultdict(int)
         for variable, names in self.setters.items():
             masks[variable] = graph.mask(names)
-            of_relation[variable.relation] |= masks[variable]
         for name, variables in self.needs.items():
             for variable in variables:
                 mask = masks.get(variable, 0) | masks.get(FactKey(variable.relation, ANY), 0)
-                if variable.subject == ANY:
-                    mask = of_relation.get(variable.relation, 0)
                 if mask and (last := graph.last_before(name, mask)):
                     self.suppliers[name, variable] = last
                     for supplier in last:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from fleet.core.model.derived import holds
 from fleet.core.model.formulas.abstraction import reads
@@ -11,8 +11,9 @@ from fleet.core.model.formulas.evaluation import conjuncts, evaluate, expanded
 from fleet.core.model.formulas.nodes import Formula, Holds, Variable, atoms
 from fleet.core.model.formulas.text import formula_text
 from fleet.core.model.skills import Action, Skills
-from fleet.core.model.world import WorldModel, known_value, room_left
+from fleet.core.model.world import WorldModel, condition_holds, known_value, room_left
 from keyexpr_schema.facts import FactKey, Literal, Value, render_value
+from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.tasks import TaskRecord
 
 ANY = "$"
@@ -83,6 +84,20 @@ def made_true(
         return known_value(variable, facts, world)
 
     return (*action.after, *carried_out(_guarded(action, world), value_of, world))
+
+
+def first_broken(
+    action: Action, always: Iterable[Condition], never: Iterable[Condition], world: WorldModel
+) -> str | None:
+    """The first condition that would not always, or once, hold if the action were done now, as a
+    phrase, or `None`."""
+    facts: Mapping[FactKey, Value] | None = None
+    for condition, wanted in (*((c, True) for c in always), *((c, False) for c in never)):
+        if facts is None:
+            facts = {**world.facts, **dict(made_true(action, world.facts, world))}
+        if condition_holds(facts, condition, world) is not wanted:
+            return f"{condition} would {'not ' if wanted else ''}hold then"
+    return None
 
 
 def effects_hold(action: Action, world: WorldModel) -> bool:

@@ -108,17 +108,22 @@ class TaskGraph:
 
     def last_before(self, task: str, mask: int) -> tuple[str, ...]:
         """Of the tasks in `mask`, those before `task` with no other of them in between."""
-        return self.last(self._ancestors[self._index[task]] & mask)
+        return self.last_of(self._ancestors[self._index[task]] & mask)
 
-    def last(self, mask: int) -> tuple[str, ...]:
-        """Of the tasks in a bit set, those that no other of them follows."""
-        rest = mask
+    def last_of(self, mask: int) -> tuple[str, ...]:
+        """Of the tasks in `mask`, those with no other of them behind them."""
         found = []
-        while rest:
-            index = rest.bit_length() - 1
+        while mask:
+            index = mask.bit_length() - 1
             found.append(self.order[index])
-            rest &= ~(self._ancestors[index] | 1 << index)
+            mask &= ~(self._ancestors[index] | 1 << index)
         return tuple(found)
+
+    def first_not_after(self, task: str, mask: int) -> str | None:
+        """Of the tasks in `mask`, the first in `order` that is neither this one nor after it."""
+        number = self._index[task]
+        mask &= ~(self._descendants[number] | 1 << number)
+        return self.order[(mask & -mask).bit_length() - 1] if mask else None
 
     def reduced(self) -> dict[str, tuple[str, ...]]:
         """The fewest edges with the same meaning: task to the tasks it waits for directly."""

@@ -209,16 +209,6 @@ class WorldModel:
         """Whether the facts say that the condition holds."""
         return condition_holds(self.facts, condition, self)
 
-    def plain(self) -> WorldModel:
-        """The same world in dictionaries, for searches that look things up a million times."""
-        return replace(
-            self,
-            places=dict(self.places),
-            objects=dict(self.objects),
-            robots=dict(self.robots),
-            facts=dict(self.facts),
-        )
-
     def with_facts(self, facts: Mapping[FactKey, Value]) -> WorldModel:
         """The same world with some facts changed."""
         return replace(self, facts={**self.facts, **facts})

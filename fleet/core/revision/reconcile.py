@@ -110,20 +110,21 @@ def _going_on(
     for name in _under_way(entry, started):
         under_way.setdefault(_call_of(entry.records[name]), []).append(name)
     names: dict[str, str] = {}
-    skipped: set[str] = set()
+    found = ended = skipped = graph.mask(())
     for task in graph.order:
         if not under_way.get(calls[task]):
             continue
-        before = {name for name in graph.order if graph.precedes(name, task)}
-        ended = {new for new, old in names.items() if entry.records[old].state in ENDED_TASKS}
-        before -= ended
-        if names.keys().isdisjoint(before) and all(
-            _holds_already(calls[name], world) for name in before
+        before = graph.before(task) & ~ended
+        if not before & found and all(
+            _holds_already(calls[name], world) for name in graph.named(before)
         ):
             # The same call twice: in the order in which they were given out.
-            names[task] = under_way[calls[task]].pop(0)
+            names[task] = old = under_way[calls[task]].pop(0)
+            found |= graph.mask((task,))
+            if entry.records[old].state in ENDED_TASKS:
+                ended |= graph.mask((task,))
             skipped |= before
-    return names, frozenset(skipped)
+    return names, frozenset(graph.named(skipped))
 
 
 def _holds_already(call: Call, world: WorldModel) -> bool:

@@ -81,6 +81,8 @@ def _plan(
         strategy=problem.strategy,
         made_by="llm",
         allocator=problem.allocator,
+        always=problem.always,
+        never=problem.never,
     )
 
 

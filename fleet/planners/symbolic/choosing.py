@@ -282,4 +282,6 @@ def _plan(problem: PlanningProblem, choice: Choice, explored: Exploration | None
         made_by="symbolic",
         allocator=problem.allocator,
         seeks=tuple(explored.seeks) if explored else (),
+        always=problem.always,
+        never=problem.never,
     )

@@ -30,6 +30,7 @@ from fleet.planners.symbolic.action_sequences import (
     subgoals_in_order,
 )
 from fleet.planners.symbolic.choosing import Choice, choose
+from fleet.planners.symbolic.engine.finite_domain import Trajectory
 from fleet.planners.symbolic.engine.instantiation import Facts
 
 MAX_RESTORATIONS = 2
@@ -140,7 +141,9 @@ class _Reached:
         """
         settled = frozenset(self.settled)
         budget = self.budget if share == 1.0 else self.budget.part(share)
-        found = alternatives_for(subgoal, self.facts, self.problem.world, budget, settled)
+        problem = self.problem
+        way = Trajectory(problem.always, problem.never)
+        found = alternatives_for(subgoal, self.facts, problem.world, budget, settled, way)
         if not isinstance(found, tuple):
             self.failure = found
             return False

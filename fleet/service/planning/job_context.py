@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Set
 
 from fleet.core.planning_input import PlanningInput
+from fleet.jobshop.time_budget import TimeBudget
 from fleet.scheduling.allocation_context import AllocationContext
 from keyexpr_schema.ids import actor_in
 from keyexpr_schema.payloads.plans import Plan
 
 
-def context_of(given: PlanningInput, busy: frozenset[str]) -> AllocationContext:
+def context_of(given: PlanningInput, busy: frozenset[str], limit: TimeBudget) -> AllocationContext:
     """What a planning job is allocated in, in seconds from now; actors in `busy` are under way."""
     job = given.job
     robots = {spec.robot for spec in given.robots}
@@ -23,6 +24,7 @@ def context_of(given: PlanningInput, busy: frozenset[str]) -> AllocationContext:
         },
         actor_order=job.actor_order,
         under_way=busy | frozenset(job.begun_actors),
+        limit=limit,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from dataclasses import replace as changed
 from typing import Any
@@ -18,14 +18,18 @@ from fleet.core.model.world import WorldModel
 from fleet.core.planning_input import InterpretationInput, PlanningInput
 from fleet.jobshop.time_budget import Clock, TimeBudget
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
+from fleet.planners.contradictions import contradictions, reasons_of
 from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
 from fleet.planners.plan_repair import repair_plan
 from fleet.service.composition import Composition
 from fleet.service.planning.job_context import context_of, robots_under_way
+from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan
 
 PLANNERS_SHARE = 0.5
 """Of a job's time, how much its planner has; allocating and checking take the rest."""
+ALLOCATED_BY = 0.9
+"""When, of a job's time, allocators should have come to an answer."""
 
 
 def run_planning_job(
@@ -36,8 +40,9 @@ def run_planning_job(
     `clock` is what the planner's share of the time limit goes by.
     """
     started = time.perf_counter()
+    limit = TimeBudget(given.limit_s, clock)
     budget = TimeBudget(PLANNERS_SHARE * given.limit_s, clock)
-    result = _result(given, composition, budget)
+    result = _result(given, composition, budget, limit.until(ALLOCATED_BY))
     for_robots = _goals_for_robots(given, composition.feasibility, result, budget)
     took_s = time.perf_counter() - started
     if isinstance(result, PlanningSucceeded):
@@ -57,6 +62,7 @@ def run_planning_job(
         planning_time_s=took_s,
         postponed=result.postponed,
         for_robots=for_robots,
+        goal_reasons=dict(result.goal_reasons),
     )
 
 
@@ -74,7 +80,7 @@ def run_interpretation(given: InterpretationInput, composition: Composition) -> 
 
 
 def _result(
-    given: PlanningInput, composition: Composition, budget: TimeBudget
+    given: PlanningInput, composition: Composition, budget: TimeBudget, limit: TimeBudget
 ) -> PlanningSucceeded | NoPlan:
     job = given.job
     allocator = composition.allocators.get(job.allocator)
@@ -85,7 +91,7 @@ def _result(
     if planner is None:
         choices = ", ".join(sorted(composition.planners))
         return NoPlan(f"there is no planner {job.planner}: choose one of {choices}")
-    run = _Run(given, given.world(), planner, composition.feasibility, allocator, budget)
+    run = _Run(given, given.world(), planner, composition.feasibility, allocator, budget, limit)
     return run.repaired() or run.planned()
 
 
@@ -141,6 +147,7 @@ class _Run:
     feasibility: Planner
     allocator: Allocator
     budget: TimeBudget
+    limit: TimeBudget
 
     def repaired(self) -> PlanningSucceeded | None:
         """The residual plan, repaired if need be, with another allocation, if that will do."""
@@ -201,7 +208,7 @@ class _Run:
     def _allocate(self, checked: CheckedPlan, busy: Mapping[str, str]) -> Allocated | NotAllocated:
         """With actors that robots are `busy` with left where they are and begun with, if that can
         be; else only left where they are; else as if nothing were under way."""
-        context = context_of(self.given, frozenset(busy))
+        context = context_of(self.given, frozenset(busy), self.limit)
         calm = changed(context, under_way=frozenset())
         plan = checked.plan
         pins = {**busy, **plan.pins}
@@ -227,7 +234,16 @@ class _Run:
         if job.partial:
             return plan_reachable_goals(self.planner, self.feasibility, problem, self._reached())
         plan = self.planner.plan(problem)
-        return plan if isinstance(plan, NoPlan) else PartialPlan.of(plan, problem)
+        if isinstance(plan, CheckedPlan):
+            return PartialPlan.of(plan, problem)
+        if plan.postponed:
+            return plan
+        reasons = reasons_of(contradictions(self.feasibility, problem), problem.goals)
+        if not reasons:
+            return plan
+        first = next(goal.goal for goal in problem.goals if goal.goal in reasons)
+        sentence = f"goal {first} cannot be planned: {reasons[first]}"
+        return changed(plan, reason=sentence, goal_reasons=reasons)
 
     def _problem(self) -> PlanningProblem:
         return _problem(self.given, self.world, self.budget)
@@ -237,5 +253,14 @@ class _Run:
 
     def _with_goal_conditions(self, plan: Plan) -> Plan:
         """A proposed plan answers for its goals: their conditions must hold at its end, too."""
-        wanted = [condition for goal in self.given.goals for condition in goal.conditions]
-        return replace(plan, conditions=tuple(dict.fromkeys([*plan.conditions, *wanted])))
+        goals = self.given.goals
+        return replace(
+            plan,
+            conditions=_both(plan.conditions, (c for g in goals for c in g.conditions)),
+            always=_both(plan.always, (c for g in goals for c in g.always)),
+            never=_both(plan.never, (c for g in goals for c in g.never)),
+        )
+
+
+def _both(mine: Iterable[Condition], wanted: Iterable[Condition]) -> tuple[Condition, ...]:
+    return tuple(dict.fromkeys([*mine, *wanted]))

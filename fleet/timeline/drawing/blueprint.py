@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint import encodings
 
-from fleet.timeline.drawing.sink import SIM_TIME
+from fleet.timeline.drawing.sink import SIM_TIME, end_unused_streams
 
 Rectangle = tuple[float, float, float, float]
 
@@ -31,18 +31,39 @@ LEGEND = 5
 """With more robots the legend would hide the lines."""
 
 
+class Layout(rrb.Blueprint):
+    """Remembers the stream by which Rerun hands it on, which holds itself until it is told to end.
+
+    Two threads and some hundred kB a layout are too much where files roll.
+    """
+
+    handed_on_by: rr.RecordingStream | None = None
+
+    def _log_to_stream(self, stream: rr.RecordingStream) -> None:
+        super()._log_to_stream(stream)
+        self.handed_on_by = stream
+
+    def send(self, stream: rr.RecordingStream) -> None:
+        """Lay out a recording so, and leave nothing behind."""
+        stream.send_blueprint(self)
+        if self.handed_on_by is not None:
+            self.handed_on_by.disconnect()
+            self.handed_on_by = None
+        end_unused_streams()
+
+
 def blueprint(
     floor_m: Rectangle | None = None,
     span_s: tuple[float, float] = DEFAULT_SPAN_S,
     lanes: int = 2,
-) -> rrb.Blueprint:
+) -> Layout:
     """The layout, its eye south of and above the floor `(x_min, y_min, x_max, y_max)` [m].
 
     `span_s` is the fleet time [s] that the Gantt chart and the utilisation show from side to
     side; the chart gets room for so many `lanes`, up to half of the height.
     """
     chart = min(0.5, (4 + 3 * max(2, lanes)) * LANE_SHARE)
-    return rrb.Blueprint(
+    return Layout(
         rrb.Horizontal(
             rrb.Vertical(
                 rrb.Spatial3DView(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
 import rerun as rr
 
 from fleet.timeline.drawing.palette import CANCELLED, FAILED, Palette, Rgba
@@ -62,21 +64,26 @@ class Lane:
         ]
         return max(covering, key=lambda bar: bar.start_s, default=None)
 
-    def busy_s(self, start_s: float, end_s: float) -> float:
-        """Seconds of `start_s`…`end_s` that a bar covers; overlapping bars count once.
+    def busy_s(self, start_s: float, ends_s: Sequence[float]) -> list[float]:
+        """Seconds from `start_s` to each of `ends_s` that a bar covers; overlapping count once.
 
-        `start_s` is no later than the first bar, and `end_s` no earlier than what is settled.
+        `start_s` is no later than the first bar; `ends_s` ascend, and none is before what is
+        settled.
         """
-        start_s = max(start_s, self.settled_s)
-        spans = sorted(
-            (max(start_s, bar.start_s), min(end_s, end_s if bar.end_s is None else bar.end_s))
-            for bar in self.bars.values()
-        )
-        total, reach = self.settled_busy_s, start_s
-        for low, high in spans:
-            total += max(0.0, high - max(low, reach))
-            reach = max(reach, high)
-        return total
+        reach = max(start_s, self.settled_s)
+        until_s, total = ends_s[-1], self.settled_busy_s
+        corners, totals = [reach], [total]
+        for low, high in sorted(
+            (bar.start_s, until_s if bar.end_s is None else bar.end_s) for bar in self.bars.values()
+        ):
+            if high > reach:
+                low = max(low, reach)
+                total += high - low
+                corners += (low, high)
+                totals += (totals[-1], total)
+                reach = high
+        busy: list[float] = np.interp(ends_s, corners, totals).tolist()
+        return busy
 
     def look(self, bar: Bar) -> None:
         """The label and the colour of a bar are news."""
@@ -90,7 +97,7 @@ class Lane:
         """Count what ended before, and forget it."""
         if before_s <= self.settled_s:
             return
-        self.settled_busy_s = self.busy_s(self.settled_s, before_s)
+        (self.settled_busy_s,) = self.busy_s(self.settled_s, [before_s])
         self.settled_s = before_s
         for key in [k for k, b in self.bars.items() if b.end_s is not None and b.end_s < before_s]:
             del self.bars[key]
@@ -179,6 +186,14 @@ class Lanes:
         """Count what ended before, and forget it."""
         for lane in self.lanes.values():
             lane.settle(before_s)
+
+    def begin_again(self) -> None:
+        """The fleet's clock went back: what was counted, and what still ran, is of another run."""
+        self.first_s = None
+        for lane in self.lanes.values():
+            lane.bars.clear()
+            lane.logged.clear()
+            lane.settled_s, lane.settled_busy_s = float("-inf"), 0.0
 
     def drop(self, plan: str, task: str, now_s: float) -> None:
         """The planner deleted its record of a task: what still ran there ended."""

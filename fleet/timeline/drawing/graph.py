@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import networkx
 import rerun as rr
@@ -61,6 +62,8 @@ class Drawing:
     top_drawn: float = 0.0
     positions: dict[str, tuple[float, float]] = field(default_factory=dict)
     """Of `nodes_drawn`, from 0 down."""
+    edges_drawn: list[tuple[str, str]] | None = None
+    """None while nothing is shown."""
     drawn_s: float = float("-inf")
     drawn_wall_s: float = float("-inf")
     changed_s: float = float("-inf")
@@ -157,21 +160,30 @@ class Graphs:
             drawing.positions = layout(nodes)
         drawing.nodes_drawn, drawing.top_drawn = nodes, top
         if not nodes:
-            self._sink.log(drawing.path, rr.Clear(recursive=False), at_s)
+            if drawing.edges_drawn is not None:
+                drawing.edges_drawn = None
+                self._sink.log(drawing.path, rr.Clear(recursive=False), at_s)
             return
         names = {node.task for node in nodes}
         edges = [(first, node.task) for node in nodes for first in node.after if first in names]
         places = [drawing.positions[node.task] for node in nodes]
-        drawn = rr.GraphNodes(
-            node_ids=[node.task for node in nodes],
-            positions=[(x, y + top) for x, y in places],
-            labels=[node.label for node in nodes],
-            colors=[TASK_STATES[node.state] for node in nodes],
-            show_labels=True,
-        )
+        drawn: dict[str, list[Any]] = {
+            "node_ids": [node.task for node in nodes],
+            "positions": [(x, y + top) for x, y in places],
+            "labels": [node.label for node in nodes],
+            "colors": [TASK_STATES[node.state] for node in nodes],
+        }
         # One entity for both, or the viewer does not know which nodes the edges mean.
-        edged = rr.GraphEdges(edges=edges, graph_type="directed")
-        self._sink.log(drawing.path, drawn, at_s, None, edged)
+        if drawing.edges_drawn is None:
+            edged = rr.GraphEdges(edges=edges, graph_type="directed")
+            self._sink.log(
+                drawing.path, rr.GraphNodes(**drawn, show_labels=True), at_s, None, edged
+            )
+        else:
+            self._sink.row(drawing.path, rr.GraphNodes, at_s, None, **drawn)
+            if edges != drawing.edges_drawn:
+                self._sink.row(drawing.path, rr.GraphEdges, at_s, None, edges=edges)
+        drawing.edges_drawn = edges
 
 
 def _shape(nodes: list[Node]) -> list[object]:

@@ -76,6 +76,11 @@ class Picture:
         """How much it remembers: bars and tasks."""
         return len(self._lanes) + len(self._graphs)
 
+    @property
+    def calls(self) -> int:
+        """How often something was handed to Rerun."""
+        return self._sink.calls
+
     def show(self, key: str, value: Any, at_s: float, wall_s: float) -> None:
         """Draw a value of the key of that name."""
         if key == SIM_SCENE.name:
@@ -181,7 +186,7 @@ class Picture:
         framed = (floor, self._span_s, len(self._lanes.lanes))
         if self._framed != framed:
             self._framed = framed
-            self._sink.stream.send_blueprint(blueprint(*framed))
+            blueprint(*framed).send(self._sink.stream)
 
     def _label(self, record: TaskRecord, at_s: float) -> None:
         if record.robot is None:

@@ -6,12 +6,14 @@ import socket
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
 import numpy as np
 import rerun as rr
+import rerun_bindings
 
 from fleet.timeline.clock import Clock
 from fleet.timeline.drawing.text import drawable
@@ -42,9 +44,15 @@ class Sink:
         self.stream = stream
         self.clock = clock
         self._waiting: dict[tuple[str, Any], _Rows] = {}
+        self.calls = 0
+        """How often something was handed to Rerun: what it costs goes with these, not with rows."""
 
     def row(self, path: str, kind: Any, sim_s: float, wall_s: float | None, **fields: Any) -> None:
-        """A row of an archetype at a fleet time [s]; it goes out with others at the next flush."""
+        """A row of an archetype at a fleet time [s]; it goes out with others at the next flush.
+
+        Of an entity and archetype the fields are always the same. A field is one value, or a list
+        with one for each instance; then all are, and of the same length.
+        """
         rows = self._waiting.get((path, kind))
         if rows is None:
             rows = self._waiting[path, kind] = _Rows({name: [] for name in fields})
@@ -64,12 +72,24 @@ class Sink:
             self._send(path, kind, rows)
 
     def _send(self, path: str, kind: Any, rows: _Rows) -> None:
-        self.columns(path, rows.sim_s, rows.wall_s, kind.columns(**rows.fields))
+        first = next(iter(rows.fields.values()))
+        if isinstance(first[0], list):
+            flat = {name: list(chain(*values)) for name, values in rows.fields.items()}
+            columns = kind.columns(**flat).partition([len(value) for value in first])
+        else:
+            columns = kind.columns(**rows.fields)
+        self.columns(path, rows.sim_s, rows.wall_s, columns)
 
     def log(
         self, path: str, what: Any, sim_s: float, wall_s: float | None = None, *more: Any
     ) -> None:
-        """Log archetypes at a fleet time [s]; the wall time follows from it if not given."""
+        """Log archetypes at a fleet time [s]; the wall time follows from it if not given.
+
+        It counts as later than the rows that wait, of what is below `path` as well.
+        """
+        for name in [name for name in self._waiting if f"{name[0]}/".startswith(f"{path}/")]:
+            self._send(*name, self._waiting.pop(name))
+        self.calls += 1
         if wall_s is None:
             wall_s = self.clock.wall_at(sim_s)
         self.stream.set_time(SIM_TIME, duration=sim_s)
@@ -78,12 +98,14 @@ class Sink:
 
     def fix(self, path: str, what: Any) -> None:
         """Log an archetype that holds at all times."""
+        self.calls += 1
         self.stream.log(path, what, static=True)
 
     def columns(
         self, path: str, sim_s: Sequence[float], wall_s: Sequence[float], columns: Any
     ) -> None:
         """Log many rows of one entity at once."""
+        self.calls += 1
         self.stream.send_columns(
             path,
             indexes=[
@@ -102,6 +124,10 @@ def entity(*parts: str) -> str:
 def open_stream(out: Path, name: str, live_port: int | None = None) -> rr.RecordingStream:
     """A new recording that is written to `out`, and served on `127.0.0.1:live_port` if given.
 
+    The file has no table of contents at its end: Rerun keeps that in memory until the file is
+    closed, some kB for each piece of it. Readers and viewer read the pieces themselves, as they do
+    after a SIGKILL; `rerun rrd optimize` adds one.
+
     Raises:
         UnwritableRecording: the file cannot be made there.
     """
@@ -113,7 +139,7 @@ def open_stream(out: Path, name: str, live_port: int | None = None) -> rr.Record
             f"cannot record to {out}: {error.strerror or error}; name a file you may write"
         ) from None
     stream = rr.RecordingStream(APPLICATION, recording_id=uuid4(), send_properties=True)
-    sinks: list[Any] = [rr.FileSink(out)]
+    sinks: list[Any] = [rr.FileSink(out, write_footer=False)]
     if live_port is not None:
         sinks.append(rr.GrpcServerSink(bind_ip="127.0.0.1", port=live_port))
     stream.set_sinks(*sinks)
@@ -121,6 +147,11 @@ def open_stream(out: Path, name: str, live_port: int | None = None) -> rr.Record
     stream.set_log_tick_enabled(False)
     stream.send_recording_name(drawable(name))
     return stream
+
+
+def end_unused_streams() -> None:
+    """Let Rerun end the threads of streams that nobody refers to, which it does not by itself."""
+    rerun_bindings.flush_and_cleanup_orphaned_recordings()
 
 
 def free_port() -> int:

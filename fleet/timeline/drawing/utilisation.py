@@ -19,6 +19,9 @@ LAG_S = 1.0
 SETTLED_S = 60.0
 """So long after a sample nothing changes what it says any more."""
 
+AGAIN_S = 1.0
+"""A fleet's clock that is further behind than this went back: a simulation began again."""
+
 _MAX_SAMPLES = 5_000
 
 
@@ -34,6 +37,9 @@ class Utilisation:
 
     def advance(self, now_s: float, final: bool = False) -> None:
         """Log the samples up to `now_s` [s, fleet time]; none while nobody works."""
+        if self._next_s is not None and now_s < self._next_s - STEP_S - AGAIN_S:
+            self._next_s = None
+            self._lanes.begin_again()
         start_s = self._lanes.first_s
         if start_s is None:
             return
@@ -59,7 +65,10 @@ class Utilisation:
         wall = [self._sink.clock.wall_at(time_s) or 0.0 for time_s in times]
         total = [0.0] * len(times)
         for robot, lane in self._lanes.lanes.items():
-            busy = [lane.busy_s(start_s, time_s) / (time_s - start_s) for time_s in times]
+            busy = [
+                busy_s / (time_s - start_s)
+                for busy_s, time_s in zip(lane.busy_s(start_s, times), times, strict=True)
+            ]
             total = [a + b for a, b in zip(total, busy, strict=True)]
             self._send(robot, self._palette.robot(robot), 1.5, times, wall, busy)
         count = len(self._lanes.lanes)

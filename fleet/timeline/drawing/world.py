@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import cos, sin
+
 import rerun as rr
 
 from fleet.timeline.drawing.palette import Palette, Rgba
@@ -37,7 +39,8 @@ class World:
         self._roots: dict[str, str] = {}  # owner -> the body that stands for it
         self._specs: dict[str, RobotSpec] = {}
         self._trails: dict[str, Trail] = {}
-        self._labels: dict[str, tuple[str, float]] = {}
+        self._labels: dict[str, tuple[str, float, str]] = {}
+        """Of each robot the path, the height and the text of its label."""
         self._doing: dict[str, str | None] = {}
         self._stand_ins: set[str] = set()
         self._tints: dict[str, int] = {}
@@ -156,13 +159,9 @@ class World:
             )
             self._sink.log(f"{path}/body", body, sim_s, wall_s)
             self.robot_label(state.robot, self._doing.get(state.robot), sim_s, wall_s)
-        self._sink.log(
-            path,
-            rr.Transform3D(
-                translation=[x, y, 0.0], rotation=rr.RotationAxisAngle([0, 0, 1], radians=yaw)
-            ),
-            sim_s,
-            wall_s,
+        turned = (0.0, 0.0, sin(yaw / 2), cos(yaw / 2))  # x y z w
+        self._sink.row(
+            path, rr.Transform3D, sim_s, wall_s, translation=(x, y, 0.0), quaternion=turned
         )
         self._trail(state.robot).visit(self._sink, (x, y, 0.05), sim_s, wall_s)
 
@@ -179,9 +178,12 @@ class World:
         name = (spec.label if spec else "") or robot
         text = drawable(f"{name}: {doing}" if doing else name)
         height = self._height(robot) if root else _STAND_IN_M[1]
-        if self._labels.get(robot) == (path + text, height):
+        before = self._labels.get(robot)
+        now = self._labels[robot] = (path, height, text)
+        if before is not None and before[:2] == now[:2]:
+            if before != now:
+                self._sink.row(f"{path}/label", rr.Points3D, sim_s, wall_s, labels=text)
             return
-        self._labels[robot] = (path + text, height)
         self._sink.log(
             f"{path}/label",
             rr.Points3D(

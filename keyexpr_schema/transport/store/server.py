@@ -15,6 +15,7 @@ import logging
 import threading
 import uuid
 from collections.abc import Callable
+from sys import intern
 from typing import Any
 
 import zenoh
@@ -126,7 +127,7 @@ class StoreServer:
                 keyexpr,
                 stamp_of_text(str(timestamp)),
                 sample.kind == zenoh.SampleKind.DELETE,
-                str(sample.encoding),
+                intern(str(sample.encoding)),  # there are a few
                 sample.payload.to_bytes(),
             )
         )

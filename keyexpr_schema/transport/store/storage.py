@@ -122,7 +122,7 @@ def is_journaled(keyexpr: str) -> bool:
     )
 
 
-@lru_cache(maxsize=65_536)
+@lru_cache(maxsize=8192)
 def _key_of(keyexpr: str) -> Key[Any, Any] | None:
     try:
         return key_of(keyexpr.partition("/")[2])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf
+
 import pytest
 from msgspec.structs import replace
 
@@ -9,12 +11,13 @@ from fleet.allocators.base import Allocated, NotAllocated
 from fleet.allocators.makespan import MakespanAllocator
 from fleet.allocators.min_max_load import MinMaxLoadAllocator, TieBreak
 from fleet.core.model.world import WorldModel
-from fleet.jobshop.time_budget import StepClock
+from fleet.jobshop.time_budget import StepClock, TimeBudget
 from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from fleet.scheduling.allocation_context import AllocationContext
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.plans import Plan, Task
+from tests.support.errand_plans import errand_plan
 from tests.support.household import bring, carrier, checked, home, manipulator
 
 QUICK = MakespanAllocator(deadline_s=0.2, exact=False, clock=StepClock())
@@ -99,3 +102,14 @@ def test_too_few_robots_is_a_sentence() -> None:
     found = QUICK.allocate(checked(plan, world))
     assert isinstance(found, NotAllocated)
     assert found.violations[0].sentence
+
+
+def test_the_search_ends_with_the_time_that_there_is_for_the_plan() -> None:
+    plan, world = errand_plan(goals=30, robots=3)
+    steps = []
+    for left_s in (0.0, 40.0, inf):
+        clock = StepClock(1.0)
+        context = AllocationContext(limit=TimeBudget(left_s, StepClock(0.0)))
+        allocated(MakespanAllocator(100.0, exact=False, clock=clock), plan, world, context)
+        steps.append(clock())
+    assert steps[0] < steps[1] < steps[2]

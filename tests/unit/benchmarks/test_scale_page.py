@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,8 @@ import pytest
 
 from benchmarks.scale import report
 from benchmarks.scale.core_run import CoreRun
+from benchmarks.scale.errands import Errands
+from benchmarks.scale.long_life import LongLife
 from benchmarks.scale.soak import Lived, summed_up
 from benchmarks.tables import as_json
 from keyexpr_schema.payloads.plans import PlanState
@@ -57,6 +60,26 @@ def test_plans_are_lived_through_one_after_the_other() -> None:
     run = CoreRun(robots=2)
     run.live(3, first=0, goals=2)
     assert list(run.plans.values()) == [PlanState.SUCCEEDED] * 3
+
+
+@pytest.mark.parametrize("made", [False, True], ids=["while it is planned", "while it is done"])
+def test_a_long_life_goes_on_where_it_ended_in_the_middle_of_a_mission(
+    tmp_path: Path, made: bool
+) -> None:
+    with LongLife(tmp_path) as life:
+        asyncio.run(life.live_through(3))
+        wanted = Errands("m3", [3], robots=4, cups=12)
+        life.put_cups([3])
+        life.put_goals([3], cups=12)
+        answer = life.ask(wanted)
+        if made:
+            life.apply(answer)
+            assert life.state.index.work
+    with LongLife(tmp_path) as life:
+        assert (life.missions, life.set_aside) == (4, [])
+        assert not life.state.plans
+        asyncio.run(life.live_through(2))
+        assert life.missions == 6
 
 
 def test_the_page_says_what_was_measured_before_and_now(tmp_path: Path) -> None:

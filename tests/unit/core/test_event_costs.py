@@ -20,10 +20,13 @@ from benchmarks.scale import errands
 from benchmarks.scale.core_run import CoreRun
 from fleet.core import events
 from fleet.core.events import Event
+from fleet.core.handlers.plan_results import planning_failed
+from fleet.core.handlers.requests import plan_requested
 from fleet.core.state import State
 from fleet.core.step import step
 from keyexpr_schema.facts import AT, HOLDING
 from keyexpr_schema.payloads.plans import PlanState
+from keyexpr_schema.payloads.requests import PlanRequest
 from keyexpr_schema.payloads.tasks import ReportState
 from keyexpr_schema.payloads.world import Fact
 
@@ -282,6 +285,26 @@ def goals_told(count: int, sentence: bool) -> Cost:
         ))  # fmt: skip
     event = events.GoalPut(goal=errands.goal(LAST, sentence), **run.at())
     return cost_of(run.state, event)
+
+
+def test_what_is_asked_and_answered_is_found_at_once_among_many_open_plans() -> None:
+    assert handled_among(300) == handled_among(3)
+
+
+def handled_among(plans: int) -> list[int]:
+    """The calls of the handlers of a request and of answers, while so many plans are made."""
+    run = CoreRun(robots=2)
+    run.put_cups(range(100))
+    run.put_goals(range(plans), cups=100)
+    for number in range(plans):
+        run.ask(errands.Errands(f"p{number}", [number], robots=2, cups=100))
+    again = PlanRequest(request="ask-p1", plan="p1", goals=("g1",))
+    asked = events.PlanRequested(request=again, **run.at())
+    failed = events.PlanningFailed(job=10_000, reason="none", **run.at())
+    return [
+        calls_of(lambda: plan_requested(run.state, asked) and None),
+        calls_of(lambda: planning_failed(run.state, failed) and None),
+    ]
 
 
 def alike(one: Cost, other: Cost) -> bool:

@@ -10,6 +10,7 @@ from msgspec.structs import replace as replace_fields
 from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.jobshop.time_budget import StepClock, TimeBudget
 from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, PlanningProblem
+from fleet.planners.contradictions import contradictions
 from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
 from fleet.planners.plan_repair import repair_plan
 from fleet.planners.symbolic.planner import SymbolicPlanner
@@ -118,3 +119,11 @@ def test_full_hands_do_not_multiply_what_is_looked_at(number: int) -> None:
     for wanted in (bring(1, "hallway"), bring(number + 1, "hallway")):
         made = PLANNER.plan(PlanningProblem("p", (wanted,), world, budget=steps(10_000)))
         assert isinstance(made, CheckedPlan), made
+
+
+def test_contradictions_are_looked_for_within_the_time() -> None:
+    many = tuple(replace_fields(bring(1, "hallway"), goal=f"g{n}") for n in range(1, 9))
+    against = replace_fields(bring(1, "kitchen"), goal="g9", ordinal=9)
+    asked = replace(problem(ENOUGH), goals=(*many, against))
+    assert contradictions(PLANNER, asked) == {"g9": "g1"}
+    assert contradictions(PLANNER, replace(asked, budget=steps(1))) == {}

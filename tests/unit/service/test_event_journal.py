@@ -209,3 +209,14 @@ def test_two_planners_cannot_have_one_journal(tmp_path: Path) -> None:
     with EventJournal(tmp_path):
         with pytest.raises(JournalInUse, match="another planner works with"):
             EventJournal(tmp_path).__enter__()
+
+
+def test_a_file_that_is_no_journal_is_one_sentence_and_left_as_it_is(tmp_path: Path) -> None:
+    file = tmp_path / "events.db"
+    file.write_text("shopping list")
+    with pytest.raises(JournalUnreadable, match=r"not a database.*move it away"):
+        EventJournal(tmp_path).__enter__()
+    assert file.read_text() == "shopping list"
+    file.unlink()
+    with EventJournal(tmp_path) as journal:  # nobody holds its lock
+        assert journal.empty

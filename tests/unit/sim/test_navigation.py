@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -13,6 +14,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from sim.errors import NoPath, NoStance
 from sim.files.mission_file import load_mission
+from sim.files.solids import solids
 from sim.files.world_schema import WorldFile
 from sim.navigation import Navigator
 from sim.navigation.clearance import Clearance, segment_gap
@@ -204,3 +206,80 @@ def test_routes_prefer_spots_that_are_free() -> None:
     second = routes.to_place((8.0, 3.0, 0.0), "kitchen", {first.node})
     assert second is not None and second.node != first.node
     assert routes.to_point((8.0, 3.0, 0.0), (0.2, 1.0, 0.5), 0.3) is None
+
+
+def test_the_nearest_box_is_found_among_those_that_may_be_the_nearest() -> None:
+    """One by one, all boxes give the same as the few that are looked at together."""
+    chance = random.Random(7)
+    boxes = solids(WORLD)
+
+    def gap(x: float, y: float) -> float:
+        gaps = []
+        for box in boxes:
+            dx, dy = x - box.center_m[0], y - box.center_m[1]
+            c, s = math.cos(box.yaw_rad), math.sin(box.yaw_rad)
+            along, across = abs(c * dx + s * dy), abs(c * dy - s * dx)
+            out = max(along - box.half_m[0], 0.0), max(across - box.half_m[1], 0.0)
+            gaps.append(math.hypot(*out))
+        return min(gaps)
+
+    for spread_m in (0.0, 0.5, 4.0):
+        x, y = chance.uniform(0.5, WORLD.size_m[0] - 0.5), chance.uniform(0.5, 5.5)
+        points = [
+            (
+                min(max(x + chance.uniform(-spread_m, spread_m), 0.0), WORLD.size_m[0]),
+                min(max(y + chance.uniform(-spread_m, spread_m), 0.0), WORLD.size_m[1]),
+            )
+            for _ in range(40)
+        ]
+        assert CLEARANCE.at(points).tolist() == pytest.approx([gap(*point) for point in points])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_search_goes_on_where_what_is_blocked_now_is_not_where_it_has_been(seed: int) -> None:
+    chance = random.Random(seed)
+    nodes = list(range(len(LATTICE)))
+    goals, blocked = frozenset(chance.sample(nodes, 1)), frozenset(chance.sample(nodes, 6))
+    field = LATTICE.new_field(goals, blocked)
+    went_on = began_anew = 0
+    for _ in range(200):
+        asked = chance.choice(LATTICE.neighbours[min(goals)])
+        blocked = (blocked - {chance.choice(sorted(blocked))}) | {chance.choice(nodes)}
+        if field.holds_with(blocked):
+            went_on += 1
+        else:
+            began_anew += 1
+            field = LATTICE.new_field(goals, blocked)
+        assert field[asked] == LATTICE.new_field(goals, blocked)[asked]
+    fresh = LATTICE.new_field(goals, blocked)
+    assert [field[node] for node in nodes] == [fresh[node] for node in nodes]
+    assert not field.holds_with(blocked | {next(n for n in nodes if n not in blocked)})
+    assert went_on > 20 < began_anew
+
+
+def test_robots_that_come_to_rest_far_away_start_no_search_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    begun = 0
+
+    class Counted(DistanceField):
+        def __init__(self, *args: Any) -> None:
+            nonlocal begun
+            begun += 1
+            super().__init__(*args)
+
+    monkeypatch.setattr("sim.navigation.lattice.DistanceField", Counted)
+    navigator = Navigator(WORLD)
+    poses = {"a": (2.8, 1.8, 0.0)}
+    poses |= {f"b{k}": (9.4 - 0.6 * (k % 2), 1.8 + 0.6 * k, 0.0) for k in range(4)}
+    for name, pose in poses.items():
+        navigator.add_robot(name, pose, 0.2)
+    navigator.go_to_place("a", "hallway")
+    navigator.tick(0.0, poses)
+    assert begun
+    begun = 0
+    for number in range(1, 16):
+        for bit in range(4):
+            navigator.pin(f"b{bit}", bool(number >> bit & 1))
+        navigator.tick(0.05 * number, poses)
+    assert begun <= 1

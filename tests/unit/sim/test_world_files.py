@@ -65,6 +65,11 @@ def test_home_says_what_is_in_it() -> None:
     assert [(o.object, o.kind, o.ordinal, o.label) for o in object_payloads(world)] == [
         ("cup_1", "cup", 1, "first cup"),
         ("cup_2", "cup", 2, "second cup"),
+        ("kitchen_table", "table", 1, "kitchen table"),
+        ("kitchen_counter", "furniture", 1, "kitchen counter"),
+        ("hallway_table", "table", 2, "hallway table"),
+        ("coffee_table", "table", 3, "coffee table"),
+        ("sofa", "furniture", 2, "sofa"),
     ]
     assert world.start_point_m("cup_1") == pytest.approx((0.7, 4.8, 0.6))
     assert world.place_at(5.0, 1.0) == "hallway"
@@ -240,3 +245,66 @@ def test_what_lies_in_the_middle_of_a_wide_table_is_said_to_be_out_of_reach(
     only_drives = tmp_path / "only.yaml"
     only_drives.write_text(path.read_text().replace(str(HSR), str(HSR.with_name("locobot.yaml"))))
     assert out_of_reach(load_mission(only_drives)) == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            "  wall: {kind: cupboard, place: kitchen, center_m: [2, 2], size_m: [0.3, 0.5, 0.8]}",
+            r"furniture.wall.size_m: .*too small for a cupboard; it needs \[0.4, 0.3, 0.4\]",
+        ),
+        (
+            "  low: {kind: fridge, place: kitchen, center_m: [2, 2], size_m: [0.6, 0.6, 0.5]}",
+            "furniture.low.plinth_m: 0.3 leaves 0.20 m inside; a hand needs 0.35 m",
+        ),
+        (
+            "  hob: {kind: counter, place: kitchen, center_m: [2, 2], size_m: [0.6, 0.6, 0.7], "
+            "process: {state: temperature, value: hot, after_s: 3}}",
+            "furniture.hob.process: nothing starts it; add `switch: true`",
+        ),
+        (
+            "people: {ben: {at_m: [20, 1]}}",
+            r"people.ben.at_m: \[20.0, 1.0\] is in none of the places",
+        ),
+        (
+            "states: {kitchen_table: {is_open: true}}",
+            "states.kitchen_table.is_open: it does not open; there are none",
+        ),
+        ("states: {moon: {is_on: true}}", "states.moon: there is no such thing in this world"),
+    ],
+)
+def test_furniture_people_and_states_that_cannot_be_are_one_clear_sentence(
+    tmp_path: Path, change: str, said: str
+) -> None:
+    text = HOME.read_text()
+    if change.startswith("  "):
+        text = text.replace("furniture:\n", f"furniture:\n{change}\n")
+    else:
+        text += change + "\n"
+    path = tmp_path / "world.yaml"
+    path.write_text(text)
+    with pytest.raises(BadFile, match=said) as caught:
+        load_world(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_object_says_once_what_it_is_on_or_in(tmp_path: Path) -> None:
+    path = tmp_path / "world.yaml"
+    path.write_text(HOME.read_text().replace("on: kitchen_table,", "", 1))
+    with pytest.raises(BadFile, match=r"objects\.cup_1: say either `on` or `in`"):
+        load_world(path)
+
+
+def test_the_apartment_is_furnished_and_everything_in_it_is_in_reach() -> None:
+    mission = load_mission("apartment")
+    world = mission.world
+    assert (len(world.place_entries), len(world.furniture), len(world.object_entries)) == (
+        5,
+        25,
+        40,
+    )
+    assert len({robot.spec.model for robot in mission.robots}) == 4
+    assert out_of_reach(mission) == ()
+    for place in place_payloads(world):
+        assert set(place.travel_m) == set(world.place_entries) - {place.place}

@@ -107,6 +107,111 @@ def test_the_journal_is_cut_by_age_and_by_count(tmp_path):
         assert rows(tmp_path, "journal") == 5000
 
 
+def test_the_journal_is_cut_by_bytes_also_by_the_next_process(tmp_path):
+    memory = StoreMemory(journal_mb=1.0)
+
+    def kept(store: SqliteStore) -> tuple[int, int, int]:
+        found, last = store.journal("north", JournalQuery(limit=10_000))
+        return len(found), found[-1].number - last, sum(len(entry.data) for entry in found)
+
+    def put(store: SqliteStore, number: int, size: int) -> None:
+        store.apply(
+            [Write(f"north/plans/p{number}/spec", number << 128 | 7, False, "", size * b"x")]
+        )
+
+    for run in range(2):
+        with SqliteStore(tmp_path, memory=memory) as store:
+            for number in range(400 * run + 1, 400 * run + 401):
+                put(store, number, 10_000)
+                assert kept(store)[2] <= 1.07 * 2**20
+            entries, newest, size = kept(store)
+            assert newest == 0
+            assert 90 <= entries <= 105
+            assert size >= 0.9 * 2**20
+    with SqliteStore(tmp_path, memory=memory) as store:
+        # One that is larger than all there may be leaves room for nothing else.
+        put(store, 1000, 3 * 2**20)
+        assert kept(store)[:2] == (1, 0)
+
+
+def test_a_busy_store_forgets_the_oldest_of_too_many_deletions(tmp_path):
+    memory = StoreMemory(tombstones=100)
+    with SqliteStore(tmp_path, memory=memory) as store:
+        store.apply([write("kept", 1)])
+        long_ago = store.changes(PLACES, "", 10).position
+        for n in range(1, 301):
+            store.apply([write(f"p{n}", 4 * n), write(f"p{n}", 4 * n + 1, deleted=True)])
+        assert rows(tmp_path, "latest") <= 102
+        assert store.newest([f"north/world/places/p{n}" for n in (190, 300)]) == [
+            None,
+            write("p300", 1201, deleted=True),
+        ]
+        assert store.apply([write("p300", 1200)]) == 0
+        # Who has not looked since before lists everything: of some deletions nothing is known.
+        late = store.changes(PLACES, long_ago, 1000)
+        assert (late.whole, [w.keyexpr[-4:] for w in late.writes]) == (True, ["kept"])
+    with SqliteStore(tmp_path, memory=memory) as store:
+        assert store.apply([write("p300", 1200)]) == 0
+        store.apply([write(f"q{n}", 2000 + n, deleted=True) for n in range(10)])
+        assert rows(tmp_path, "latest") <= 111
+
+
+def pages(path: Path) -> tuple[int, int]:
+    """Of the file, and those of them that are not used."""
+    db = sqlite3.connect(path / "state.sqlite")
+    found = tuple(
+        db.execute(f"PRAGMA {name}").fetchone()[0] for name in ("page_count", "freelist_count")
+    )
+    db.close()
+    return found  # type: ignore[return-value]
+
+
+def test_the_file_stops_growing_and_gives_back_what_it_does_not_use(tmp_path):
+    clock = Clock()
+    memory = StoreMemory(journal_mb=1.0, tombstones=100)
+    stamp = 0
+
+    def live(store: SqliteStore, missions: int) -> int:
+        nonlocal stamp
+        for _ in range(missions):
+            stamp += 100
+            names = [f"m{stamp}-{n}" for n in range(20)]
+            store.apply([write(name, stamp + n) for n, name in enumerate(names)])
+            store.apply([write(n, stamp + 50 + at, deleted=True) for at, n in enumerate(names)])
+        return pages(tmp_path)[0]
+
+    with SqliteStore(tmp_path, memory=memory, wall_time_s=clock) as store:
+        young = live(store, 300)
+        assert live(store, 900) <= 1.05 * young
+        # Much is stored for once, and deleted.
+        some = [write(f"x{n}", stamp + n + 1) for n in range(50_000)]
+        store.apply(some)
+        full = pages(tmp_path)[0]
+        stamp += len(some)
+        store.apply([Write("north/world/places/*", stamp + 1 << 128 | 7, True, "", b"")])
+        live(store, 900)
+        there, unused = pages(tmp_path)
+        assert there < full / 3
+        assert unused < max(1000, there / 2)
+
+
+def test_a_file_of_before_is_made_small_when_it_is_opened(tmp_path):
+    with SqliteStore(tmp_path) as store:
+        store.apply([write(f"x{n}", n + 1) for n in range(20_000)])
+    db = sqlite3.connect(tmp_path / "state.sqlite")
+    db.execute("PRAGMA auto_vacuum = NONE")
+    db.execute("VACUUM")
+    db.execute("DELETE FROM latest WHERE number > 10")
+    db.execute("DELETE FROM journal WHERE number > 10")
+    db.commit()
+    db.close()
+    assert pages(tmp_path)[1] > 1000
+    with SqliteStore(tmp_path) as store:
+        assert pages(tmp_path)[1] == 0
+        assert [w.keyexpr[-1] for w in store.select("**")] == list("0123456789")
+        assert len(store.journal("north", JournalQuery())[0]) == 10
+
+
 def test_a_simulation_and_states_are_not_in_the_journal(tmp_path):
     with SqliteStore(tmp_path) as store:
         stamp = 5 << 128

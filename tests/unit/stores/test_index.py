@@ -53,6 +53,41 @@ def test_orders_are_found_without_a_look_at_the_reports():
     assert lines_run(listed, many) == lines_run(listed, few)
 
 
+def test_wildcards_cost_what_is_alive_not_what_is_deleted():
+    reports = "north/robots/*/reports/*/*/*"
+
+    def mostly_deleted(dead: int) -> Index:
+        index = filled(dead + 5)
+        for n in range(1, dead + 1):
+            gone = f"north/robots/r{n % 10}/reports/p/t{n}/1"
+            index.set(index.last + 1, Write(gone, index.last << 128, True, "", b""))
+        return index
+
+    def listed(index: Index) -> None:
+        found, more = index.since([reports], 0, 100, index.last)
+        assert (len(found), more) == (5, False)
+
+    def answered(index: Index) -> None:
+        assert len(index.matching(reports)) == 5
+
+    few, many = mostly_deleted(100), mostly_deleted(5000)
+    assert many.tombstones == 5000
+    assert lines_run(answered, many) == lines_run(answered, few)
+    assert lines_run(listed, many) == lines_run(listed, few)
+
+
+def test_a_key_is_a_value_or_a_tombstone_and_told_once():
+    index = Index()
+    for n in range(1, 5):
+        index.set(n, Write("north/world/places/a", n << 128, n % 2 == 0, "", b""))
+        found, _ = index.since(["**"], 0, 10, 0)
+        assert [(number, write.deleted) for number, write in found] == [(n, n % 2 == 0)]
+        assert (len(index), index.tombstones) == (1, int(n % 2 == 0))
+        assert len(index.matching("**")) == n % 2
+    index.forget("north/world/places/a")
+    assert (len(index), index.get("north/world/places/a")) == (0, None)
+
+
 def test_what_changed_since_costs_what_changed():
     reports = "north/robots/*/reports/*/*/*"
 

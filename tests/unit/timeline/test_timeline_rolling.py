@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from keyexpr_schema import keyspace as keys
 from keyexpr_schema.payloads.plans import PlanAddress, PlanState
 from keyexpr_schema.payloads.simulation import SimAddress, SimClock
 from keyexpr_schema.payloads.tasks import TaskState
+from tests.support.polling import until
 from tests.support.timeline_mission import END_S, WALL_S, Put, again, frames, put
 
 
@@ -29,6 +31,11 @@ def live(number: int) -> list[Put]:
         clock = SimClock(time_s=at_s, wall_time_s=WALL_S + at_s, speed=1.0)
         ticks.append(put(keys.SIM_CLOCK, SimAddress(), clock, at_s))
     return sorted([*again(number), *ticks], key=lambda one: int(one.timestamp.split("/")[0]))
+
+
+def threads() -> int:
+    """How many this process has, those of libraries included."""
+    return sum(1 for _ in Path("/proc/self/task").iterdir())
 
 
 def ended(number: int) -> Put:
@@ -50,6 +57,73 @@ def test_what_is_kept_does_not_grow_with_the_missions(tmp_path: Path) -> None:
     assert len(set(kept[45:])) == 1, kept
     said = [row.value[0] for row in rows(tmp_path / "many.rrd", "/fleet/log/plans", "text")]
     assert [f"plan p1-{number} is succeeded" in said for number in range(60)] == [True] * 60
+
+
+def test_what_is_kept_does_not_grow_where_the_clock_went_back(tmp_path: Path) -> None:
+    """A simulation that began again is hours behind what was drawn before."""
+    recorder = Recorder(open_stream(tmp_path / "again.rrd", "test"))
+    kept = []
+    for number in (*range(1000, 1010), *range(60)):
+        for change in live(number):
+            recorder.record(change)
+        recorder.flush()
+        kept.append(len(recorder))
+    recorder.close()
+    assert len(set(kept[60:])) == 1, kept
+    busy = [
+        row.value[0]
+        for row in rows(tmp_path / "again.rrd", "/fleet/utilisation/all/fleet", "scalars")
+        if row.sim_s is not None and row.sim_s < 60 * END_S
+    ]
+    assert len(busy) > 58 * END_S
+    assert all(0.0 <= share <= 1.0 for share in busy)
+
+
+def test_the_calls_of_a_mission_do_not_go_with_its_events(tmp_path: Path) -> None:
+    """Rows go to Rerun together: a call for each entity and flush, however many there are."""
+    calls = []
+    for repeated in (1, 20):
+        recorder = Recorder(open_stream(tmp_path / f"calls-{repeated}.rrd", "test"))
+        for change in live(0):
+            recorder.record(change)
+        recorder.flush()
+        had = recorder.calls
+        for change in live(1):
+            recorder.record(change)
+            if change.key is keys.TASK_RECORD and change.value.robot is not None:
+                for attempt in range(2, repeated + 1):  # each is a bar and two labels
+                    value = msgspec.structs.replace(change.value, attempt=attempt)
+                    recorder.record(dataclasses.replace(change, value=value))
+        recorder.flush()
+        calls.append(recorder.calls - had)
+        recorder.close()
+    few, many = calls
+    assert few < 40
+    assert many < 1.5 * few
+
+
+def test_of_a_file_rerun_keeps_no_table_of_contents(tmp_path: Path) -> None:
+    """It would grow with each piece of the file; a finished one says that it has none."""
+    from rerun.chunk import RrdReader
+
+    recorder = Recorder(open_stream(tmp_path / "open.rrd", "test"))
+    for change in live(0):
+        recorder.record(change)
+    recorder.close()
+    with pytest.warns(match="no footer"):
+        assert list(RrdReader(tmp_path / "open.rrd").stream())
+
+
+async def test_a_file_that_is_left_leaves_no_thread_behind(tmp_path: Path) -> None:
+    recorder = Recorder(open_stream(tmp_path / "0.rrd", "test"))
+    before = threads()
+    for number in range(1, 6):
+        for change in live(number):
+            recorder.record(change)
+        recorder.continue_in(open_stream(tmp_path / f"{number}.rrd", "test"))
+
+    await until(lambda: threads() <= before, "the end of threads of files that were left", 30.0)
+    recorder.close()
 
 
 def test_of_a_lane_only_the_latest_labels_are_kept() -> None:

@@ -97,14 +97,15 @@ def test_a_cup_is_fetched_from_a_cupboard_into_a_bowl(tmp_path: Path) -> None:
     run(tmp_path, script)
 
 
-def test_what_nobody_knew_of_is_seen_when_its_cupboard_is_opened(tmp_path: Path) -> None:
+def test_what_nobody_knew_of_is_seen_in_an_open_cupboard(tmp_path: Path) -> None:
     async def script(home: Household) -> None:
         found = await home.do("search", place="kitchen")
         assert "at(cup_1)" not in found
         assert found["is_open(dresser_drawer_1)"] is False
         assert "at(cupboard)" not in found, "where furniture stands is no news"
-        opened = await home.do("open", thing="cupboard", place="kitchen")
-        assert opened["at(cup_1)"] == "cupboard"
+        await home.do("open", thing="cupboard", place="kitchen")
+        inside = await home.do("look_into", container="cupboard", place="kitchen")
+        assert inside["at(cup_1)"] == "cupboard"
 
     run(tmp_path, script)
 

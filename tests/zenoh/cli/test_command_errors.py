@@ -50,6 +50,26 @@ def test_what_cannot_be_is_one_sentence_and_exit_code_1(
     assert said.err.count("\n") == 1
 
 
+@pytest.mark.parametrize("process", [["planner"], ["worker", "hsr"], ["router"]])
+def test_a_data_directory_that_cannot_be_used_is_one_sentence(
+    robotctl: Robotctl, process: list[str]
+) -> None:
+    file = robotctl.folder / "file"
+    file.touch()
+    for folder in (file, file / "below", Path("/proc/x")):
+        said = robotctl(*process, "--data", str(folder))
+        assert said.code == 1
+        assert f"directory {folder} cannot be used: " in said.err
+        assert "name one that can be written with --data" in said.err
+        assert said.err.count("\n") == 1
+
+
+def test_a_file_that_cannot_be_written_is_one_sentence(robotctl: Robotctl) -> None:
+    said = robotctl("demo", "two-cups", "--out", "/proc/x")
+    assert said.code == 1
+    assert said.err.endswith("\nError: /proc/x cannot be used: No such file or directory\n")
+
+
 def test_usage_errors_exit_with_2_and_suggest(robotctl: Robotctl) -> None:
     typo = robotctl("robtos")
     assert typo.code == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import sqlite3
 from pathlib import Path
 
@@ -26,8 +27,10 @@ from keyexpr_schema.payloads.requests import (
     PlanRequest,
     RequestAddress,
 )
+from keyexpr_schema.payloads.tasks import OrderAddress, Report, ReportAddress, ReportState
 from keyexpr_schema.transport.session import Session
 from tests.support.planner_process import (
+    ask_for_plan,
     carry_out,
     next_order,
     person,
@@ -246,3 +249,36 @@ async def test_the_name_of_a_plan_that_was_deleted_is_not_used_again(
         await session.confirm(PLAN_PROPOSAL, PlanAddress("p1"), proposal)
         status = await value(session, PLAN_STATUS, PlanAddress("p1"), state=PlanState.REJECTED)
         assert status.reason == answer.sentence
+
+
+async def test_a_plan_that_is_being_cancelled_is_deleted_once_its_robots_have_spoken(
+    router: RouterProcess, tmp_path: Path
+) -> None:
+    """Also when the planner is killed in between."""
+    robotctl = Robotctl(router.endpoint, tmp_path, realm="test")
+    async with person(router.endpoint) as session:
+        async with planner(router.endpoint, tmp_path / "data") as process:
+            await ask_for_plan(session)
+            order = await next_order(session, set())
+            assert (await robotctl.soon("plan", "cancel", "p")).code == 0
+            await value(session, ORDER, OrderAddress.of(order), cancelled=True)
+            deleting = asyncio.create_task(robotctl.soon("plan", "delete", "p"))
+
+            async def asked() -> bool:
+                wanted = (await session.list(CONTROL_REQUEST)).values()
+                return any(ask.control is Control.DELETE for ask in wanted)
+
+            await until(asked, "the request")
+            process.kill()
+            await process.start()
+            report = Report(
+                robot="hsr", plan="p", revision=1, task=order.task, attempt=1, epoch=order.epoch,
+                incarnation="i1", state=ReportState.CANCELLED, planner=order.planner,
+            )  # fmt: skip
+            await session.confirm(REPORT, ReportAddress.of(report), report)
+            deleted = await deleting
+            assert (deleted.code, deleted.out.strip()) == (0, "plan p is deleted"), deleted.err
+            assert await session.list(PLAN_STATUS) == {}
+            assert await session.list(REPORT) == {}
+            (entry,) = (await robotctl.soon("history", "--json")).data
+            assert (entry["plan"], entry["outcome"]) == ("p", "cancelled")

@@ -21,7 +21,8 @@ from keyexpr_schema.transport.session import Session, SessionConfig, open_sessio
 from sim.embodiment import SimEmbodiment
 from sim.files.mission_file import load_mission
 from sim.kinematic.backend import KinematicBackend, MotionModel
-from sim.server.sim_server import SimServer
+from sim.server.publisher import WorldPublisher
+from sim.server.sim_server import IDLE_S, SimServer
 from tests.support.polling import until
 from tests.support.router_process import RouterProcess
 from workers.embodiment import Embodiment, SensingEmbodiment
@@ -145,7 +146,7 @@ async def test_time_stands_still_while_nobody_moves(session_config: Make) -> Non
 
 
 async def test_the_world_waits_for_the_next_call_of_a_robot_whose_motion_ended(
-    session_config: Make,
+    session_config: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async with served(session_config, grace_s=2.0) as (backend, asker):
         body = SimEmbodiment(asker, "hsr", "i1")
@@ -154,8 +155,21 @@ async def test_the_world_waits_for_the_next_call_of_a_robot_whose_motion_ended(
         looked_s = backend.time_s
         driving = asyncio.create_task(other.perform(TO_KITCHEN))
         await until(lambda: backend.senses("locobot").moving)
+        looks_around = 0
+        publish = WorldPublisher.publish
+
+        def counted(self: WorldPublisher, robots: tuple[str, ...] = ()) -> None:
+            nonlocal looks_around
+            looks_around += 1
+            publish(self, robots)
+
+        monkeypatch.setattr(WorldPublisher, "publish", counted)
+        waiting_since_s = time.monotonic()
         await body.senses()
         assert backend.time_s == looked_s  # held back for the sake of hsr
+        await until(lambda: looks_around > 5)
+        # A call would wake it up; without any it looks around now and then.
+        assert looks_around <= 3 + (time.monotonic() - waiting_since_s) / IDLE_S
         await body.perform(LOOK)
         assert backend.time_s == pytest.approx(looked_s + 2.0)
         outcome = await driving  # hsr has no more to do, and its grace is over some time

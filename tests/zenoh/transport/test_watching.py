@@ -20,7 +20,8 @@ from keyexpr_schema.payloads.system import StoreAddress, StoreChanges, StoreChan
 from keyexpr_schema.payloads.tasks import Report, ReportAddress, ReportState
 from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.connecting import zenoh_config
-from keyexpr_schema.transport.link import Put
+from keyexpr_schema.transport.link import COLLECTED, Put
+from keyexpr_schema.transport.samples import stamp_of_text
 from keyexpr_schema.transport.session import Narrowed, Session, Watch, open_session
 from keyexpr_schema.transport.store.storage import Write
 from tests.support.polling import until
@@ -54,11 +55,50 @@ async def test_a_watch_shows_what_is_stored_then_changes_then_deletions(session_
             assert [(c.key, c.value) for c in changes] == [(FACT, fact(1)), (GOAL_SPEC, None)]
 
 
-async def test_a_watch_across_kill_9_misses_nothing_and_never_goes_back(router, session_config):
+async def test_what_is_collected_comes_in_the_order_in_which_it_was_put(session_config):
+    """Each key has a subscription of its own, and all of them wait for the same moment."""
+    async with open_session(session_config()) as session:
+        async with session.watch(GOAL_SPEC, FACT, collect_s=0.3) as watch:
+            await watch.synced()
+            for number in range(1, 41):
+                await session.confirm(FACT, AT, fact(number))
+                await session.confirm(GOAL_SPEC, GoalAddress(f"g{number}"), goal(f"g{number}"))
+            changes = await take(watch, 80)
+    stamps = [stamp_of_text(change.timestamp) for change in changes]
+    assert stamps == sorted(stamps)
+    assert [change.value.value for change in changes[::2]] == list(range(1, 41))
+
+
+async def test_where_more_came_than_can_wait_it_is_said(session_config):
+    async with open_session(session_config()) as session:
+        taken: list[str] = []
+        pattern = FACT.pattern()
+        receiver = (pattern, lambda sample: taken.append(sample.keyexpr))
+        passed: list[str] = []
+        async with (
+            session.link.collected([receiver]) as collect,
+            session.link.subscribed(pattern, lambda sample: passed.append(sample.keyexpr)),
+        ):
+            for count in (COLLECTED - 1, COLLECTED + 5):
+                for number in range(count):
+                    session.put(FACT, FactAddress(f"cup_{number}", "at"), fact(number))
+                await until(lambda count=count: len(passed) == count, "all that was put")
+                lost = collect()
+                assert lost == (count > COLLECTED)
+                assert len(taken) == min(count, COLLECTED)
+                assert taken[-1] == FACT.build(FactAddress(f"cup_{count - 1}", "at"))
+                taken.clear()
+                passed.clear()
+
+
+@pytest.mark.parametrize("collect_s", [None, 0.02])
+async def test_a_watch_across_kill_9_misses_nothing_and_never_goes_back(
+    router, session_config, collect_s
+):
     async with (
         open_session(session_config(component="reader")) as reader,
         open_session(session_config(component="writer")) as writer,
-        reader.watch(FACT) as watch,
+        reader.watch(FACT, collect_s=collect_s) as watch,
     ):
         for number in range(0, 60, 20):
             for value in range(number, number + 10):

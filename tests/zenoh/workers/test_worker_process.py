@@ -18,6 +18,7 @@ from keyexpr_schema.payloads.robots import RobotActivity
 from keyexpr_schema.payloads.tasks import ReportState
 from keyexpr_schema.transport.session import SessionConfig, open_session
 from sim.files.mission_file import load_mission
+from tests.support.polling import until
 from tests.support.router_process import RouterProcess
 from tests.support.worker_processes import WORKER, Processes, line, ready
 from tests.support.worker_world import DEADLINE_S, Planner
@@ -130,6 +131,35 @@ async def test_a_second_worker_for_a_robot_is_turned_away(
         order = await planner.order("locobot", "t1", "navigate", to="kitchen")
         report = await planner.report(order)
         assert (report.state, report.incarnation) == (ReportState.SUCCEEDED, incarnation)
+
+
+async def test_of_workers_that_start_at_one_instant_one_stays(
+    processes: Processes, session_config: Callable[..., SessionConfig]
+) -> None:
+    """They all wait for their robot, each with a journal of its own."""
+    processes.sim(speed=4.0)
+    workers = [processes.worker("locobot", f"host-{n}") for n in range(4)]
+    for worker in workers:
+        assert "waits" in await line(worker)
+    async with open_session(session_config(component="test")) as session:
+        planner = Planner(session, load_mission("two-cups"))
+        await planner.register()
+
+        async def the_others_have_ended() -> bool:
+            return sum(worker.poll() is None for worker in workers) <= 1
+
+        await until(the_others_have_ended, "all but one to end")
+        (left,) = [worker for worker in workers if worker.poll() is None]
+        incarnation = await ready(left, "locobot")
+        order = await planner.order("locobot", "t1", "navigate", to="kitchen")
+        report = await planner.report(order)
+        assert (report.state, report.incarnation) == (ReportState.SUCCEEDED, incarnation)
+    for worker in workers:
+        if worker is not left:
+            _, errors = await asyncio.to_thread(worker.communicate, timeout=DEADLINE_S)
+            assert worker.returncode == 1
+            assert "a worker of locobot is connected already (locobot-" in errors
+            assert "Traceback" not in errors
 
 
 async def test_a_worker_without_a_router_says_what_it_waits_for(tmp_path: Path) -> None:

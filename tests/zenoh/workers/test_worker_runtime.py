@@ -247,6 +247,7 @@ async def test_an_order_of_an_older_planner_is_refused(fleet_of: MakeFleet) -> N
         report = await fleet.report(old)
         assert (report.state, report.retryable) == (ReportState.REFUSED, True)
         assert report.reason is not None and "epoch 4" in report.reason
+        assert report.fence == 5
         assert fleet.world.backend.senses("locobot").place == "hallway"
 
 

@@ -28,6 +28,7 @@ from fleet.core.model.formulas.nodes import (
     grounded,
     grounded_term,
 )
+from fleet.core.model.parameter_types import ParameterType, parse_type
 from keyexpr_schema.facts import FactKey, Value
 
 ValueOf = Callable[[FactKey], Value]
@@ -45,6 +46,7 @@ class TypedInventory(Inventory, Protocol):
     """What exists, by type: `WorldModel` is one."""
 
     def of_type(self, type_: str) -> Collection[str]: ...
+    def is_of_type(self, name: str, type_: ParameterType) -> bool: ...
 
 
 def evaluate(
@@ -78,7 +80,7 @@ class _Reading:
             case Stored(literal):
                 return self.value_of(literal.variable) == literal.value
             case Is(name, kind):
-                return name in self.world.of_type(kind)
+                return self.world.is_of_type(name, parse_type(kind))
             case Compare(left, relation, right):
                 return _compare(self.term(left), relation, self.term(right))
             case Not(of):
@@ -154,7 +156,7 @@ def expanded(node: Formula, world: TypedInventory) -> Formula:
         case Holds() | Stored():
             return node
         case Is(name, kind):
-            return TRUE if name in world.of_type(kind) else FALSE
+            return TRUE if world.is_of_type(name, parse_type(kind)) else FALSE
         case Compare(left, relation, right):
             compared = Compare(expanded_term(left, world), relation, expanded_term(right, world))
             if isinstance(compared.left, Constant) and isinstance(compared.right, Constant):

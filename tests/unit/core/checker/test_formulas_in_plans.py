@@ -246,3 +246,27 @@ def test_furniture_is_where_it_belongs_unless_somebody_says_otherwise() -> None:
     assert [v.code for v in check_plan(plan(there), world).violations] == ["condition-unmet"]
     moved = world.with_facts({FactKey("at", "box"): "hallway"})
     assert not check_plan(plan(there), moved).violations
+
+
+def test_what_must_always_or_never_hold_does_in_every_order() -> None:
+    inside = {FactKey("at", "cup_1"): "box", FactKey("at", "cup_2"): "box", **OPEN}
+    fetch = task("t1", "fetch", "a1", object="cup_1")
+    shut = task("t2", "shut", "a2", ("t1",), door="box")
+    work = plan(fetch, shut)
+    assert not check_plan(work, house(inside)).violations
+    is_open = Condition(relation="is_open", subject="box", value=True)
+    (broken,) = check_plan(replace(work, always=(is_open,)), house(inside)).violations
+    assert (broken.code, broken.condition) == ("constraint-violated", is_open)
+    assert broken.sentence == "is_open(box) = true must always hold, and does not after t2"
+    shut_in = Condition(relation="reachable", subject="cup_2", value=False)
+    (broken,) = check_plan(replace(work, never=(shut_in,)), house(inside)).violations
+    assert broken.sentence == "reachable(cup_2) = false must never hold, and does after t2"
+    # The first cup is out by then, whoever looks.
+    other = replace(shut_in, subject="cup_1")
+    assert not check_plan(replace(work, never=(other,)), house(inside)).violations
+    loose = plan(replace(fetch, after=()), replace(shut, after=()))
+    assert check_plan(replace(loose, never=(other,)), house(inside)).violations
+    (at_once,) = check_plan(replace(work, always=(shut_in,)), house(inside)).violations
+    assert (
+        at_once.sentence == "reachable(cup_2) = false must always hold, and does not at the start"
+    )

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace as model_replace
+from itertools import pairwise
+from types import FrameType
 
 import pytest
 from msgspec.structs import replace
@@ -13,6 +16,7 @@ from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.world import Surface
+from tests.support.errand_plans import errand_plan
 from tests.support.household import PLACES, SKILLS, at, carrier, cup, fact, home, manipulator
 
 A1, A2 = "?a1", "?a2"
@@ -296,6 +300,31 @@ def test_a_thousand_tasks_are_checked_within_the_timeout() -> None:
             tasks.append(replace(t, task=name, after=after, args={**t.args, **object_}))
     world = home(cups=250)
     assert isinstance(check_plan(plan(tasks), world), CheckedPlan)
+
+
+def test_twice_the_work_of_one_robot_costs_twice_as_much_to_check() -> None:
+    """Each of its tasks writes where it is: nothing is compared pair by pair."""
+
+    def calls(goals: int) -> int:
+        checked, world = errand_plan(goals, robots=1)
+        done = [task.task for task in checked.tasks]
+        behind = {later: (before,) for before, later in pairwise(done)}
+        allocation = dict.fromkeys(checked.actors, "r0")
+        seen = 0
+
+        def count(frame: FrameType, event: str, arg: object) -> None:
+            nonlocal seen
+            seen += event in ("call", "c_call")
+
+        sys.setprofile(count)
+        try:
+            violations = check_allocation(checked, world, allocation, behind)
+        finally:
+            sys.setprofile(None)
+        assert not violations
+        return seen
+
+    assert calls(120) < 2.5 * calls(60)
 
 
 def test_places_of_the_household_are_what_the_plans_speak_of() -> None:

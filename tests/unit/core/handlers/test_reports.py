@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from msgspec.structs import replace
+
 from fleet.core import events
 from fleet.core.handlers.reports import MAX_FAILURES
 from fleet.core.revision.replanning import MAX_REPLANS
 from keyexpr_schema.payloads.goals import GoalState
 from keyexpr_schema.payloads.requests import ReplanRequest
+from keyexpr_schema.payloads.system import LARGEST_EPOCH
 from keyexpr_schema.payloads.tasks import ReportState, TaskState
 from keyexpr_schema.payloads.world import Fact
 from tests.support.fleet_model import BOTH, FleetModel, fleet
@@ -128,3 +131,29 @@ def test_a_person_who_wants_another_plan_has_perhaps_put_things_right() -> None:
     model.receive(events.PlanningFailed, job=job.job, reason="no way")
     model.finish()
     assert [model.goal_state(goal) for goal in ("g1", "g2")] == [GoalState.REACHED] * 2
+
+
+def test_a_refusal_of_a_planner_that_began_anew_costs_no_attempt() -> None:
+    """Its store and its journal are lost, and the robots have had orders of a higher epoch."""
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    (order,) = model.orders()
+    for _ in range(2 * MAX_FAILURES):
+        model.report(order, ReportState.REFUSED, fence=7)
+    assert model.orders() == [order]
+    model.receive(events.EpochRaised, epoch=8)
+    assert model.orders() == [replace(order, epoch=8)]
+    model.report(order, ReportState.REFUSED, fence=7)  # what was on its way
+    assert model.orders() == [replace(order, epoch=8)]
+    model.receive(events.EpochRaised, epoch=3)
+    assert model.state.epoch == 8
+    model.finish()
+    assert model.goal_state("g1") is GoalState.REACHED
+
+
+def test_a_refusal_with_an_epoch_that_nobody_counted_up_to_is_one_of_the_attempt() -> None:
+    model = fleet()
+    model.plan(bring(1, "hallway"))
+    (order,) = model.orders()
+    model.report(order, ReportState.REFUSED, fence=LARGEST_EPOCH + 1)
+    assert [again.attempt for again in model.orders()] == [order.attempt + 1]

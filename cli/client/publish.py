@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from cli.client.names import TakenMeanwhile, free_name, next_number, put_if_unchanged
 from cli.errors import BadArgument, check_known
-from keyexpr_schema.facts import AT, parse_value
+from keyexpr_schema.facts import AT, IN, ON, parse_value
 from keyexpr_schema.keyspace import (
     FACT,
     GOAL_SPEC,
@@ -71,13 +71,15 @@ async def put_statement(session: Session, text: str, name: str | None = None) ->
 
 
 async def put_fact(session: Session, relation: str, subject: str, written: str) -> Fact:
-    """Store a fact, confirmed.
+    """Store a fact, confirmed. What is on or in a known object is stored as where it is (`at`).
 
     Raises:
         Unknown: `at` of something that is no object or robot, or of a place that is none.
         BadArgument: something would be at itself.
     """
     value = parse_value(written)
+    if relation in (ON, IN) and written in [a.object for a in await session.list(OBJECT)]:
+        relation = AT
     if relation == AT:
         how = "load a world with `robotctl world load FILE`"
         robots = [a.robot for a in await session.list(ROBOT_SPEC)]

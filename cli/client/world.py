@@ -34,25 +34,33 @@ async def put_object(
     aliases: tuple[str, ...],
     home: str | None,
     mass_kg: float | None,
+    features: tuple[str, ...] = (),
+    part_of: str | None = None,
+    fixed: bool = False,
 ) -> Object:
     """Store an object, confirmed; of one that is known, what is not said now stays as it was.
 
-    A new one is the next of its kind: with cup 1 and cup 2 there, it is cup 3.
+    A new one is the next of its kind: with cup 1 and cup 2 there, it is cup 3. `fixed`: it does not
+    move.
 
     Raises:
-        BadArgument: the name stands for a place or a robot.
-        Unknown: its home is no place.
+        BadArgument: the name stands for a place or a robot, or it would be a part of itself.
+        Unknown: its home is no place or object, or what it is a part of is no object.
         InvalidId: the name or the kind cannot be one.
     """
     check_id(name, "object")
     check_id(kind, "kind")
     await claim_name(session, name, "object")
     places = [address.place for address in await session.list(PLACE)]
-    if home is not None:
-        check_known("place", home, places)
     _check_free(name, "place", places)
     _check_free(name, "robot", [address.robot for address in await session.list(ROBOT_SPEC)])
     objects = {a.object: thing for a, thing in (await session.list(OBJECT)).items()}
+    if home is not None:
+        check_known("place or object", home, [*places, *objects])
+    if part_of is not None:
+        check_known("object", part_of, objects)
+        if part_of == name:
+            raise BadArgument(f"{name} cannot be a part of itself")
     old = objects.get(name)
     number = None if old is None or old.kind != kind else old.ordinal
     if number is None:
@@ -72,6 +80,9 @@ async def put_object(
             aliases=aliases or now.aliases,
             home=home or now.home,
             mass_kg=now.mass_kg if mass_kg is None else mass_kg,
+            features=features or now.features,
+            part_of=part_of or now.part_of,
+            movable=now.movable and not fixed,
         )
 
     return await session.update(OBJECT, ObjectAddress(name), changed)

@@ -16,6 +16,9 @@ _GOES_WITH = {
     "--kind": ("--object",),
     "--home": ("--object",),
     "--mass-kg": ("--object",),
+    "--feature": ("--object",),
+    "--part-of": ("--object",),
+    "--fixed": ("--object",),
     "--region": ("--place",),
     "--distance": ("--place",),
 }
@@ -51,11 +54,29 @@ async def add(
         str | None, typer.Option("--kind", help="What sort of object it is, such as cup.")
     ] = None,
     home: Annotated[
-        str | None, typer.Option("--home", metavar="PLACE", help="Where the object belongs.")
+        str | None,
+        typer.Option(
+            "--home", metavar="PLACE", help="The place or object where the object belongs."
+        ),
     ] = None,
     mass_kg: Annotated[
         float | None, typer.Option("--mass-kg", min=0.0, help="What the object weighs; else 0.")
     ] = None,
+    feature: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--feature",
+            metavar="WORD",
+            help="What can be done with it: supports, contains, openable, switchable, person, …; "
+            "repeatable.",
+        ),
+    ] = None,
+    part_of: Annotated[
+        str | None, typer.Option("--part-of", metavar="ID", help="The object that it is a part of.")
+    ] = None,
+    fixed: Annotated[
+        bool, typer.Option("--fixed", help="It does not move; it is at its --home.")
+    ] = False,
     region: Annotated[
         list[str] | None,
         typer.Option(
@@ -94,6 +115,9 @@ async def add(
             "--kind": kind,
             "--home": home,
             "--mass-kg": mass_kg,
+            "--feature": feature,
+            "--part-of": part_of,
+            "--fixed": fixed or None,
             "--region": region,
             "--distance": distance,
         },
@@ -106,7 +130,16 @@ async def add(
     async with call.session() as session:
         if thing is not None:
             kept = await put_object(
-                session, thing, kind or "", label, tuple(alias or ()), home, mass_kg
+                session,
+                thing,
+                kind or "",
+                label,
+                tuple(alias or ()),
+                home,
+                mass_kg,
+                tuple(feature or ()),
+                part_of,
+                fixed,
             )
             call.show(kept, lambda: f"stored object {kept.object}: “{kept.label}”, a {kept.kind}")
         elif place is not None:

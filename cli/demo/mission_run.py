@@ -56,7 +56,10 @@ class Demo:
         """
         for text in self.mission.statements:
             await put_statement(self.session, text)
-        given = [await put_goal(self.session, text, None) for text in self.mission.goals]
+        speaker = self.mission.speaker
+        given = [
+            await put_goal(self.session, text, None, speaker=speaker) for text in self.mission.goals
+        ]
         self.goals = tuple(goal.goal for goal in given)
         await self.view.until_read(self.goals, "the goals", READ_S, PLAN_S)
         for status in self._statuses().values():

@@ -32,13 +32,29 @@ def places_table(places: Sequence[Place]) -> Table:
 def objects_table(objects: Sequence[Object]) -> Table:
     """One line an object."""
     return table(
-        ["object", "kind", "label", "also called", "mass", "home"],
+        ["object", "kind", "label", "also called", "mass", "home", "features"],
         (
-            (o.object, o.kind, o.label, ", ".join(o.aliases), f"{o.mass_kg:g} kg", o.home)
+            (
+                o.object,
+                o.kind,
+                o.label,
+                ", ".join(o.aliases),
+                f"{o.mass_kg:g} kg",
+                o.home,
+                ", ".join(_features(o)),
+            )
             for o in objects
         ),
         title="Objects",
     )
+
+
+def _features(thing: Object) -> list[str]:
+    """What can be done with it, and what it is a part of."""
+    fixed = [] if thing.movable else ["fixed"]
+    part = [] if thing.part_of is None else [f"part of {thing.part_of}"]
+    room = [] if thing.room is None else [f"room for {thing.room:g}"]
+    return [*thing.features, *fixed, *part, *room]
 
 
 def facts_table(facts: Sequence[Fact]) -> Table:

@@ -62,14 +62,14 @@ def as_written(state: State, fact: Fact) -> Fact:
     return replace(fact, relation=literal.variable.relation)
 
 
-def known_finer(state: State, literal: Literal) -> Value:
+def known_finer(state: State, literal: Literal, *, aboard: bool = False) -> Value:
     """Its value, or the one believed where that says the same more finely: on a table in the
-    kitchen, of what is said to be in the kitchen."""
+    kitchen, of what is said to be in the kitchen; `aboard`: or in a basket there."""
     variable, value = literal
     if variable.relation != AT or value is None or state.logic < ONE_VARIABLE_SINCE_LOGIC:
         return value
     facts = FactValues(state.facts)
-    return facts.get(variable) if holds(literal, facts.get, state) else value
+    return facts.get(variable) if holds(literal, facts.get, state, aboard=aboard) else value
 
 
 def _without_circle(state: State, fact: Fact) -> State | None:

@@ -18,11 +18,12 @@ class GoalAddress(Address, frozen=True):
 class Condition(Payload, frozen=True, kw_only=True):
     """`relation(subject) = value` must hold, e.g. `at(cup_1) = hallway`.
 
-    A goal `at(object) = place` also holds when the object lies in the basket of a robot that is
-    at the place; it does not while a hand holds the object. Two relations are derived from others:
+    A goal `at(object) = place` holds of all that carries the object, however indirectly: it may be
+    in a bowl on a table there, or in the basket of a robot that is there; it does not while a hand
+    holds the object. `on(object)` and `in(object)` name the thing that carries it directly.
     `located(object) = true` holds when it is known where the object is, `held(object) = true` when
-    a hand holds it. With `any_of`, it is enough that the condition holds for one of those subjects
-    (`subject` is then the first of them): "a cup", "some robot".
+    a robot's hand holds it. With `any_of`, it is enough that the condition holds for one of those
+    subjects (`subject` is then the first of them): "a cup", "some robot".
     """
 
     relation: Id

@@ -51,7 +51,8 @@ class ObjectAddress(Address, frozen=True):
 class Fact(Payload, frozen=True, kw_only=True):
     """One state variable and its value, with who said so and when.
 
-    `at(x)` is a place; for a thing that a robot has in its hand or basket it is that robot.
+    `at(x)` is what carries x directly: a place, a thing that it is on or in, the robot that has it
+    in its hand or basket, the person who has it. `on(x)` and `in(x)` a thing say the same.
     `holding(robot)` is an object or `nothing`.
     `time_s` is seconds on the fleet's clock (simulated time in a simulation).
     """

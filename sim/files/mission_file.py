@@ -36,7 +36,7 @@ class MissionRobot(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Mission(msgspec.Struct, frozen=True, kw_only=True):
-    """A world, robots in it, statements about it and goals."""
+    """A world, robots in it, statements about it and goals; `speaker` is who says these."""
 
     mission: Id
     world: WorldFile
@@ -44,6 +44,7 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True):
     statements: tuple[str, ...]
     goals: tuple[str, ...]
     plan: PlanOptions
+    speaker: Id | None = None
 
 
 class _Start(FileEntry, frozen=True):
@@ -75,6 +76,8 @@ class _MissionEntry(FileEntry, frozen=True):
     """How things are at the start in this mission, besides what the world file says."""
     statements: tuple[str, ...] = ()
     goals: tuple[str, ...] = ()
+    speaker: Id | None = None
+    """The person who says the goals: "me" in them."""
     plan: PlanOptions = PlanOptions()
 
 
@@ -114,6 +117,7 @@ def load_mission(name: str | Path) -> Mission:
         statements=entry.statements,
         goals=entry.goals,
         plan=entry.plan,
+        speaker=entry.speaker,
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -9,8 +11,9 @@ from hypothesis import strategies as st
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, Vocabulary, read_goal, statement_facts
 from fleet.language.words.tokens import words_in
-from keyexpr_schema.payloads.world import Object, Place
+from keyexpr_schema.payloads.world import Feature, Object, Place
 from tests.support.household import carrier, manipulator
+from tests.support.language_flat import FURNISHED
 from tests.support.language_house import WORDS as NAMES
 from tests.support.language_house import shown
 from tests.support.reached import Reached, reaches
@@ -92,6 +95,85 @@ def test_any_statement_is_read_or_refused(reached: Reached, text: str) -> None:
         reached["read"] += 1
         assert facts
         assert {key.subject for key, _ in facts} <= KNOWN
+
+
+FURNISHED_WORDS = words_in(
+    "bring put set give hand take open close shut switch turn on off in into onto to from of the a "
+    "all fork lamp cup first bowl box tray shelf fridge cupboard table television anna kitchen "
+    "living room me it and then is should be has contains everything back away look search , . '"
+)
+FURNISHED_SOUP = st.lists(st.sampled_from(FURNISHED_WORDS), max_size=12).map(" ".join)
+THING = st.sampled_from(
+    (
+        *("the fork", "the lamp", "the first cup", "the bowl", "the box", "the tray", "the fridge"),
+        *("Anna", "everything", "it", "the television", "the shelf", "the kitchen table", "me"),
+        *("the upper board", "the cups"),
+    )
+)
+FURNISHED_WISH = st.builds(
+    str.format,
+    st.sampled_from(
+        (
+            *("put {} on {}", "put {} in {}", "bring {} to {}", "give {} to {}", "close {}"),
+            *("switch {} off", "open {}", "put {} back", "clear {}", "search {}", "bring me {}"),
+            *("{} should be open", "take {} from {}"),
+        )
+    ),
+    THING,
+    THING,
+)
+FURNISHED_CLAIM = st.builds(
+    str.format,
+    st.sampled_from(
+        ("{} is on {}", "{} is in {}", "{} is open", "{} is off", "{} has {}", "{} contains {}")
+    ),
+    THING,
+    THING,
+)
+FURNISHED_WISHES = st.lists(FURNISHED_WISH, min_size=1, max_size=2).map(" and ".join)
+
+
+@reaches("handed", least={"refused": 50, "on or in": 5, "state": 3})
+@settings(max_examples=500, deadline=None)
+@given(st.one_of(FURNISHED_SOUP, FURNISHED_WISH, FURNISHED_WISHES), st.sampled_from([None, "anna"]))
+def test_what_is_wished_for_things_can_be(reached: Reached, text: str, speaker: str | None) -> None:
+    """Nothing is put into itself, nor on what only contains, nor moved that stays where it is."""
+    try:
+        reading = read_goal(text, replace(FURNISHED, speaker=speaker))
+    except NotUnderstood as refused:
+        reached["refused"] += 1
+        assert str(refused)
+        assert "\n" not in str(refused)
+        return
+    for condition in (condition for stage in reading.stages for condition in stage):
+        good_for = FURNISHED.good_for.get(str(condition.value), frozenset())
+        things = [FURNISHED.objects[s] for s in condition.subjects if s in FURNISHED.objects]
+        if condition.relation in ("at", "on", "in"):
+            assert condition.value not in condition.subjects
+            assert all(thing.is_a(Feature.MOVABLE) for thing in things)
+        if condition.relation in ("on", "in"):
+            wanted = Feature.SUPPORTS if condition.relation == "on" else Feature.CONTAINS
+            assert wanted in good_for
+            reached["on or in"] += 1
+        if condition.relation in ("is_open", "is_on"):
+            wanted = Feature.OPENABLE if condition.relation == "is_open" else Feature.SWITCHABLE
+            assert all(thing.is_a(wanted) for thing in things)
+            reached["state"] += 1
+        reached["handed"] += condition.relation == "at" and condition.value == "anna"
+
+
+@reaches("refused", "read")
+@settings(max_examples=300, deadline=None)
+@given(st.one_of(FURNISHED_SOUP, FURNISHED_CLAIM))
+def test_any_statement_about_furniture_is_read_or_refused(reached: Reached, text: str) -> None:
+    try:
+        facts = statement_facts(text, FURNISHED)
+    except NotUnderstood as refused:
+        reached["refused"] += 1
+        assert "\n" not in str(refused)
+    else:
+        reached["read"] += 1
+        assert all(key.subject != value for key, value in facts)
 
 
 @settings(max_examples=200, deadline=None)

@@ -67,7 +67,7 @@ def _read_statement(state: State, statement: Statement) -> State:
         as_written(state, Fact.of(literal, source, said_s or state.time_s)) for literal in read
     )
     for fact in facts:
-        state = conclude(state, replace(fact, value=known_finer(state, fact.literal)))
+        state = conclude(state, replace(fact, value=known_finer(state, fact.literal, aboard=True)))
     return _set_status(state, StatementStatus(statement=name, facts=facts, said_s=said_s))
 
 

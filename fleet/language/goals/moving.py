@@ -195,7 +195,10 @@ class Moving:
         for number, place in enumerate(where.each, 1):
             # Each is one of its own: negative keys are those of no word.
             one = replace(mentions[0], key=-(1000 * (mentions[0].key + 1) + number))
-            self.draft.add(AT, one, place)
+            if one.type == "robot":
+                self.draft.add(AT, one, self.place_of(place))
+            else:
+                self.to_spot(one, place)
         self.moved = []
         self.subjects.remember([])
 
@@ -224,12 +227,12 @@ class Moving:
     def _put(self, mention: Mention, where: Where, target: str) -> None:
         if mention.type == "robot":
             return self.draft.add(AT, mention, self.place_of(target))
-        if mention.open or target not in mention.subjects:
-            kept = [name for name in mention.subjects if name != target]
-            one = replace(mention, subjects=tuple(kept), open=mention.open and len(kept) > 1)
-            handed = where.target_type == "robot" or self.vocabulary.is_person(target)
-            return self.draft.add(where.relation, one, target, on_robot=handed)
-        raise NotUnderstood(f"{self.clause!r}: nothing can be on or in itself")
+        kept = tuple(name for name in mention.subjects if name != target)
+        if not kept:
+            raise NotUnderstood(f"{self.clause!r}: nothing can be on or in itself")
+        others = replace(mention, subjects=kept, open=mention.open and len(kept) > 1)
+        handed = where.target_type == "robot" or self.vocabulary.is_person(target)
+        return self.draft.add(where.relation, others, target, on_robot=handed)
 
     def place_of(self, target: str) -> str:
         """The place where somebody goes who goes there.
@@ -271,21 +274,21 @@ class Moving:
             name = homeless[0] if homeless else mention.subjects[0]
             raise NotUnderstood(f"it is not known where {name} belongs: {HOME_HINT}")
         if mention.open:
-            self.to_home(mention, homes[mention.subjects[0]])
+            self.to_spot(mention, homes[mention.subjects[0]])
             return
         for name in mention.subjects:
-            self.to_home(Mention((name,), "object", mention.key), homes[name])
+            self.to_spot(Mention((name,), "object", mention.key), homes[name])
 
     def is_spot(self, name: str | None) -> bool:
         """Whether things can belong there: in a place, or on or in a thing."""
         return name in self.vocabulary.places or name in self.vocabulary.good_for
 
-    def to_home(self, mention: Mention, home: str | None) -> None:
-        """Wish that it is where it belongs."""
-        good_for = self.vocabulary.good_for.get(home or "", ())
+    def to_spot(self, mention: Mention, spot: str | None) -> None:
+        """Wish that it is in that place, or on or in that thing."""
+        good_for = self.vocabulary.good_for.get(spot or "", ())
         on = Feature.SUPPORTS in good_for
         within = Feature.CONTAINS in good_for
-        self.draft.add(AT if on == within else ON if on else IN, mention, home)
+        self.draft.add(AT if on == within else ON if on else IN, mention, spot)
 
     # --- going -----------------------------------------------------------------------------------
     def go(self, who: Sequence[Subject] | None) -> None:

@@ -56,7 +56,7 @@ class Tidying(States):
     def _to_their_homes(self, names: Sequence[str], homes: Mapping[str, str]) -> None:
         start = self.began
         for name in names:
-            self.to_home(Mention((name,), "object", start), homes[name])
+            self.to_spot(Mention((name,), "object", start), homes[name])
         self.subjects.remember([Mention(tuple(names), "object", start)])
 
     def _within(self, homes: Mapping[str, str]) -> tuple[str, ...]:

@@ -67,7 +67,8 @@ class Locations:
                 person, a robot, or a robot's basket.
         """
         cursor, start = self.cursor, self.cursor.at
-        word = cursor.tokens[start - 1].word if start else ""
+        before = [token.word for token in cursor.tokens[:start] if token.word != "of"]
+        word = before[-1] if before else ""
         if (speaker := self._speaker()) is not None:
             return Locative(preposition, speaker, word)
         if (basket := self._basket(start)) is not None:
@@ -163,7 +164,8 @@ class Locations:
         source, _ = self._one(sources) if sources else (None, "place")
         if len(targets) == 1 and targets[0].noun.quantity is Quantity.ALL:
             each = targets[0].noun.resolve()
-            if each.type == "place" and len(each.subjects) > 1:
+            things = all(name in self.vocabulary.objects for name in each.subjects)
+            if (each.type == "place" or things) and len(each.subjects) > 1:
                 return Where(source, each=each.subjects, text=targets[0].noun.text)
         target, target_type = self._one(targets) if targets else (None, "place")
         if source is not None and source == target:

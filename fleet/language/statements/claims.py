@@ -44,6 +44,8 @@ class Claims(Clauses):
                 )
             if mention.type == "robot" and target in self.vocabulary.robots:
                 raise NotUnderstood("a robot is at a place, not on a robot: name the place")
+            if target in mention.subjects:
+                raise NotUnderstood(f"{self.clause!r}: nothing can be on or in itself")
             robot = mention.type == "robot" and target is not None
             for name in mention.subjects:
                 self.fact(AT, name, self.place_of(target) if robot and target else target)

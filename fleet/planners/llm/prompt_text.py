@@ -109,6 +109,7 @@ def vocabulary_text(text: str, vocabulary: Vocabulary) -> str:
             "robots": [
                 {"robot": name, "label": spec.label} for name, spec in vocabulary.robots.items()
             ],
+            **({} if vocabulary.speaker is None else {"speaker": vocabulary.speaker}),
             "sentence": text,
         }
     )

@@ -34,7 +34,8 @@ def test_the_world_is_loaded_said_listed_and_forgotten(robotctl: Robotctl) -> No
 
     world = robotctl("world", "list", "--json").data
     assert [place["place"] for place in world["places"]] == ["hallway", "kitchen", "living_room"]
-    assert [thing["object"] for thing in world["objects"]] == ["cup_1", "cup_2"]
+    moved = [thing["object"] for thing in world["objects"] if thing["movable"]]
+    assert moved == ["cup_1", "cup_2"]
     assert [fact["value"] for fact in world["facts"]] == ["kitchen"]
     assert [s["text"] for s in world["statements"]] == ["The first cup is in the kitchen."]
     page = robotctl("world", "list").out
@@ -45,7 +46,7 @@ def test_the_world_is_loaded_said_listed_and_forgotten(robotctl: Robotctl) -> No
     statement = world["statements"][0]["statement"]
     assert robotctl("world", "delete", statement).code == 0
     assert robotctl("world", "delete", "cup_2").out.strip() == "deleted object cup_2"
-    assert "known are: cup_1," in robotctl("world", "delete", "cup_2").err
+    assert "did you mean 'cup_1'?" in robotctl("world", "delete", "cup_2").err
     left = robotctl("world", "list", "--json").data
     assert left["facts"] == left["statements"] == []
 
@@ -68,6 +69,28 @@ def test_objects_are_told_one_by_one(robotctl: Robotctl) -> None:
     assert "(did you mean 'kitchen'?)" in wrong.err
     taken = robotctl("world", "add", "--object", "kitchen", "--kind", "cup")
     assert "'kitchen' is a place already" in taken.err
+
+
+def test_what_others_can_be_on_is_told_with_its_features(robotctl: Robotctl) -> None:
+    robotctl("world", "load", WORLD)
+    desk = ("world", "add", "--object", "desk", "--kind", "desk", "--fixed", "--home", "kitchen")
+    robotctl(*desk)
+    drawer = robotctl(
+        *("world", "add", "--object", "drawer", "--kind", "drawer", "--part-of", "desk"),
+        *("--feature", "contains", "--feature", "openable", "--json"),
+    ).data
+    assert (drawer["features"], drawer["part_of"]) == (["contains", "openable"], "desk")
+    assert "openable" in robotctl("world", "list").out
+    said = robotctl("world", "add", "--fact", "in", "cup_1", "drawer")
+    assert said.out.strip() == "stored at(cup_1) = drawer"
+    wrong = robotctl("world", "add", "--fact", "at", "cup_1", "cup_1")
+    assert "cannot be on or in itself" in wrong.err
+    robotctl("world", "add", "--object", "anna", "--kind", "person")
+    goal = ("goal", "add", "Bring me the first cup.")
+    assert robotctl(*goal, "--speaker", "anna", "--json").data["spec"]["speaker"] == "anna"
+    assert (
+        "there is no person 'ana' (did you mean 'anna'?)" in robotctl(*goal, "--speaker", "ana").err
+    )
 
 
 def test_places_are_told_one_by_one(robotctl: Robotctl) -> None:

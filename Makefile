@@ -43,7 +43,7 @@ docs: $(VENV)/development ## write the generated pages under docs/
 	$(BIN)/python -m keyexpr_schema.document
 
 screenshots: $(VENV)/runtime ## run the demonstrations and make the pictures of the README from them
-	for shot in two-cups:56 find-cup:34 apartment:90; do \
+	for shot in two-cups:56 find-cup:34 apartment:104; do \
 		mission=$${shot%:*}; rm -rf runs/screenshots-$$mission; \
 		$(BIN)/robotctl demo $$mission --out runs/screenshots-$$mission && \
 		$(BIN)/python -m fleet.timeline.screenshot runs/screenshots-$$mission/recording.rrd \

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from keyexpr_schema.payloads.motions import PointM
-from sim.errors import NoPath, NoStance
 from sim.files.world_schema import FLOOR_M
 from sim.mujoco_world.base_motions import navigate, reach_m, reach_to_m
 from sim.mujoco_world.grasping import (
@@ -39,18 +38,14 @@ def place_at(context: MotionContext, run: MotionRun) -> Steps:
     if not spots:
         raise MotionFailed(f"there is no free spot for {held} at {target}")
     spot = None
-    why = ""
     for candidate in spots[:MOST_SPOTS]:
-        try:
-            reach = reach_to_m(context, run, candidate)
-            context.navigator.approach(run.robot.name, candidate, reach)
-        except (NoStance, NoPath) as error:
-            why = str(error)
-        else:
+        reach = reach_to_m(context, run, candidate)
+        if context.navigator.reaches(run.robot.name, candidate, reach):
             spot = candidate
             break
+        yield  # the world goes on while it thinks
     if spot is None:
-        raise MotionFailed(f"no free spot at {target} is in reach: {why}")
+        raise MotionFailed(f"no free spot at {target} is in reach of {run.robot.name}")
     at = spot
     run.phase = f"driving up to {target}"
     yield from navigate(

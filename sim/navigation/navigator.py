@@ -156,6 +156,12 @@ class Navigator:
             raise NoPath(f"there is no way to {what} from where {robot} stands")
         self._tasks[robot] = _Task(what, docks=tuple(docks))
 
+    def reaches(
+        self, robot: str, point_m: tuple[float, float, float], reach_m: tuple[float, float]
+    ) -> bool:
+        """Whether there is a stance for `approach`, whoever stands there now."""
+        return bool(self._spots.stances(point_m, self._robots[robot].radius_m, reach_m))
+
     def cancel(self, robot: str) -> None:
         """Forget where `robot` was going; it comes to rest within a step."""
         traveller = self._robots[robot]

@@ -59,6 +59,7 @@ class Opaque:
     node: int
     formula: Formula
     variables: frozenset[FactKey]
+    aboard: bool
 
 
 class Nodes:
@@ -141,7 +142,10 @@ class Nodes:
             return derived.holds(literal, self.known, self.world, aboard=aboard)
         key = literal, aboard, innermost
         if key not in self._readings:
-            self._readings[key] = self._read(literal, aboard, innermost)
+            try:
+                self._readings[key] = self._read(literal, aboard, innermost)
+            except TooManyWays:
+                self._readings[key] = self._only_evaluated(Holds(literal), aboard)
         return self._readings[key]
 
     def formula(self, formula: Formula) -> int | bool:
@@ -199,14 +203,16 @@ class Nodes:
         try:
             return self._reading(list(ways(read, domain, self.known)))
         except TooManyWays:
-            node = self._new(-1, None)
+            return self._only_evaluated(formula, aboard=False)
 
-            def values_of(key: FactKey) -> Sequence[Value]:
-                return self._domain(key) or (self.known(key),)
+    def _only_evaluated(self, formula: Formula, aboard: bool) -> int:
+        def values_of(key: FactKey) -> Sequence[Value]:
+            return self._domain(key) or (self.known(key),)
 
-            read_off = variables_read(formula, values_of, self.world)
-            self.opaque[node] = Opaque(node, formula, frozenset(read_off))
-            return node
+        node = self._new(-1, None)
+        read_off = variables_read(formula, values_of, self.world, aboard)
+        self.opaque[node] = Opaque(node, formula, frozenset(read_off), aboard)
+        return node
 
     def _domain(self, key: FactKey) -> Sequence[Value] | None:
         """The values that a variable can have; `None` if it keeps the one that it has."""
@@ -289,7 +295,7 @@ class Nodes:
             found += [
                 node
                 for node, opaque in self.opaque.items()
-                if evaluate(opaque.formula, value_of, self.world)
+                if evaluate(opaque.formula, value_of, self.world, aboard=opaque.aboard)
             ]
         return found
 
@@ -313,7 +319,9 @@ class Nodes:
             ]
         opaque = self.opaque.get(node)
         if opaque is not None:
-            return ((),) if evaluate(opaque.formula, self.values(state), self.world) else ()
+            read = self.values(state)
+            holds = evaluate(opaque.formula, read, self.world, aboard=opaque.aboard)
+            return ((),) if holds else ()
         return ((),) if self._rides(self.rides[node], state) else ()
 
 

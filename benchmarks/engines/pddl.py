@@ -2,16 +2,21 @@
 
 Every relation becomes a predicate `(is-relation subject value)`; a skill that overwrites a variable
 gets one more parameter, its old value. Capabilities become static predicates, the room in a basket
-so many slots. What is unknown is left out, so every fact that a skill needs must be known.
+so many slots. What is unknown is left out, so every fact that a skill needs must be known. Types of
+things are static predicates. Skills with formulas, and those that need what is read off other
+variables, are left out; that nothing is closed is taken for granted.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 
+from fleet.core.model.derived import DERIVED
+from fleet.core.model.parameter_types import BASE_TYPES
 from fleet.core.model.skills import Action, Need, SkillModel
 from fleet.core.model.world import WorldModel
-from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Value
+from keyexpr_schema.facts import AT, HOLDING, IN, NOTHING, ON, REACHABLE, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 
 Step = tuple[str, tuple[str, ...]]
@@ -20,9 +25,9 @@ Step = tuple[str, tuple[str, ...]]
 
 def domain(world: WorldModel) -> str:
     """The skills as a typed STRIPS domain."""
-    skills = [world.skills[name] for name in sorted(world.skills)]
+    skills = _plain(world)
     relations = sorted(
-        {row.variable.relation for skill in skills for row in (*skill.before, *skill.after)}
+        {row.variable.relation for skill in skills for row in (*_before(skill), *skill.after)}
         | {AT, HOLDING}
     )
     predicates = [f"(is-{relation} ?subject - thing ?value - thing)" for relation in relations]
@@ -34,11 +39,12 @@ def domain(world: WorldModel) -> str:
         for name, need in sorted(statics.items())
     ]
     predicates += [f"(skilled-{skill.name} ?robot - thing)" for skill in skills]
+    predicates += [f"({_type(kind)} ?name - thing)" for kind in sorted(_kinds(skills))]
     words = sorted(
         {
             _word(row.value)
             for s in skills
-            for row in (*s.before, *s.after)
+            for row in (*_before(s), *s.after)
             if row.value not in s.parameters
         }
     )
@@ -70,6 +76,11 @@ def problem(world: WorldModel, conditions: Iterable[Condition]) -> str:
     known += [f"(slot {slot} {robot}) (empty {slot})" for slot, robot in slots]
     known += [f"(other {a} {b})" for a in world.team for b in world.team if a != b]
     known += _abilities(world)
+    known += [
+        f"({_type(kind)} {name})"
+        for kind in sorted(_kinds(_plain(world)))
+        for name in world.of_type(kind)
+    ]
     goals = " ".join(f"(is-{c.relation} {c.subject} {_word(c.value)})" for c in conditions)
     names = [
         f"{' '.join(world.team)} - a-robot",
@@ -96,10 +107,38 @@ def actions(steps: Sequence[Step], world: WorldModel) -> list[Action]:
     return found
 
 
+def _plain(world: WorldModel) -> list[SkillModel]:
+    """The skills that can be said in STRIPS."""
+    return [
+        skill
+        for _, skill in sorted(world.skills.items())
+        if not skill.conditions
+        and not skill.conditional
+        and {row.variable.relation for row in _before(skill)}.isdisjoint((*DERIVED, ON, IN))
+    ]
+
+
+def _before(skill: SkillModel) -> list[Literal]:
+    return [row for row in skill.before if row.variable.relation != REACHABLE]
+
+
+def _kinds(skills: Iterable[SkillModel]) -> set[str]:
+    return {kind for skill in skills for kind in skill.parameters.values()} - set(BASE_TYPES)
+
+
+def _type(kind: str) -> str:
+    return "kind-" + re.sub(r"\W+", "-", kind)
+
+
 def _action(skill: SkillModel) -> str:
     parameters = [f"?{name} - a-{kind.bases[0]}" for name, kind in skill.types.items()]
-    known = dict(skill.before)
-    before = [f"(is-{r} ?{s} {_term(v, skill)})" for (r, s), v in skill.before]
+    known = dict(_before(skill))
+    before = [f"(is-{r} ?{s} {_term(v, skill)})" for (r, s), v in _before(skill)]
+    before += [
+        f"({_type(kind)} ?{name})"
+        for name, kind in skill.parameters.items()
+        if kind not in BASE_TYPES
+    ]
     before += [f"(skilled-{skill.name} ?{skill.actor_parameter})"]
     robots = skill.robot_parameters
     before += [f"(other ?{a} ?{b})" for i, a in enumerate(robots) for b in robots[i + 1 :]]
@@ -129,13 +168,14 @@ def _action(skill: SkillModel) -> str:
 
 
 def _abilities(world: WorldModel) -> list[str]:
+    plain = {skill.name for skill in _plain(world)}
     found = [
         f"(skilled-{skill} {robot})"
         for robot in world.team
         for skill in world.robots[robot].skills
-        if skill in world.skills
+        if skill in plain
     ]
-    for need in {need for _, need in _needs(world.skills.values())}:
+    for need in {need for _, need in _needs(_plain(world))}:
         for robot in world.team:
             has = world.capability(robot, need.capability)
             if has is None:

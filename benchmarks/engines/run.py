@@ -98,29 +98,59 @@ def _own(size: tuple[int, int], parts: Composition) -> list[Row]:
     return [Row(size, "own search", "solved", took_s, len(planned.plan.tasks), made, best)]
 
 
-def _engine(
-    size: tuple[int, int], engine: str, parts: Composition, python: str, timeout_s: float
-) -> Row:
-    world, goals = household(*size), goals_of(size[0])
+@dataclass(frozen=True)
+class SolvedOutside:
+    """What came of an engine on a problem; `reallocated_s` once others may do the tasks."""
+
+    outcome: str
+    planning_s: float | None = None
+    tasks: int | None = None
+    makespan_s: float | None = None
+    reallocated_s: float | None = None
+
+
+def solved_outside(
+    engine: str,
+    world: WorldModel,
+    goals: Sequence[Goal],
+    parts: Composition,
+    python: str,
+    timeout_s: float,
+) -> SolvedOutside:
+    """A problem solved by an engine in another interpreter, its sequence made a DAG as ours are."""
     answer = _solve(engine, world, goals, python, timeout_s)
     if answer["status"] != "solved":
-        return Row(size, engine, answer.get("why") or answer["status"])
+        return SolvedOutside(answer.get("why") or answer["status"])
     actions = pddl.actions(answer["steps"], world)
     own = _plan([ActionSequence("g", tuple(actions))], goals, together=True)
     bound = {task.actor: actions[i].actor for i, task in enumerate(own.tasks)}
     checked = check_plan(own, world)
     if isinstance(checked, InvalidPlan):
-        return Row(size, engine, f"rejected: {checked.violations[0].sentence}")
+        return SolvedOutside(f"rejected: {checked.violations[0].sentence}")
     as_chosen = _Bound(bound).allocate(checked)
     cut = check_plan(_plan(_sequences(actions, world), goals, together=False), world)
-    return Row(
-        size,
-        engine,
+    return SolvedOutside(
         "solved",
         answer["seconds"],
         len(actions),
         as_chosen.schedule.makespan_s if isinstance(as_chosen, Allocated) else None,
         _makespan_s(cut, parts.allocators["makespan"]) if isinstance(cut, CheckedPlan) else None,
+    )
+
+
+def _engine(
+    size: tuple[int, int], engine: str, parts: Composition, python: str, timeout_s: float
+) -> Row:
+    world, goals = household(*size), goals_of(size[0])
+    found = solved_outside(engine, world, goals, parts, python, timeout_s)
+    return Row(
+        size,
+        engine,
+        found.outcome,
+        found.planning_s,
+        found.tasks,
+        found.makespan_s,
+        found.reallocated_s,
     )
 
 

@@ -22,7 +22,9 @@ class Tidying(States):
         cursor.take("up")
         preposed = cursor.preposition() is not None
         about_things = cursor.word() in ("it", "them") or (
-            not cursor.next_of(WHOLE_HOUSE) and self.nouns.starts(("object",))
+            not cursor.next_of(WHOLE_HOUSE)
+            and self.nouns.starts(("object",))
+            and not self._furniture_next()
         )
         if not preposed and about_things:
             return self.move(tidy=True)
@@ -39,6 +41,17 @@ class Tidying(States):
         if not names:
             raise NotUnderstood(f"nothing has a home: {HOME_HINT}")
         return self._to_their_homes(names, homes)
+
+    def _furniture_next(self) -> bool:
+        """Whether what comes next is a thing that stays where it is, and has others on it."""
+        start = self.cursor.at
+        noun = self.nouns.noun("an object", ("object",))
+        self.cursor.at = start
+        things = self.vocabulary.objects
+        return all(
+            name in self.vocabulary.good_for and not things[name].is_a(Feature.MOVABLE)
+            for name in noun.names
+        )
 
     def clear(self) -> None:
         """`clear TABLE`, after the verb: what lies on it goes where it belongs."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fleet.errors import NotUnderstood
 from fleet.language.phrases.cursor import Cursor
 from fleet.language.phrases.mentions import NounPhrase, Quantity
-from fleet.language.words.lexicon import CATEGORIES, Entity, EntityType
+from fleet.language.words.lexicon import CATEGORIES, ENTITY_TYPES, Entity, EntityType
 from fleet.language.words.tokens import number_of, ordinal_of
 from fleet.language.words.wordlists import DEFINITE
 
@@ -91,7 +91,10 @@ class Heads:
         """A run of words that occur in names and kinds, perhaps with numbers behind it."""
         cursor, begin = self.cursor, self.cursor.at
         end, found = cursor.lexicon.described(cursor.tokens, begin, types)
-        if not found:
+        name_end, named = cursor.lexicon.exact(cursor.tokens, begin, ENTITY_TYPES)
+        # "The kitchen" is the place of that name, and no table that is called by it, too.
+        other = named and name_end >= end and all(e.type not in types for e in named)
+        if not found or (other and all(e.type == "place" for e in named)):
             return None
         plural, generic = False, False
         kind = cursor.lexicon.kind(cursor.tokens, begin, end, types)

@@ -186,7 +186,7 @@ class Locations:
         """What must hold of the target: `on` or `in`, as it is good for, or `at` of all else.
 
         Raises:
-            NotUnderstood: it is said to be on what things can only be in.
+            NotUnderstood: it is said to be on what opens, and things can only be in.
         """
         good_for = self.vocabulary.good_for.get(target, frozenset())
         words = {p.word for p in locatives if target in p.noun.names}
@@ -194,7 +194,7 @@ class Locations:
             both = Feature.CONTAINS in good_for
             return ON if not both or words & _ON else IN if words & _IN else AT
         if Feature.CONTAINS in good_for:
-            if words & _ON:
+            if words & _ON and self.vocabulary.objects[target].is_a(Feature.OPENABLE):
                 raise NotUnderstood(f"nothing can be put on {target}, only in it")
             return IN
         return AT

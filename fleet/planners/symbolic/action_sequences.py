@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
 
@@ -15,14 +14,13 @@ from fleet.core.model.world import WorldModel, condition_holds
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import ActionSequence
-from fleet.planners.symbolic.finite_domain import FiniteDomainTask
-from fleet.planners.symbolic.grounding import Grounding
-from fleet.planners.symbolic.impossibility import what_is_missing
-from fleet.planners.symbolic.instantiation import Facts
-from fleet.planners.symbolic.readings import TooManyWays
-from fleet.planners.symbolic.robot_classes import representatives
-from fleet.planners.symbolic.search import Solution, Solver, Unfinished, Unreachable
-from fleet.planners.symbolic.travel import Travel
+from fleet.planners.symbolic.engine.finite_domain import ANYHOW, FiniteDomainTask, Trajectory
+from fleet.planners.symbolic.engine.grounding import Grounding
+from fleet.planners.symbolic.engine.impossibility import what_is_missing
+from fleet.planners.symbolic.engine.instantiation import Facts
+from fleet.planners.symbolic.engine.robot_classes import representatives
+from fleet.planners.symbolic.engine.search import Solution, Solver, Unfinished, Unreachable
+from fleet.planners.symbolic.engine.travel import Travel
 from keyexpr_schema.facts import AT, HELD, HOLDING, IN, ON, SEARCHED, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 
@@ -114,22 +112,23 @@ def alternatives_for(
     world: WorldModel,
     budget: TimeBudget,
     settled: frozenset[str] = frozenset(),
+    on_the_way: Trajectory = ANYHOW,
 ) -> tuple[tuple[ActionSequence, ...], Facts] | Impossible | GaveUp:
     """Different sequences for a subgoal, the cheapest first, and the facts after that one; or why
     there is none, or none was found within the `budget`.
 
     Where a robot stands is left open at the start, so that every actor begins with the way to its
     work, whatever its robot does before; `settled` robots are taken to be where `facts` say.
+    What has to hold, or not, `on_the_way` does so in every state of a sequence.
     """
     failure: Impossible | GaveUp | None = None
     sought: list[_Sought] = []
     for conditions in subgoal.choices(world):
-        made = _sought(conditions, facts, world, settled, thorough=False)
+        made = _sought(conditions, facts, world, settled, on_the_way, thorough=False)
         if isinstance(made, Impossible) and all(
             _speaks_of_what_exists(c, world) for c in conditions
         ):
-            with suppress(TooManyWays):
-                made = _sought(conditions, facts, world, settled, thorough=True)
+            made = _sought(conditions, facts, world, settled, on_the_way, thorough=True)
         if isinstance(made, _Sought):
             sought.append(made)
         else:
@@ -141,10 +140,7 @@ def alternatives_for(
             break
         results = _different_solutions(one, budget)
         if not results and not one.thorough:
-            try:
-                again = _sought(one.conditions, facts, world, settled, thorough=True)
-            except TooManyWays:
-                again = Impossible("")
+            again = _sought(one.conditions, facts, world, settled, on_the_way, thorough=True)
             results = _different_solutions(again, budget) if isinstance(again, _Sought) else []
         if isinstance(results, Unfinished):
             failure = GaveUp(_gave_up(subgoal, results, budget))
@@ -158,7 +154,9 @@ def alternatives_for(
         named = frozenset(world.robots) & _spoken_of(one.conditions, world)
         sequence = ActionSequence(subgoal.goal, result.actions, named)
         sequences.setdefault(sequence.lifted, sequence)
-    return tuple(sequences.values())[:ALTERNATIVES], found[0][0].facts
+    after = found[0][0].facts
+    unmoved = (key for key, value in after.items() if value is None and key.relation == AT)
+    return tuple(sequences.values())[:ALTERNATIVES], {**after, **{k: facts.get(k) for k in unmoved}}
 
 
 def _speaks_of_what_exists(condition: Condition, world: WorldModel) -> bool:
@@ -183,7 +181,7 @@ def _dearest_s(found: Sequence[tuple[Solution, _Sought]]) -> float:
 
 def _gave_up(subgoal: Subgoal, search: Unfinished, budget: TimeBudget) -> str:
     """How near a search came that ran out of time, or of states."""
-    after = f"{budget.seconds:g} s" if budget.over else f"{search.states} states"
+    after = f"{budget.seconds:.3g} s" if budget.over else f"{search.states} states"
     steps = [f"{a.skill.name}({', '.join(a.args.values())})" for a in search.nearest]
     rest = f"still lacked {', '.join(steps[:NEAREST_STEPS])}" if steps else "is where it began"
     more = f" and {len(steps) - NEAREST_STEPS} more" if len(steps) > NEAREST_STEPS else ""
@@ -252,18 +250,21 @@ def _sought(
     facts: Facts,
     world: WorldModel,
     settled: frozenset[str],
+    on_the_way: Trajectory,
     thorough: bool,
 ) -> _Sought | Impossible:
     """The conditions as a task, or why they are out of reach."""
     goal = [Literal(FactKey(c.relation, c.subject), c.value) for c in conditions]
-    robots = representatives(conditions, facts, world)
+    way = (*on_the_way.always, *on_the_way.never)
+    robots = representatives(conditions, facts, world, way, thorough)
     travel = Travel(world, facts)
     free = travel.free(robots)
     start: Facts = dict(facts)
     for robot in free - settled:
         start[FactKey(AT, robot)] = None
     grounding = Grounding(world, start, goal, robots, free, thorough)
-    task = FiniteDomainTask(world, start, goal, grounding.actions, robots, travel, free)
+    actions = grounding.actions
+    task = FiniteDomainTask(world, start, goal, actions, robots, travel, free, on_the_way)
     solver = Solver(task)
     least_s = inf if task.impossible else solver.least_s()
     if least_s == inf:

@@ -30,7 +30,8 @@ from fleet.planners.symbolic.action_sequences import (
     subgoals_in_order,
 )
 from fleet.planners.symbolic.choosing import Choice, choose
-from fleet.planners.symbolic.instantiation import Facts
+from fleet.planners.symbolic.engine.finite_domain import Trajectory
+from fleet.planners.symbolic.engine.instantiation import Facts
 
 MAX_RESTORATIONS = 2
 """How often what the sequences for later subgoals undid is reached again, where no plan does."""
@@ -46,44 +47,35 @@ class SymbolicPlanner(Planner):
     strategies = (BIG_DAG, PER_GOAL, MONOLITHIC)
 
     def _solve(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
-        made = self._one_by_one(problem)
-        if isinstance(made, CheckedPlan) or made.postponed:
-            return made
-        if not any(len(goal.conditions) > 1 for goal in problem.goals):
-            return made
-        together = self._each_goal_at_once(problem)
-        return together if isinstance(together, CheckedPlan) or together.postponed else made
+        return self._one_by_one(problem, ())
 
-    def _each_goal_at_once(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
-        """All conditions of a goal in one search: what one of them leaves in a hand is there for
-        the next, and what is undone on the way is made true again.
-        """
-        reached = _Reached(problem, dict(problem.world.facts), problem.budget.until(SEARCH_SHARE))
-        for goal in problem.goals:
-            if all(condition_holds(reached.facts, c, problem.world) for c in goal.conditions):
-                continue
-            first, *others = goal.conditions
-            if not reached.add(Subgoal(goal.goal, first, tuple(others))):
-                failure = reached.failure
-                return NoPlan(failure.reason, postponed=isinstance(failure, GaveUp))
-        return choose(problem, reached.options, None)
-
-    def _one_by_one(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
-        """One search for each condition of each goal."""
+    def _one_by_one(
+        self, problem: PlanningProblem, first: tuple[Subgoal, ...]
+    ) -> CheckedPlan | NoPlan:
+        """A search for one condition after the other, beginning with some."""
         world = problem.world
         searching = problem.budget.until(SEARCH_SHARE)
         reached = _Reached(problem, dict(world.facts), searching)
         unlocated: list[Subgoal] = []
         late: set[str] = set()
-        for subgoal in subgoals_in_order(problem, world.facts):
-            if not searching.over and reached.add(subgoal):
+        subgoals = subgoals_in_order(problem, world.facts)
+        subgoals.sort(key=lambda subgoal: subgoal not in first)
+        for subgoal in subgoals:
+            # One that is hard leaves half of the time to those after it.
+            share = 1.0 if subgoal is subgoals[-1] else 0.5
+            if not searching.over and reached.add(subgoal, share):
                 continue
             if searching.over or isinstance(reached.failure, GaveUp):
                 late.add(subgoal.goal)
             elif _needs_locating(subgoal, reached.facts, world):
                 unlocated.append(subgoal)
+            elif reached.options and subgoal not in first:
+                # What was done for others before may be what makes it impossible.
+                return self._one_by_one(problem, (subgoal, *first))
             else:
-                return NoPlan(_no_way(subgoal, reached.failure, world))
+                refused = NoPlan(_no_way(subgoal, reached.failure, world))
+                alone = not any(g.goal == subgoal.goal and g.conditions[1:] for g in problem.goals)
+                return refused if alone else self._each_goal_at_once(problem, refused)
         if late and len(problem.goals) == 1 and isinstance(reached.failure, GaveUp):
             return NoPlan(reached.failure.reason, postponed=True)
         if late:
@@ -102,9 +94,31 @@ class SymbolicPlanner(Planner):
                 break
             restored = choose(problem, reached.options, explored)
             made = restored if isinstance(restored, CheckedPlan) else made
-        if isinstance(made, NoPlan) and problem.budget.over:
-            return replace(made, postponed=True)  # not all choices were looked at
+        if isinstance(made, NoPlan):
+            if problem.budget.over:
+                return replace(made, postponed=True)  # not all choices were looked at
+            if not unlocated and any(goal.conditions[1:] for goal in problem.goals):
+                return self._each_goal_at_once(problem, made)
         return made
+
+    def _each_goal_at_once(
+        self, problem: PlanningProblem, otherwise: NoPlan
+    ) -> CheckedPlan | NoPlan:
+        """All conditions of a goal in one search: what one of them leaves in a hand is there for
+        the next, and what is undone on the way is made true again. `otherwise` where that is no
+        plan either.
+        """
+        reached = _Reached(problem, dict(problem.world.facts), problem.budget.until(SEARCH_SHARE))
+        for goal in problem.goals:
+            if all(condition_holds(reached.facts, c, problem.world) for c in goal.conditions):
+                continue
+            first, *others = goal.conditions
+            if not reached.add(Subgoal(goal.goal, first, tuple(others))):
+                failure = reached.failure
+                late = isinstance(failure, GaveUp)
+                return NoPlan(failure.reason, postponed=True) if late else otherwise
+        made = choose(problem, reached.options, None)
+        return made if isinstance(made, CheckedPlan) else otherwise
 
 
 @dataclass
@@ -121,10 +135,15 @@ class _Reached:
     settled: set[str] = field(default_factory=set)
     failure: Impossible | GaveUp = field(default_factory=lambda: Impossible("nothing was sought"))
 
-    def add(self, subgoal: Subgoal) -> bool:
-        """Find sequences that reach one more subgoal; whether there are any."""
+    def add(self, subgoal: Subgoal, share: float = 1.0) -> bool:
+        """Find sequences that reach one more subgoal, in a share of what is left of the time;
+        whether there are any.
+        """
         settled = frozenset(self.settled)
-        found = alternatives_for(subgoal, self.facts, self.problem.world, self.budget, settled)
+        budget = self.budget if share == 1.0 else self.budget.part(share)
+        problem = self.problem
+        way = Trajectory(problem.always, problem.never)
+        found = alternatives_for(subgoal, self.facts, problem.world, budget, settled, way)
         if not isinstance(found, tuple):
             self.failure = found
             return False

@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from fleet.core.model.parameter_types import OBJECT
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
-from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Value
+from fleet.planners.symbolic.engine.relevance import related_skills
+from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.robots import RobotSpec
 
@@ -17,21 +18,29 @@ MAX_FULL_HANDS = 2
 
 
 def representatives(
-    conditions: Sequence[Condition], facts: Mapping[FactKey, Value], world: WorldModel
+    conditions: Sequence[Condition],
+    facts: Mapping[FactKey, Value],
+    world: WorldModel,
+    on_the_way: Sequence[Condition] = (),
+    thorough: bool = False,
 ) -> list[str]:
     """One robot of each kind that is interchangeable now, as many where a skill takes several of
     the kind, and those that are spoken of.
 
     What a hand holds, if not the subject, only has to be put down, and each thing more would
-    multiply the states to be looked at: a few such robots stand for all, unless it may be a tool.
+    multiply the states to be looked at: a few such robots stand for all, unless it may be a tool,
+    or the search is `thorough`.
     """
     subjects = {condition.subject for condition in conditions}
     spoken_of = subjects | {condition.value for condition in conditions}
+    spoken_of |= {name for c in on_the_way for name in (*c.subjects, c.value)}
     spoken_of |= {facts.get(FactKey(AT, subject)) for subject in subjects}
-    tools = any(_needs_a_tool(condition, world) for condition in conditions)
+    tools = thorough or any(_needs_a_tool(condition, world) for condition in conditions)
     kinds: dict[object, list[str]] = {}
     full: Counter[object] = Counter()
     together: dict[object, int] = {}
+    goal = [Literal(FactKey(c.relation, c.subject), c.value) for c in conditions]
+    skills = related_skills(world, goal)
     for robot in world.team:
         spec = world.robots[robot]
         holds = facts.get(FactKey(HOLDING, robot))
@@ -44,7 +53,7 @@ def representatives(
         alone = named or robot in world.marked
         same = kinds.setdefault((able, holds, robot if alone else None), [])
         if able not in together:
-            together[able] = max(1, *(_places_for(skill, spec) for skill in world.skills.values()))
+            together[able] = max([1, *(_places_for(skill, spec) for skill in skills)])
         if len(same) < together[able]:
             same.append(robot)
     return sorted(robot for same in kinds.values() for robot in same)

@@ -86,14 +86,14 @@ def place_of(name: str, value_of: ValueOf, world: Inventory) -> str | None:
 
 
 def variables_read(
-    formula: Formula, values_of: derived.ValuesOf, world: TypedInventory
+    formula: Formula, values_of: derived.ValuesOf, world: TypedInventory, aboard: bool
 ) -> set[FactKey]:
     """The variables that an `expanded` formula may be decided by."""
     found: set[FactKey] = set()
     for atom in atoms(formula):
         match atom:
             case Holds(literal):
-                found |= derived.read_by(literal, values_of, world)
+                found |= derived.read_by(literal, values_of, world, aboard=aboard)
             case Stored(literal):
                 found.add(literal.variable)
             case Variable(key):

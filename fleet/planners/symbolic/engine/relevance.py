@@ -10,7 +10,7 @@ from fleet.core.model.formulas.nodes import relations_of
 from fleet.core.model.parameter_types import OBJECT
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
-from fleet.planners.symbolic.travel import only_drives
+from fleet.planners.symbolic.engine.travel import only_drives
 from keyexpr_schema.facts import (
     AT,
     HELD,

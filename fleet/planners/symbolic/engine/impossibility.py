@@ -15,9 +15,9 @@ from fleet.core.model.formulas.nodes import Formula
 from fleet.core.model.formulas.text import formula_text
 from fleet.core.model.parameter_types import PLACE, ROBOT
 from fleet.core.model.skills import Action
-from fleet.planners.symbolic.finite_domain import FiniteDomainTask
-from fleet.planners.symbolic.grounding import Grounding
-from fleet.planners.symbolic.relevance import rows_of
+from fleet.planners.symbolic.engine.finite_domain import FiniteDomainTask
+from fleet.planners.symbolic.engine.grounding import Grounding
+from fleet.planners.symbolic.engine.relevance import rows_of
 from keyexpr_schema.facts import AT, IN, ON, REACHABLE, Literal
 
 MAX_NAMED = 3
@@ -132,7 +132,7 @@ class _Missing:
                     ):
                         reasons[f"{skill.name} is for {kind}, and {name} is none"] = None
         named = list(reasons)[:MAX_NAMED]
-        return "; ".join(named) if named else f"no skill makes {literal} true"
+        return "; ".join(named) if named else f"no skill makes {literal}"
 
 
 def _reachable(task: FiniteDomainTask) -> set[int]:

@@ -20,10 +20,11 @@ from fleet.core.model.formulas.nodes import (
 )
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, room_left
-from fleet.planners.symbolic.instantiation import Facts
-from fleet.planners.symbolic.nodes import Nodes, Stands, State, watch_lists
-from fleet.planners.symbolic.travel import Moves, Travel
+from fleet.planners.symbolic.engine.instantiation import Facts
+from fleet.planners.symbolic.engine.nodes import Nodes, Stands, State, watch_lists
+from fleet.planners.symbolic.engine.travel import Moves, Travel
 from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
+from keyexpr_schema.payloads.goals import Condition
 
 MAX_GOAL_WAYS = 512
 """Combinations of ways looked at in which all parts of a goal can hold at once."""
@@ -33,8 +34,8 @@ MAX_GOAL_WAYS = 512
 class Operator:
     """An action: nodes that it needs, robots that have to be somewhere, facts that it makes true.
 
-    `cost_s` is without the ways of robots. `conditional` effects come on top of what it `writes`;
-    `may_write` are the nodes that those can make true.
+    `cost_s` is without the ways of robots to it. `conditional` effects come on top of what it
+    `writes`; `may_write` are the nodes that those can make true.
     """
 
     action: Action
@@ -46,8 +47,23 @@ class Operator:
     may_write: tuple[int, ...] = ()
 
 
+@dataclass(frozen=True)
+class Trajectory:
+    """Conditions that hold, or do not, in every state on the way."""
+
+    always: tuple[Condition, ...] = ()
+    never: tuple[Condition, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.always or self.never)
+
+
+ANYHOW = Trajectory()
+"""It does not matter what holds on the way."""
+
+
 class FiniteDomainTask:
-    """Operators and a goal over `nodes`.
+    """Operators and a goal over `nodes`, and what holds on the way there.
 
     `impossible` is a part of the goal that no operator touches and that does not hold.
     """
@@ -61,9 +77,11 @@ class FiniteDomainTask:
         robots: Sequence[str],
         travel: Travel,
         free: Collection[str],
+        on_the_way: Trajectory = ANYHOW,
     ) -> None:
         self.world = world
         self.goal = goal
+        self.on_the_way = on_the_way
         self.travel = travel
         effects = [tuple(_each(effect, world) for effect in a.conditional) for a in actions]
         conditional = [tuple(row for rows in of for row in rows) for of in effects]
@@ -116,6 +134,29 @@ class FiniteDomainTask:
             values[here] = self.nodes.fact(here, place)
         return tuple(values)
 
+    def allows(self, state: State) -> bool:
+        """Whether what has to hold on the way holds in a state."""
+        read = self.nodes.values(state)
+        start = self.nodes.start
+
+        def value_of(key: FactKey) -> Value:
+            value = read(key)
+            return start.get(key) if value is None else value
+
+        def holds(condition: Condition) -> bool:
+            return any(
+                derived.holds(
+                    Literal(FactKey(condition.relation, subject), condition.value),
+                    value_of,
+                    self.world,
+                    aboard=True,
+                )
+                for subject in condition.subjects
+            )
+
+        way = self.on_the_way
+        return all(map(holds, way.always)) and not any(map(holds, way.never))
+
     def successors(self, state: State) -> Iterator[tuple[int, Moves, State]]:
         """Every operator that can be done, the ways of robots to it, and the state after it."""
         nodes = self.nodes
@@ -139,13 +180,17 @@ class FiniteDomainTask:
                 if stands is None or not self._has_room(operator.action, state):
                     continue
                 moves = {r: place for r, place in stands if self.where(state, r) != place}
-                values = list(self.moved(state, moves) if moves else state)
-                there = tuple(values) if operator.conditional else state
+                there = self.moved(state, moves) if moves else state
+                if self.on_the_way and moves and not self.allows(there):
+                    continue
+                values = list(there)
                 for written in operator.writes:
                     values[variable_of[written]] = written
                 for effect in operator.conditional:
                     self._apply(effect, there, values)
-                yield number_, moves, tuple(values)
+                reached = tuple(values)
+                if not self.on_the_way or self.allows(reached):
+                    yield number_, moves, reached
 
     def moves_to_goal(self, state: State) -> Moves | None:
         """Robots that only have to go somewhere for the goal to hold; `None` if it takes more."""
@@ -158,6 +203,8 @@ class FiniteDomainTask:
             if stands is None:
                 continue
             moves = {r: place for r, place in stands if self.where(state, r) != place}
+            if self.on_the_way and not self.allows(self.moved(state, moves)):
+                continue
             if best is not None and self.moves_s(state, moves) >= self.moves_s(state, best):
                 continue
             value_of = self.nodes.values(self.moved(state, moves))
@@ -223,7 +270,8 @@ class FiniteDomainTask:
         if any(node is False for node in nodes):
             return None
         needs = tuple(dict.fromkeys(node for node in nodes if node is not True))
-        cost_s = self.world.work_s(action.actor, action.skill)
+        stood = stands.get(action.actor, self.nodes.start.get(FactKey(AT, action.actor)))
+        cost_s = self.world.duration_s(action, stood, action.actor)
         writes, may_write = written
         return Operator(
             action, needs, tuple(stands.items()), writes, cost_s, conditional, may_write

@@ -10,7 +10,7 @@ from fleet.core.model import derived
 from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, parse_type
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel, known_value
-from fleet.planners.symbolic.relevance import Row, few_of_each, related_skills, rows_of
+from fleet.planners.symbolic.engine.relevance import Row, few_of_each, related_skills, rows_of
 from keyexpr_schema.facts import AT, IN, ON, FactKey, Literal, Value
 
 Facts = dict[FactKey, Value]

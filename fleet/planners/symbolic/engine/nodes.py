@@ -8,15 +8,15 @@ many ways to hold to list them is `Opaque`: only ever evaluated.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from fleet.core.model import derived
 from fleet.core.model.formulas.evaluation import evaluate
 from fleet.core.model.formulas.nodes import Formula, Holds, Not
 from fleet.core.model.world import WorldModel, known_value
-from fleet.planners.symbolic.instantiation import Facts
-from fleet.planners.symbolic.readings import (
+from fleet.planners.symbolic.engine.instantiation import Facts
+from fleet.planners.symbolic.engine.readings import (
     Assumed,
     TooManyWays,
     ValueOf,
@@ -24,7 +24,7 @@ from fleet.planners.symbolic.readings import (
     variables_read,
     ways,
 )
-from fleet.planners.symbolic.travel import Travel
+from fleet.planners.symbolic.engine.travel import Travel
 from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
 
 State = tuple[int, ...]
@@ -59,6 +59,7 @@ class Opaque:
     node: int
     formula: Formula
     variables: frozenset[FactKey]
+    aboard: bool
 
 
 class Nodes:
@@ -88,7 +89,7 @@ class Nodes:
         """By node: the number of its variable; -1 for what is no fact."""
         self.value_of: list[Value] = []
         self.axioms: dict[int, list[Axiom]] = {}
-        self.rides: dict[tuple[int, int], Ride] = {}
+        self.rides: dict[int, Ride] = {}
         self.opaque: dict[int, Opaque] = {}
         self._counted = frozenset(counted)
         self._facts: dict[tuple[int, Value], int] = {}
@@ -128,6 +129,12 @@ class Nodes:
 
         `aboard`: as in a goal; `innermost`: only where a place is the first around.
         """
+        if literal.variable.relation == AT and literal.variable.subject in self.position:
+            # It can drive there: the place is no matter of the state.
+            there: Assumed = {literal.variable: literal.value}
+            if literal not in self._readings:
+                self._readings[literal] = self._reading([(there, True), ({}, False)])
+            return self._readings[literal]
         if not is_read_off(literal, self.world):
             v = self.number.get(literal.variable)
             if v is not None:
@@ -135,7 +142,10 @@ class Nodes:
             return derived.holds(literal, self.known, self.world, aboard=aboard)
         key = literal, aboard, innermost
         if key not in self._readings:
-            self._readings[key] = self._read(literal, aboard, innermost)
+            try:
+                self._readings[key] = self._read(literal, aboard, innermost)
+            except TooManyWays:
+                self._readings[key] = self._only_evaluated(Holds(literal), aboard)
         return self._readings[key]
 
     def formula(self, formula: Formula) -> int | bool:
@@ -193,14 +203,16 @@ class Nodes:
         try:
             return self._reading(list(ways(read, domain, self.known)))
         except TooManyWays:
-            node = self._new(-1, None)
+            return self._only_evaluated(formula, aboard=False)
 
-            def values_of(key: FactKey) -> Sequence[Value]:
-                return self._domain(key) or (self.known(key),)
+    def _only_evaluated(self, formula: Formula, aboard: bool) -> int:
+        def values_of(key: FactKey) -> Sequence[Value]:
+            return self._domain(key) or (self.known(key),)
 
-            read_off = variables_read(formula, values_of, self.world)
-            self.opaque[node] = Opaque(node, formula, frozenset(read_off))
-            return node
+        node = self._new(-1, None)
+        read_off = variables_read(formula, values_of, self.world, aboard)
+        self.opaque[node] = Opaque(node, formula, frozenset(read_off), aboard)
+        return node
 
     def _domain(self, key: FactKey) -> Sequence[Value] | None:
         """The values that a variable can have; `None` if it keeps the one that it has."""
@@ -220,8 +232,9 @@ class Nodes:
     def _reading(self, found: Iterable[tuple[Assumed, bool]]) -> int | bool:
         """A node that holds in some of these ways."""
         rows: dict[tuple[frozenset[int], Stands], None] = {}
-        always = True
+        always, any_way = True, False
         for assumed, holds in found:
+            any_way = True
             if not holds:
                 always = False
                 continue
@@ -236,7 +249,7 @@ class Nodes:
                     needs.add(self.fact(self.number[key], value))
             rows[frozenset(needs), tuple(sorted(stands))] = None
         if always or not rows:
-            return always
+            return always and any_way
         node = self._new(-1, None)
         self.axioms[node] = [Axiom(tuple(sorted(needs)), stands, node) for needs, stands in rows]
         return node
@@ -248,9 +261,12 @@ class Nodes:
             return None
         at_robot = self.fact(self.number[key], value)
         in_hand = self.fact(self.number[hand], key.subject)
-        if (at_robot, in_hand) not in self.rides:
-            self.rides[at_robot, in_hand] = Ride(self._new(-1, None), at_robot, in_hand)
-        return self.rides[at_robot, in_hand].node
+        for node, ride in self.rides.items():
+            if (ride.at_robot, ride.in_hand) == (at_robot, in_hand):
+                return node
+        node = self._new(-1, None)
+        self.rides[node] = Ride(node, at_robot, in_hand)
+        return node
 
     def _is_hand_of_ride(self, key: FactKey, assumed: Assumed) -> bool:
         return key.relation == HOLDING and any(
@@ -279,7 +295,7 @@ class Nodes:
             found += [
                 node
                 for node, opaque in self.opaque.items()
-                if evaluate(opaque.formula, value_of, self.world)
+                if evaluate(opaque.formula, value_of, self.world, aboard=opaque.aboard)
             ]
         return found
 
@@ -303,12 +319,10 @@ class Nodes:
             ]
         opaque = self.opaque.get(node)
         if opaque is not None:
-            return ((),) if evaluate(opaque.formula, self.values(state), self.world) else ()
-        ride = next(ride for ride in self.rides.values() if ride.node == node)
-        return ((),) if self._rides(ride, state) else ()
-
-
-Watch = Callable[[int], Sequence[int]]
+            read = self.values(state)
+            holds = evaluate(opaque.formula, read, self.world, aboard=opaque.aboard)
+            return ((),) if holds else ()
+        return ((),) if self._rides(self.rides[node], state) else ()
 
 
 def watch_lists(nodes: Nodes, rows: Sequence[Sequence[int]]) -> dict[int, list[int]]:
@@ -334,9 +348,8 @@ def _deciding_facts(nodes: Nodes, node: int) -> list[int]:
     """Facts of one variable, one of which holds wherever the node does; none if there are none."""
     if nodes.variable_of[node] >= 0:
         return [node]
-    for ride in nodes.rides.values():
-        if ride.node == node:
-            return [ride.at_robot]
+    if node in nodes.rides:
+        return [nodes.rides[node].at_robot]
     facts: dict[int, set[int]] = defaultdict(set)
     axioms = nodes.axioms.get(node, ())
     for axiom in axioms:

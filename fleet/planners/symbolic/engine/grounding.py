@@ -3,7 +3,7 @@
 Backwards from the goal: an action is of use if it makes something true that the goal, or an action
 that is of use, wants. What no skill can change is looked up while parameters are filled in, so that
 no action is made that could never be done. Drives are not grounded: they are part of what an action
-costs (`fleet.planners.symbolic.travel`).
+costs (`fleet.planners.symbolic.engine.travel`).
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from fleet.core.model.formulas.nodes import And, Formula, Holds, Not, Or, Stored
 from fleet.core.model.parameter_types import ROBOT
 from fleet.core.model.skills import Action, SkillModel
 from fleet.core.model.world import WorldModel, room_left
-from fleet.planners.symbolic.instantiation import ANY, Binding, Facts, Instantiation
-from fleet.planners.symbolic.readings import is_read_off
-from fleet.planners.symbolic.relevance import Row
+from fleet.planners.symbolic.engine.instantiation import ANY, Binding, Facts, Instantiation
+from fleet.planners.symbolic.engine.readings import is_read_off
+from fleet.planners.symbolic.engine.relevance import Row
 from keyexpr_schema.facts import (
     AT,
     HELD,

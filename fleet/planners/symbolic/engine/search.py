@@ -14,11 +14,11 @@ from math import inf
 
 from fleet.core.model.skills import Action
 from fleet.jobshop.time_budget import TimeBudget
-from fleet.planners.symbolic.finite_domain import FiniteDomainTask
-from fleet.planners.symbolic.instantiation import Facts
-from fleet.planners.symbolic.nodes import State
-from fleet.planners.symbolic.relaxation import Estimate, Relaxation
-from fleet.planners.symbolic.travel import Moves
+from fleet.planners.symbolic.engine.finite_domain import FiniteDomainTask
+from fleet.planners.symbolic.engine.instantiation import Facts
+from fleet.planners.symbolic.engine.nodes import State
+from fleet.planners.symbolic.engine.relaxation import Estimate, Relaxation
+from fleet.planners.symbolic.engine.travel import Moves
 
 FIRST_STATES = 200
 """States that A* looks at before a greedy search is tried."""
@@ -26,8 +26,8 @@ IMPROVING_STATES = 600
 """States that A* looks at in all where there is a sequence already."""
 OTHER_STATES = 15
 """States looked at for another sequence that uses other actions."""
-MAX_STATES = 1_000_000
-"""States looked at before a search gives up even with time left: about a gigabyte of them."""
+MAX_STATES = 500_000
+"""States known before a search gives up even with time left: about half a gigabyte of them."""
 GREED = 5.0
 """How much more a greedy search trusts its estimate than what it has spent."""
 
@@ -94,7 +94,7 @@ class Search:
         """
         task = self._task
         while self._queue:
-            if len(self._closed) >= states or budget.over:
+            if len(self._closed) >= states or len(self._best) >= MAX_STATES or budget.over:
                 return False
             _, _, guess_s, _, least_s, node, estimate = heappop(self._queue)
             if node.operator < 0 and node.parent is not None:

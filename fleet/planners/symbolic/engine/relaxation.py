@@ -15,8 +15,8 @@ from heapq import heappop, heappush
 from math import inf
 from typing import NamedTuple
 
-from fleet.planners.symbolic.finite_domain import FiniteDomainTask
-from fleet.planners.symbolic.nodes import Stands, State
+from fleet.planners.symbolic.engine.finite_domain import FiniteDomainTask
+from fleet.planners.symbolic.engine.nodes import Stands, State
 from keyexpr_schema.facts import Value
 
 
@@ -189,6 +189,8 @@ class Relaxation:
             involved = _NOBODY.union(*(cause.robots for cause in causes))
         if number < self._operators:
             dearest_s += self._costs[number] + charge_s[number]
+        elif not stands and len(causes) == 1:
+            stands = causes[0].stands  # an axiom moves nobody
         return Label(dearest_s, stands, involved | self._robots[number], number, tuple(causes))
 
 

@@ -17,7 +17,7 @@ from sim.errors import BadFile
 from sim.files.solids import Solid, walls
 from sim.files.world_schema import ObjectKind, WorldFile
 from sim.mujoco_world.description import RobotModel
-from sim.mujoco_world.furnishing import add_fixture, add_holds, add_hollow
+from sim.mujoco_world.furnishing import add_fixture, add_hollow, add_palms
 
 STEP_S = 0.005
 """Physics step. 5 ms carries a grasp by friction with the solver settings below."""
@@ -70,7 +70,7 @@ def compile_world(world: WorldFile, robots: Sequence[tuple[str, RobotModel]]) ->
         for one, two in itertools.combinations(bodies, 2):
             # A robot's controllers keep it out of its own way.
             spec.add_exclude(bodyname1=f"{name}/{one}", bodyname2=f"{name}/{two}")
-    add_holds(spec, world, robots)
+    add_palms(spec, world)
     for geom in spec.geoms:
         geom.solref[:2] = SOLREF
     try:

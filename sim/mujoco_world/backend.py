@@ -190,7 +190,6 @@ class MujocoBackend(Backend):
         detections: tuple[Detection, ...] = (),
     ) -> None:
         run.steps.close()
-        self._mechanisms.let_go(robot)
         self._context.navigator.cancel(robot)
         self._bodies[robot].freeze()
         run.ended = MotionOutcome(

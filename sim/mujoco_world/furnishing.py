@@ -2,19 +2,17 @@
 
 Names: `furniture/NAME` is a fixture's body; `furniture/NAME/THING` is the door or drawer of it that
 opens THING, with the joint of the same name and the site `furniture/NAME/THING/handle`. The geom
-`furniture/NAME/button` is what a finger touches. `hold/ROBOT/THING` connects a hand to a handle,
-`palm/PERSON/OBJECT` an object to a palm; none of them is active at the start.
+`furniture/NAME/button` is what a finger touches. `palm/PERSON/OBJECT` welds an object to a palm;
+none of them is active at the start.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 from sim.files.fixtures import Fixture, Mover, Panel
 from sim.files.world_schema import FLOOR_M, ObjectKind, WorldFile
-from sim.mujoco_world.description import RobotModel
 
 FRICTION = (0.8, 0.005, 0.0001)
 HANDLE_FRICTION = (1.2, 0.01, 0.001)
@@ -91,24 +89,10 @@ def _add_mover(body: Any, name: str, fixture: Fixture, mover: Mover) -> None:
     child.add_site(name=f"{name}/handle", pos=mover.handle_m, group=4)
 
 
-def add_holds(spec: Any, world: WorldFile, robots: Sequence[tuple[str, RobotModel]]) -> None:
-    """What can connect hands to handles, and objects to palms."""
+def add_palms(spec: Any, world: WorldFile) -> None:
+    """What can weld objects to palms."""
     import mujoco
 
-    for robot, model in robots:
-        arm = model.description.arm
-        if arm is None:
-            continue
-        for thing, (fixture, _) in world.fixtures.movers.items():
-            spec.add_equality(
-                name=f"hold/{robot}/{thing}",
-                type=mujoco.mjtEq.mjEQ_CONNECT,
-                objtype=mujoco.mjtObj.mjOBJ_SITE,
-                name1=f"{robot}/{arm.grip_site}",
-                name2=f"furniture/{fixture.name}/{thing}/handle",
-                active=False,
-                solref=(0.02, 1.0),
-            )
     for person in world.people:
         for name in world.object_entries:
             spec.add_equality(

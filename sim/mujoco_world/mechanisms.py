@@ -1,8 +1,7 @@
 """What gives way to a hand: doors, drawers and buttons, and the palms that things are given into.
 
 Doors turn on hinges and drawers run on slides, with friction, and nothing moves them but what
-touches them; but a hand that has closed on a handle is connected to it (at a point, free to turn)
-until it opens, as friction alone holds a post in 19 of 20 runs. A button changes over when a
+touches them: a hand holds a handle by friction, as it holds a cup. A button changes over when a
 robot's hand presses on it. A thing let go on a person's palm is welded to it until a hand takes it.
 """
 
@@ -108,17 +107,6 @@ class Mechanisms:
         if thing in self._joints:
             found[IS_OPEN] = self.is_open(thing)
         return found
-
-    def hold(self, robot: str, thing: str) -> None:
-        """Connect a robot's hand, which has closed on it, to a handle."""
-        self._data.eq_active[self._equalities[f"hold/{robot}/{thing}"]] = 1
-
-    def let_go(self, robot: str) -> None:
-        """Take a robot's hand off all handles."""
-        for thing in self._joints:
-            number = self._equalities.get(f"hold/{robot}/{thing}")
-            if number is not None:
-                self._data.eq_active[number] = 0
 
     def obstacles(self) -> tuple[Solid, ...]:
         """The doors and drawers that stand open, as upright boxes on the floor."""

@@ -92,7 +92,6 @@ def _swing(context: MotionContext, run: MotionRun, goal: float) -> Step:
         yield from reach_in(context, run, path, BACK_M)
         yield from move_arm(run, path.at, "lowering the hand", slower=1.5)
         yield from close_on(run, gripper, f"the handle of {thing}")
-        mechanisms.hold(robot.name, thing)
         yield from _pull(context, run, goal)
     except MotionFailed:
         yield from _withdraw(context, run, path)
@@ -169,7 +168,6 @@ def _withdraw(context: MotionContext, run: MotionRun, path: Reach) -> Step:
     """Let go of the handle, raise the hand and fold the arm."""
     robot = run.robot
     _, gripper = hand_of(robot)
-    context.mechanisms.let_go(robot.name)
     robot.drive.halt()
     robot.let_go()
     gripper.open(gripper.opening_m() + RELEASE_OPENING_M)

@@ -79,7 +79,7 @@ def load_settings(
         realm, environ.get("ROBOTFLEET_REALM"), written.get("realm"), path, "--realm"
     )
     return Settings(
-        routers=_endpoints(chosen_routers, where) or (DEFAULT_ROUTER,),
+        routers=endpoints(chosen_routers, where) or (DEFAULT_ROUTER,),
         realm=_realm(chosen_realm, realm_where),
         json=json,
         planner=_planner(written.get("planner"), path) if path else PlannerSettings(),
@@ -126,7 +126,12 @@ def _choose(
     return written, str(path)
 
 
-def _endpoints(value: object, where: str) -> tuple[str, ...]:
+def endpoints(value: object, where: str) -> tuple[str, ...]:
+    """The Zenoh endpoints of a list, or of a text that separates them by commas or spaces.
+
+    Raises:
+        BadSettings: one is none; the message says `where` it was written.
+    """
     if value is None:
         return ()
     entries = value.replace(",", " ").split() if isinstance(value, str) else value

@@ -29,7 +29,7 @@ def config_file(kind: str, name: str | Path, named_in: Path | None = None) -> Pa
     """The file that `name` stands for: a path, or the name of a file of that kind.
 
     A path is as given, or relative to the file `named_in` it. A name is looked for beside that
-    file's own folder, then in `config_folders`.
+    file's own folder, then in `config_folders`; if it is in none, it may be a file right here.
 
     Raises:
         NoConfigFile: no file has that name; the message lists those that there are and where they
@@ -44,11 +44,14 @@ def config_file(kind: str, name: str | Path, named_in: Path | None = None) -> Pa
     for folder in folders:
         if (folder / f"{given}.yaml").is_file():
             return folder / f"{given}.yaml"
+    if given.is_file():
+        return given
     files = (file for folder in folders for file in folder.glob("*.yaml"))
+    looked_in = {folder.resolve(): str(folder) for folder in reversed(folders)}
     known = sorted({file.stem for file in files if not file.stem.endswith(".model")})
     raise NoConfigFile(
         f"there is no {kind.removesuffix('s')} {str(given)!r}; there are "
-        f"{', '.join(known) or 'none'} (looked in {', '.join(map(str, folders))}), "
+        f"{', '.join(known) or 'none'} (looked in {', '.join(reversed(looked_in.values()))}), "
         "or give the path of a file"
     )
 

@@ -176,10 +176,12 @@ async def delete(
     """
     from cli.errors import BadArgument
 
-    if (goal is None) != ended:
-        raise BadArgument("name the goal to delete, or say --ended for all that have ended")
     if older_than is not None and not ended:
         raise BadArgument("--older-than goes with --ended")
+    if (goal is None) != ended:
+        raise BadArgument(
+            "name the goal to delete, or say --ended for all that have ended; one of both"
+        )
     if goal is None:
         await _delete_ended(call, older_than)
         return

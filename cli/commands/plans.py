@@ -230,7 +230,9 @@ async def delete(
     from cli.errors import BadArgument
 
     if (plan is None) != ended:
-        raise BadArgument("name the plan to delete, or say --ended for all that have ended")
+        raise BadArgument(
+            "name the plan to delete, or say --ended for all that have ended; one of both"
+        )
     if plan is not None:
         await _control(call, "delete", plan)
         return

@@ -13,7 +13,7 @@ from typing import Annotated, TypeVar
 import typer
 
 from cli.command import Call, single
-from cli.settings import LEAST_PLANNING_LIMIT_S
+from cli.settings import LEAST_PLANNING_LIMIT_S, endpoints
 
 T = TypeVar("T")
 SIM = "sim"
@@ -47,6 +47,13 @@ def router(
         typer.Option("--connect", metavar="ENDPOINT", help="Other routers to link with."),
     ] = None,
     data: DataOption = None,
+    store: Annotated[
+        bool | None,
+        typer.Option(
+            "--store/--no-store",
+            help="Whether it keeps the fleet's store: one router of all that are linked does.",
+        ),
+    ] = None,
     journal_entries: Annotated[
         int | None,
         typer.Option("--journal-entries", min=1, help="Changes its journal keeps: 100000."),
@@ -73,8 +80,9 @@ def router(
         ),
     ] = None,
 ) -> None:
-    """Run a Zenoh router with the fleet's durable store in it."""
+    """Run a Zenoh router with the fleet's durable store in it, or beside one that has it."""
     from cli.demo.child_processes import end_with_parent
+    from cli.errors import BadArgument
     from fleet.service.router_process import run
     from fleet.stores import StoreMemory
 
@@ -87,11 +95,18 @@ def router(
     }
     memory = StoreMemory(**{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
 
+    if store is False and (data is not None or any(value is not None for value in given.values())):
+        raise BadArgument("--no-store keeps nothing; leave out --data and how much is kept")
+    if connect and store is None:
+        raise BadArgument(
+            "--connect: stores of two routers do not align; say --no-store if one of those keeps "
+            "the fleet's store, --store if this one is to"
+        )
     end_with_parent()
     run(
-        listen=tuple(listen or call.settings.routers[:1]),
-        connect=tuple(connect or ()),
-        data_dir=data_folder(data, "router"),
+        listen=endpoints(listen, "--listen") or call.settings.routers[:1],
+        connect=endpoints(connect, "--connect"),
+        data_dir=None if store is False else data_folder(data, "router"),
         memory=memory,
     )
 
@@ -293,7 +308,10 @@ def record(
         ),
     ] = None,
     keep: Annotated[
-        int | None, typer.Option(help="With --roll-every: keep so many files, the latest.")
+        int | None,
+        typer.Option(
+            "--keep", metavar="N", min=1, help="With --roll-every: keep so many files, the latest."
+        ),
     ] = None,
 ) -> None:
     """Record everything that happens for Rerun."""

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from fleet.timeline.errors import TimelineError
 
-_UNITS = {"min": 60.0, "h": 3600.0, "MB": 2.0**20, "GB": 2.0**30}
-_EVERY = re.compile(r"(\d+(?:\.\d+)?)\s*(min|h|MB|GB)")
+_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "MB": 2.0**20, "GB": 2.0**30}
+_EVERY = re.compile(r"(\d+(?:\.\d+)?)\s*(s|min|h|MB|GB)")
 
 
 RETRY_S = 60.0
@@ -32,7 +32,7 @@ class Rolling:
 
 
 def parse_rolling(every: str, keep: int | None = None) -> Rolling:
-    """What `30min`, `2h`, `500MB` or `2GB` means; the latest `keep` files stay, or all.
+    """What `90s`, `30min`, `2h`, `500MB` or `2GB` means; the latest `keep` files stay, or all.
 
     Raises:
         BadRolling: it is none of these, or none is kept.
@@ -45,7 +45,7 @@ def parse_rolling(every: str, keep: int | None = None) -> Rolling:
         raise BadRolling(
             f"{every!r} is no time and no size; say e.g. 30min, 2h, 500MB or 2GB, above 0"
         )
-    if found[2] in ("min", "h"):
+    if found[2] in ("s", "min", "h"):
         return Rolling(seconds=amount, keep=keep)
     return Rolling(size_bytes=amount, keep=keep)
 

@@ -39,9 +39,10 @@ async def run_router(
         config.insert_json5("connect/exit_on_failure", "false")
         session = await asyncio.shield(asyncio.to_thread(zenoh.open, config))
     except zenoh.ZError as error:
+        cause = _cause(error)
+        ask = ": is another program using the port?" if "in use" in cause else ""
         raise CannotListen(
-            f"the router cannot listen on {', '.join(listen)} ({_cause(error)}): is another "
-            "program using the port?"
+            f"the router cannot listen on {', '.join(listen)} ({cause}){ask}"
         ) from None
     try:
         server = await asyncio.to_thread(StoreServer, session, store) if store is not None else None
@@ -55,4 +56,6 @@ async def run_router(
 
 
 def _cause(error: zenoh.ZError) -> str:
-    return str(error).split(" at /")[0].strip().rstrip(".!")
+    """What the system said, without where in Zenoh's code it was met."""
+    said = str(error).split(" at /")[0].strip().rstrip(".!")
+    return said.rpartition("[")[2]

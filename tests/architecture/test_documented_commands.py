@@ -82,7 +82,11 @@ SYNOPSES = list(synopses())
 @pytest.mark.parametrize(("command", "synopsis"), SYNOPSES)
 def test_a_command_of_the_table_is_there_with_its_options(command: str, synopsis: str) -> None:
     found, _ = leaf(command.split())
-    flags = {flag for parameter in found.params for flag in getattr(parameter, "opts", ())}
+    flags = {
+        flag
+        for parameter in found.params
+        for flag in (*parameter.opts, *parameter.secondary_opts)  # --store, --no-store
+    }
     assert set(re.findall(r"--[a-z-]+", synopsis)) <= flags
 
 

@@ -154,7 +154,8 @@ class Cursor:
         # What is known was hardly mistyped: a word that is not comes first.
         single = sorted(shown.split(), key=lambda word: word.casefold() in names)
         for part in (shown, " ".join(words_of(shown)), *single):
-            hint = hint or suggestion(part, names)
+            if part.casefold() not in ORDINALS:
+                hint = hint or suggestion(part, names)
         return self.refusal(f"{shown!r} is not a known {_bare(what)}{hint}; known are {known}")
 
 

@@ -50,3 +50,19 @@ def test_a_name_of_no_file_is_told_those_there_are_and_where_they_were_looked_fo
         "there is no robot 'forklift'; there are hsr, locobot, porter (looked in configs/robots, "
         f"{SHIPPED / 'robots'}), or give the path of a file"
     )
+
+
+def test_a_file_of_another_kind_right_here_is_a_path_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    put(tmp_path / "README.md")
+    put(tmp_path / "hsr")
+    assert config_file("robots", "README.md") == Path("README.md")
+    assert config_file("robots", "hsr") == SHIPPED / "robots" / "hsr.yaml"
+
+
+def test_a_folder_that_is_the_shipped_one_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(SHIPPED.parent)
+    with pytest.raises(NoConfigFile, match=r"\(looked in configs/robots\), or give"):
+        config_file("robots", "forklift")

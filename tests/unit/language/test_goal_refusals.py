@@ -167,6 +167,10 @@ from tests.support.language_house import WORDS
         ),
         ("bring all 3 cups to the kitchen", "'all 3 cups': there are only 2"),
         ("get rid of the book", "'rid of the book' is not a known object (did you mean 'book'?)"),
+        (
+            "bring the first elf to the kitchen",
+            "'the first elf' is not a known object; known",
+        ),
         ("bring all dragons to the kitchen", "'all dragons' is not a known object"),
         (
             "Pick up the book, then go to the hallway",

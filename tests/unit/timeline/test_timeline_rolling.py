@@ -208,6 +208,7 @@ def test_each_file_is_complete_in_itself(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("every", "meant"),
     [
+        ("90s", Rolling(seconds=90.0)),
         ("30min", Rolling(seconds=1800.0)),
         ("1.5 h", Rolling(seconds=5400.0)),
         ("500MB", Rolling(size_bytes=500 * 2.0**20)),

@@ -32,6 +32,9 @@ WORLD = str(CONFIGS / "worlds" / "home.yaml")
         (["goal", "add", "x", "--id", "a/**"], "goal 'a/**' is not valid: use 1 to 63 ASCII"),
         (["world", "add", ""], "say something, such as “The first cup is in the kitchen.”"),
         (["plan", "create", "big-dag", "milp", "--id", "a/b"], "plan 'a/b' is not valid: use 1"),
+        (["goal", "delete", "g", "--ended"], "or say --ended for all that have ended; one of both"),
+        (["goal", "delete", "--older-than", "5d"], "--older-than goes with --ended"),
+        (["plan", "delete", "p", "--ended"], "or say --ended for all that have ended; one of both"),
         (["demo", "three-cups"], "there is no mission 'three-cups'; there are"),
         (["demo", "two-cups", "--backend", "bullet"], "known are: kinematic, mujoco"),
         (["sim", "two-cups", "--speed", "fast"], "neither 'max' nor a number above 0"),
@@ -78,6 +81,9 @@ def test_usage_errors_exit_with_2_and_suggest(robotctl: Robotctl) -> None:
     assert nested.code == 2
     assert "Did you mean 'list'?" in nested.err
     assert robotctl("goal", "add").code == 2
+    none_kept = robotctl("record", "out.rrd", "--roll-every", "90s", "--keep", "0")
+    assert none_kept.code == 2
+    assert "'--keep'" in none_kept.err
 
 
 def test_without_a_router_it_says_one_sentence_soon(tmp_path: Path) -> None:

@@ -61,6 +61,7 @@ def test_an_endpoint_that_is_none_is_one_sentence(endpoint, tmp_path):
     assert result.returncode == 1
     assert len(result.stderr.strip().splitlines()) == 1, result.stderr
     assert "the router cannot listen on" in result.stderr
+    assert "another program" not in result.stderr
 
 
 def test_port_0_takes_a_free_one_and_a_signal_ends_it_cleanly(tmp_path):

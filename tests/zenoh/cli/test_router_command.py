@@ -1,0 +1,60 @@
+"""`robotctl router` beside another router."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from tests.support.robotctl import Robotctl
+
+FREE = "tcp/127.0.0.1:0"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--listen", "localhost"], "--listen: 'localhost' is not a Zenoh endpoint"),
+        (["--listen", FREE, "--connect", "host", "--no-store"], "--connect: 'host' is not a Zenoh"),
+        (["--listen", FREE, "--connect", "tcp/127.0.0.1:1"], "say --no-store if one of those"),
+        (["--no-store", "--data", "x"], "--no-store keeps nothing"),
+        (["--no-store", "--tombstones", "0"], "--no-store keeps nothing"),
+    ],
+)
+def test_what_a_router_cannot_be_is_one_sentence(
+    robotctl: Robotctl, arguments: list[str], words: str
+) -> None:
+    said = robotctl("router", *arguments)
+    assert said.code == 1
+    assert said.out == ""
+    assert said.err.startswith("Error: ")
+    assert words in said.err
+    assert said.err.count("\n") == 1
+
+
+async def test_a_second_router_without_a_store_shows_what_the_first_one_keeps(
+    robotctl: Robotctl,
+) -> None:
+    """What was stored before it started, too; and what is said through it is kept by the first."""
+    await robotctl.soon("world", "add", "--place", "attic")
+    command = [sys.executable, "-m", "cli.main", "router", "--listen", FREE]
+    command += ["--connect", robotctl.env["ROBOTFLEET_ROUTER"], "--no-store"]
+    second = subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, env=robotctl.env, cwd=robotctl.folder
+    )
+    try:
+        assert second.stdout is not None
+        endpoint = second.stdout.readline().split()[-1]
+        there = Robotctl(endpoint, robotctl.folder)
+        said = await there.soon("world", "add", "--place", "cellar")
+        assert said.code == 0, said.err
+        for each in (there, robotctl):
+            listed = (await each.soon("world", "list")).out
+            assert "attic" in listed
+            assert "cellar" in listed
+        assert not (robotctl.folder / ".local").exists()
+    finally:
+        second.send_signal(signal.SIGINT)
+        second.communicate(timeout=20)

@@ -139,11 +139,7 @@ class FleetRun:
             objects={truth.object: truth for truth in self.backend.truths()},
             robots={robot: self.backend.senses(robot) for robot in self.backend.robots},
             places=self._places,
-            believed={
-                fact.subject: fact.value
-                for fact in self.state.facts.values()
-                if fact.relation == AT
-            },
+            believed=dict(self.state.vocabulary().whereabouts),
             looks=[(place, x, y, see_m[robot]) for place, x, y, robot in self.shared.looks],
         )
 

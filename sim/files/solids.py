@@ -126,6 +126,9 @@ def barriers(world: WorldFile) -> tuple[Solid, ...]:
 
 
 OPEN_IN_FRONT = ("shelf", "cupboard", "fridge", "sofa", "bed")
+RESERVE_M = 0.01
+"""How high reserved floor is taken to be: robots drive on it where nothing stands above it."""
+
 FLAT_M = 0.03
 """Boards are no thicker than twice this: a hand gets over or under them."""
 
@@ -136,8 +139,15 @@ def reserves(world: WorldFile) -> tuple[Solid, ...]:
     for name, fixture in world.fixtures.by_name.items():
         if fixture.front_m <= 0.0:
             continue
+        # A door that is wide open stands out to its side, too.
+        sides = [
+            mover.moved_m(mover.handle_m, share * mover.open_at)[0]
+            for mover in fixture.movers
+            for share in (0.5, 0.8, 1.0)
+        ]
+        left, right = min(-fixture.half_m[0], *sides), max(fixture.half_m[0], *sides)
         half_y = (fixture.half_m[1] * 2 + fixture.front_m) / 2
-        x, y, _ = fixture.point_m((0.0, fixture.half_m[1] - half_y, 0.0))
-        half = (fixture.half_m[0], half_y)
-        found.append(Solid("reserve", name, (x, y), half, fixture.yaw_rad, 0.0))
+        x, y, _ = fixture.point_m(((left + right) / 2, fixture.half_m[1] - half_y, 0.0))
+        half = ((right - left) / 2, half_y)
+        found.append(Solid("reserve", name, (x, y), half, fixture.yaw_rad, RESERVE_M))
     return tuple(found)

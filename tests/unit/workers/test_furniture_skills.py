@@ -131,7 +131,7 @@ def test_looking_into_a_thing_tells_what_is_in_it_and_what_is_not(tmp_path: Path
         home.believe("at", "cup_1", None)
         found = await home.do("look_into", container="cupboard", place="kitchen")
         assert found["at(cup_1)"] == "cupboard"
-        assert found["at(mug_1)"] not in ("cupboard", None)
+        assert found["at(mug_1)"] != "cupboard"
         assert found["searched(cupboard)"] is True
 
     run(tmp_path, script)

@@ -50,7 +50,8 @@ async def count(ctx: SkillContext, place: str) -> None:
     await ctx.be_in(place)
     seen = await ctx.look()  # what it sees elsewhere than believed becomes a fact by itself
     for kind in kinds:
-        here = [d for d in seen if d.kind == kind and ctx.world.whereabouts(d) == place]
+        alike = (d for d in seen if d.kind == kind)
+        here = [d for d in alike if ctx.world.place_of(ctx.world.whereabouts(d)) == place]
         ctx.log(f"sees {len(here)} of kind {kind} in {place}")
         ctx.observe(f"count_{kind}", place, len(here))
     ctx.observe("counted", place, True)

@@ -72,4 +72,8 @@ def read_yaml(path: Path, error: type[Exception]) -> Any:
         raise error(f"{path} cannot be read: it is not UTF-8 text") from None
     except yaml.YAMLError as reason:
         kind = "JSON" if path.suffix == ".json" else "YAML"
-        raise error(f"{path} is not {kind}: {' '.join(str(reason).split())}") from None
+        mark, problem = getattr(reason, "problem_mark", None), getattr(reason, "problem", None)
+        if mark is None or problem is None:
+            raise error(f"{path} is not {kind}: {' '.join(str(reason).split())}") from None
+        where = f"line {mark.line + 1}, column {mark.column + 1}"
+        raise error(f"{path} is not {kind}: {where}: {problem}") from None

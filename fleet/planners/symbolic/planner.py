@@ -73,7 +73,7 @@ class SymbolicPlanner(Planner):
                 # What was done for others before may be what makes it impossible.
                 return self._one_by_one(problem, (subgoal, *first))
             else:
-                refused = NoPlan(_no_way(subgoal, reached.failure, world))
+                refused = NoPlan(_no_way(subgoal, reached.failure, problem))
                 alone = not any(g.goal == subgoal.goal and g.conditions[1:] for g in problem.goals)
                 return refused if alone else self._each_goal_at_once(problem, refused)
         if late and len(problem.goals) == 1 and isinstance(reached.failure, GaveUp):
@@ -180,11 +180,15 @@ def _needs_locating(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
     )
 
 
-def _no_way(subgoal: Subgoal, why: Impossible | GaveUp, world: WorldModel) -> str:
+def _no_way(subgoal: Subgoal, why: Impossible | GaveUp, problem: PlanningProblem) -> str:
+    world = problem.world
+    kept = [f"{condition} must always hold" for condition in problem.always]
+    kept += [f"{condition} must never hold" for condition in problem.never]
+    on_the_way = f"; on the way {' and '.join(kept)}" if kept else ""
     failed = (f"; {known.robot} cannot {known.skill}: {known.reason}" for known in world.hopeless)
     return (
         f"no sequence of skills of the connected robots ({', '.join(world.team)}) "
-        f"leads to {subgoal}: {why.reason}{''.join(failed)}"
+        f"leads to {subgoal}: {why.reason}{on_the_way}{''.join(failed)}"
     )
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from keyexpr_schema.config_files import SHIPPED, config_file
+from keyexpr_schema.config_files import SHIPPED, config_file, read_yaml
 from keyexpr_schema.errors import NoConfigFile
 
 
@@ -47,8 +47,8 @@ def test_a_name_of_no_file_is_told_those_there_are_and_where_they_were_looked_fo
     with pytest.raises(NoConfigFile) as caught:
         config_file("robots", "forklift")
     assert str(caught.value) == (
-        "there is no robot 'forklift'; there are hsr, locobot, porter (looked in configs/robots, "
-        f"{SHIPPED / 'robots'}), or give the path of a file"
+        "there is no robot 'forklift'; there are butler, cart, hsr, locobot, porter (looked in "
+        f"configs/robots, {SHIPPED / 'robots'}), or give the path of a file"
     )
 
 
@@ -66,3 +66,12 @@ def test_a_folder_that_is_the_shipped_one_is_told_once(monkeypatch: pytest.Monke
     monkeypatch.chdir(SHIPPED.parent)
     with pytest.raises(NoConfigFile, match=r"\(looked in configs/robots\), or give"):
         config_file("robots", "forklift")
+
+
+def test_what_is_not_yaml_is_told_with_its_line(tmp_path: Path) -> None:
+    (tmp_path / "w.yaml").write_text("world: home\nplaces: [\n")
+    with pytest.raises(NoConfigFile) as caught:
+        read_yaml(tmp_path / "w.yaml", NoConfigFile)
+    assert str(caught.value).startswith(
+        f"{tmp_path / 'w.yaml'} is not YAML: line 3, column 1: expected the node content"
+    )

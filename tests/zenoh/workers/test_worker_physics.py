@@ -49,7 +49,7 @@ async def test_both_cups_go_where_they_shall_by_hand_and_by_basket(
             return report
 
         searched = told(await do("hsr", "search", place="kitchen"))
-        assert searched["at", "cup_1"] == searched["at", "cup_2"] == "kitchen"
+        assert searched["at", "cup_1"] == searched["at", "cup_2"] == "kitchen_table"
         await do("locobot", "navigate", to="kitchen")
         await do("hsr", "pick", object="cup_1", place="kitchen")
         assert truth(fleet, "cup_1")[2] == "hsr"

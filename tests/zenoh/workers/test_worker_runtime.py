@@ -113,7 +113,7 @@ async def test_a_cup_is_fetched_and_put_down_and_every_fact_is_true(fleet_of: Ma
         assert last.state is ReportState.SUCCEEDED, last.reason
         assert truth(fleet, "cup_1") == ("hallway", "hallway_table", None)
         said = {(f.relation, f.subject): f.value for f in last.facts}
-        assert said["at", "cup_1"] == "hallway" and said["holding", "hsr"] == NOTHING
+        assert said["at", "cup_1"] == "hallway_table" and said["holding", "hsr"] == NOTHING
         for (relation, subject), value in said.items():
             stored = await fleet.fact(relation, subject)
             assert stored is not None and stored.value == value
@@ -142,7 +142,7 @@ async def test_searching_tells_what_lies_there_and_what_does_not(fleet_of: MakeF
         report = await fleet.report(await fleet.order("locobot", "t2", "search", place="kitchen"))
         assert report.state is ReportState.SUCCEEDED, report.reason
         said = {(f.relation, f.subject): f.value for f in report.facts}
-        assert said["at", "cup_1"] == said["at", "cup_2"] == "kitchen"
+        assert said["at", "cup_1"] == said["at", "cup_2"] == "kitchen_table"
         assert said["searched", "kitchen"] is True
 
 

@@ -20,6 +20,9 @@ FINGER_SPEED_M_S = 0.10
 CLOSED_M = 0.003
 """Fingers nearer to the middle than this hold nothing."""
 
+WAY_STEPS = 8
+"""At so many points on its way it is looked whether an arm touches something."""
+
 
 class Arm:
     """Follows `goal` (joint values) at the joints' own speeds, all arriving together."""
@@ -158,6 +161,18 @@ class Arm:
             kind, _, name = other.partition("/")
             if kind != "object" and other != "floor":
                 return name if kind == "furniture" else kind
+        return None
+
+    def obstacle_between(self, start: Sequence[float], end: Sequence[float]) -> str | None:
+        """As `obstacle`, on the way from `start` up to `end`, which is straight in joint values.
+
+        Where the elbow goes over to its other bend, the hand swings far out.
+        """
+        for step in range(WAY_STEPS):
+            share = step / WAY_STEPS
+            hit = self.obstacle([a + share * (b - a) for a, b in zip(start, end, strict=True)])
+            if hit is not None:
+                return hit
         return None
 
 

@@ -157,16 +157,33 @@ class Planar(Drive):
         speed = self._approach_speed(distance, limit)
         vx, vy = (dx / distance * speed, dy / distance * speed) if distance > 1e-6 else (0.0, 0.0)
         old_x, old_y, old_rate = self._command
-        change = math.hypot(vx - old_x, vy - old_y)
-        most = self._acceleration * PERIOD_S
-        if change > most:
-            vx = old_x + (vx - old_x) * most / change
-            vy = old_y + (vy - old_y) * most / change
+        vx, vy = _turned_into((old_x, old_y), (vx, vy), self._acceleration * PERIOD_S)
         most = 3.0 * self._acceleration * PERIOD_S
         rate = old_rate + max(-most, min(most, rate - old_rate))
         self._command = (vx, vy, rate)
         for motor, value in zip(self._ctrl, self._command, strict=True):
             ctrl[motor] = value
+
+
+def _turned_into(
+    old_m_s: tuple[float, float], new_m_s: tuple[float, float], most_m_s: float
+) -> tuple[float, float]:
+    """The velocity after a change of at most `most_m_s` towards a new one.
+
+    What leads off the new direction is braked first: else a robot that speeds up along a wall
+    around a corner is carried into it.
+    """
+    change_x, change_y = new_m_s[0] - old_m_s[0], new_m_s[1] - old_m_s[1]
+    if math.hypot(change_x, change_y) <= most_m_s:
+        return new_m_s
+    # Who is to stop has no new direction, and brakes the way it goes.
+    ahead_x, ahead_y = new_m_s if any(new_m_s) else old_m_s
+    speed = math.hypot(ahead_x, ahead_y)
+    ux, uy = ahead_x / speed, ahead_y / speed
+    across = max(-most_m_s, min(most_m_s, change_y * ux - change_x * uy))
+    left = math.sqrt(most_m_s**2 - across**2)
+    along = max(-left, min(left, change_x * ux + change_y * uy))
+    return (old_m_s[0] + along * ux - across * uy, old_m_s[1] + along * uy + across * ux)
 
 
 class Differential(Drive):

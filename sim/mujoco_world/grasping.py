@@ -311,7 +311,9 @@ def reach_down(
     opening_rad: float | None,
     hovers_m: tuple[float, ...] = HOVERS_M,
 ) -> Reach:
-    """Joint values for a target and above it, clear of obstacles: the first seed that works.
+    """Joint values for a target and above it, clear of obstacles as is the way between them.
+
+    The first seed that works.
 
     Raises:
         MotionFailed: there are none.
@@ -329,7 +331,7 @@ def reach_down(
         for hover, start in itertools.product(hovers_m, (at, *arm.entry.seeds)):
             above = arm.solve((x, y, z + hover), start, opening_rad)
             if above is not None:
-                hit = arm.obstacle(above)
+                hit = arm.obstacle_between(above, at)
                 if hit is None:
                     return Reach(above=above, at=at)
                 touched = hit

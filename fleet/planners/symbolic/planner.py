@@ -32,6 +32,7 @@ from fleet.planners.symbolic.action_sequences import (
 from fleet.planners.symbolic.choosing import Choice, choose
 from fleet.planners.symbolic.engine.finite_domain import Trajectory
 from fleet.planners.symbolic.engine.instantiation import Facts
+from keyexpr_schema.facts import AT, HELD, IN, ON
 
 MAX_RESTORATIONS = 2
 """How often what the sequences for later subgoals undid is reached again, where no plan does."""
@@ -61,6 +62,10 @@ class SymbolicPlanner(Planner):
         subgoals = subgoals_in_order(problem, world.facts)
         subgoals.sort(key=lambda subgoal: subgoal not in first)
         for subgoal in subgoals:
+            if _is_of_lost_things(subgoal, reached.facts, world):
+                # Nobody takes anywhere what is nobody knows where: no need to search for a way.
+                unlocated.append(subgoal)
+                continue
             # One that is hard leaves half of the time to those after it.
             share = 1.0 if subgoal is subgoals[-1] else 0.5
             if not searching.over and reached.add(subgoal, share):
@@ -176,6 +181,14 @@ def _in_time(
 def _needs_locating(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
     return any(
         subject in world.objects and not is_located(subject, facts.get, world)
+        for subject in subgoal.condition.subjects
+    )
+
+
+def _is_of_lost_things(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
+    """Whether it says where things shall be, and of none it is known where it is."""
+    return subgoal.condition.relation in (AT, ON, IN, HELD) and not any(
+        subject not in world.objects or is_located(subject, facts.get, world)
         for subject in subgoal.condition.subjects
     )
 

@@ -181,17 +181,17 @@ class _Numbers:
 
     def travel_s(self) -> tuple[tuple[tuple[float, ...], ...], ...]:
         """By kind, origin and target."""
-        return tuple(
-            tuple(
-                tuple(self._way_s(robot, origin, target) for target in self._sites)
-                for origin in self._sites
-            )
-            for robot in self._samples
-        )
+        return tuple(self._travel_of(robot) for robot in self._samples)
 
-    def _way_s(self, robot: str, origin: Value | _Way, target: Value | _Way) -> float:
-        if isinstance(origin, _Way):
-            origin = origin.place
+    def _travel_of(self, robot: str) -> tuple[tuple[float, ...], ...]:
+        rows: dict[Value, tuple[float, ...]] = {}
+        for site in self._sites:
+            place = site.place if isinstance(site, _Way) else site
+            if place not in rows:
+                rows[place] = tuple(self._way_s(robot, place, target) for target in self._sites)
+        return tuple(rows[s.place if isinstance(s, _Way) else s] for s in self._sites)
+
+    def _way_s(self, robot: str, origin: Value, target: Value | _Way) -> float:
         if isinstance(target, _Way):
             if origin == target.place:
                 return 0.0

@@ -186,7 +186,15 @@ class WorldModel:
 
     def travel_s(self, robot: str, origin: Value, target: str) -> float:
         """Seconds that a robot takes from one place to another; from anywhere if unknown."""
-        return pace(self._durations(robot)) * self.way_s(robot, origin, target)
+        key = robot, origin, target
+        if key not in self._travels_s:
+            self._travels_s[key] = pace(self._durations(robot)) * self.way_s(robot, origin, target)
+        return self._travels_s[key]
+
+    @cached_property
+    def _travels_s(self) -> dict[tuple[str, Value, str], float]:
+        """What was worked out: plans are compared by thousands of ways."""
+        return {}
 
     def way_s(self, robot: str, origin: Value, target: str) -> float:
         """Seconds from one place to another at a robot's top speed; from anywhere if unknown."""

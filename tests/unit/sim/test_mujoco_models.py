@@ -12,11 +12,13 @@ from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from sim.errors import BadFile
 from sim.files.mission_file import load_mission, load_robot
 from sim.files.world_file import load_world
+from sim.files.world_schema import WorldFile
 from sim.mujoco_world import MODELS, MujocoBackend, load_description
 from sim.mujoco_world.arm import Arm
 from sim.mujoco_world.assemble import compile_world
 from sim.mujoco_world.robot_body import RobotBody
 from sim.server.process import make_backend
+from tests.support.furnished import furnished
 
 HOME = load_world("home")
 HSR = load_robot("hsr")
@@ -28,14 +30,14 @@ def alone(spec: RobotSpec, folder: Path | None = None) -> MujocoBackend:
     return MujocoBackend(HOME, [(spec, (2.5, 3.0, 0.0))], model_folders=folders)
 
 
-def arm_of_hsr() -> tuple[Arm, PoseMRad]:
+def arm_of_hsr(world: WorldFile = HOME, pose: PoseMRad = (2.5, 3.0, 0.0)) -> tuple[Arm, PoseMRad]:
     """The arm of a robot that stands still at the pose."""
     import mujoco
 
     found = load_description(HSR.model)
-    model = compile_world(HOME, [("hsr", found)])
+    model = compile_world(world, [("hsr", found)])
     data = mujoco.MjData(model)
-    body = RobotBody(model, data, HSR, found, (2.5, 3.0, 0.0))
+    body = RobotBody(model, data, HSR, found, pose)
     mujoco.mj_forward(model, data)
     assert body.arm is not None
     return body.arm, body.pose()
@@ -92,6 +94,18 @@ def test_the_arm_does_not_pretend_to_reach_what_it_cannot() -> None:
     arm, (x, y, _) = arm_of_hsr()
     for target in ((x + 0.9, y, 0.6), (x + 0.5, y + 0.3, 0.6), (x + 0.5, y, 1.6)):
         assert all(arm.solve(target, seed) is None for seed in arm.entry.seeds)
+
+
+def test_an_arm_that_turns_its_elbow_over_touches_what_neither_end_does(tmp_path: Path) -> None:
+    arm, _ = arm_of_hsr(furnished(tmp_path), (3.4, 3.98, math.pi / 2))
+    low, high, turned = (
+        [0.62, -0.86, -0.71, 0.0],
+        [0.67, -0.86, -0.71, 0.0],
+        [0.1, 0.86, -2.43, 0.0],
+    )
+    assert [arm.obstacle(values) for values in (low, high, turned)] == [None] * 3
+    assert arm.obstacle_between(high, low) is None
+    assert arm.obstacle_between(turned, low) == "dresser"
 
 
 def test_an_unknown_model_is_named_with_those_that_exist() -> None:

@@ -10,7 +10,7 @@ from keyexpr_schema.keyspace import GOAL_SPEC, ROBOT_ALIVE
 from keyexpr_schema.payloads.goals import GoalAddress
 from keyexpr_schema.payloads.robots import AliveAddress
 from keyexpr_schema.transport.session import open_session
-from tests.support.polling import until
+from tests.support.polling import DEADLINE_S, until
 from tests.support.session_values import goal, not_connected, take
 
 
@@ -45,7 +45,7 @@ async def test_a_frozen_router_is_noticed_and_nobody_is_declared_lost(router, se
         router.freeze()
         await until(lambda: not_connected(planner))
         router.thaw()
-        await planner.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"), 20)
+        await planner.confirm(GOAL_SPEC, GoalAddress("g1"), goal("g1"), DEADLINE_S)
         with pytest.raises(TimeoutError):
             await take(watch, 1, 3.0)
 

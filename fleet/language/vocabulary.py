@@ -8,7 +8,8 @@ from functools import cached_property
 
 import msgspec
 
-from keyexpr_schema.facts import Value
+from fleet.language.words.wordbook import Wordbook, shipped_language
+from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Feature, Object, Place
 
@@ -26,6 +27,10 @@ class SkillPhrase(msgspec.Struct, frozen=True, kw_only=True):
     verb: str
     type: str = msgspec.field(name="sort")
     wants: tuple[tuple[str, Value], ...]
+    says: tuple[str, ...] = ()
+    """Other ways to ask for it: `cut up {object}`, `turn {object} off`."""
+    states: tuple[str, ...] = ()
+    """Words for what is so when it has been done, beside its participle: `clean`."""
 
     def fits(self, thing: Object) -> bool:
         """Whether it can be done to a thing."""
@@ -45,7 +50,9 @@ class Vocabulary:
     believed to lie there: a thing, a surface, or `floor`. `carriers` may say all that it is on or
     in, the nearest first: "the fork in the drawer" also of one in a box in that drawer.
     `skill_phrases` are skills that can be asked for by name, where the grammar has no verb of that
-    name. `speaker` is the person who speaks: "me".
+    name. `speaker` is the person who speaks: "me". `believed` gives what is believed of other state
+    variables: "the open window", "a clean mug". `language` has the words, where a fleet has words of
+    its own.
     """
 
     places: Mapping[str, Place]
@@ -56,6 +63,13 @@ class Vocabulary:
     skill_phrases: tuple[SkillPhrase, ...] = ()
     carriers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     speaker: str | None = None
+    believed: Mapping[FactKey, Value] = field(default_factory=dict)
+    language: Wordbook | None = None
+
+    @property
+    def wordbook(self) -> Wordbook:
+        """The words that sentences are made of."""
+        return self.language or shipped_language()
 
     def is_at(self, name: str, where: str) -> bool:
         """Whether something is believed to be there, directly or on or in what is there."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.phrases.mentions import Mention
+from fleet.language.resolve.mentions import Mention
 from fleet.language.refusals import one_of
 from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, SEARCHED, Value
 from keyexpr_schema.payloads.goals import Condition
@@ -57,6 +57,10 @@ class GoalDraft:
     def empty(self) -> bool:
         """Whether the stage that is being filled has nothing yet."""
         return not self.stages[-1]
+
+    def copy(self) -> GoalDraft:
+        """The same, to go on from."""
+        return GoalDraft(self.is_at, [list(stage) for stage in self.stages])
 
     def next_stage(self) -> None:
         """What comes now is wanted after all that came."""

@@ -4,20 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from enum import Enum
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
-from fleet.language.words.lexicon import Entity, EntityType
-
-
-class Quantity(Enum):
-    """What a determiner says."""
-
-    BARE = "cup"
-    THE = "the cup"
-    ANY = "a cup"
-    ALL = "all cups"
+from fleet.language.tagging.lexicon import Entity, EntityType
+from fleet.language.tree.nodes import Quantity
 
 
 @dataclass(frozen=True)
@@ -47,6 +38,7 @@ class NounPhrase:
     """A noun phrase before it is resolved to those meant; `ordinal` 0 is the last one.
 
     `exact`: the words name each of `found`. `generic`: the words say no more than "thing".
+    `source`: its own words say where it is ("the cup that is on the table").
     """
 
     found: tuple[Entity, ...]
@@ -58,6 +50,8 @@ class NounPhrase:
     generic: bool = False
     count: int | None = None
     ordinal: int | None = None
+    source: str | None = None
+    source_surface: str | None = None
 
     @property
     def type(self) -> EntityType:
@@ -130,3 +124,7 @@ class NounPhrase:
         if len(names) > 1 and self.count is None:
             raise NotUnderstood(f"{self.text!r} could be {one_of(names)}: say which")
         return names
+
+
+Subject = NounPhrase | Mention
+"""Whom a clause is about: a noun phrase, or somebody who was settled before ("it")."""

@@ -10,7 +10,6 @@ from typing import Literal
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.morphology import plurals
 from fleet.language.words.tokens import Phrase, Token, number_of, words_of
-from fleet.language.words.wordlists import GRAMMAR_WORDS, PLACE_SYNONYMS
 
 EntityType = Literal["object", "place", "robot", "surface"]
 ENTITY_TYPES: tuple[EntityType, ...] = ("object", "place", "robot", "surface")
@@ -37,6 +36,7 @@ class Entity:
     kin: frozenset[Phrase] = frozenset()
     """The kinds that tell who else "the other one" may be; `kinds` has wider ones, too."""
     uses: frozenset[str] = frozenset()
+    person: bool = False
 
     @property
     def rank(self) -> tuple[int, str]:
@@ -48,7 +48,10 @@ class Lexicon:
     """Looks words up among the names of a vocabulary."""
 
     def __init__(self, vocabulary: Vocabulary) -> None:
+        language = vocabulary.wordbook
+        self._grammar, self._rooms = language.grammar, language.rooms
         self.entities = tuple(_entities(vocabulary))
+        self._meant: dict[Phrase, tuple[Entity, ...]] = {}
         self._exact: dict[Phrase, list[Entity]] = defaultdict(list)
         self._kinds: dict[Phrase, tuple[bool, list[Entity]]] = {}
         self._by_word: dict[str, set[Entity]] = defaultdict(set)
@@ -117,13 +120,24 @@ class Lexicon:
     ) -> tuple[int, tuple[Entity, ...]]:
         """The longest run of words that all occur in names or kinds of the same entities."""
         end, found = at, set[Entity]()
-        while end < len(tokens) and (word := tokens[end].word) not in GRAMMAR_WORDS:
+        while end < len(tokens) and (word := tokens[end].word) not in self._grammar:
             named = self._by_word.get(word, set())
             narrower = found & named if end > at else {e for e in named if e.type in types}
             if not narrower or number_of(word) is not None:
                 break
             end, found = end + 1, narrower
         return (end, tuple(sorted(found, key=lambda e: e.rank))) if end > at else (at, ())
+
+    def meant(self, words: Phrase) -> tuple[Entity, ...]:
+        """Everybody whom these words can mean, by name or by the words in names and kinds."""
+        if (known := self._meant.get(words)) is None:
+            tokens = [Token(word, word, 0, 0) for word in words]
+            end, named = self.exact(tokens, 0, ENTITY_TYPES)
+            known = named if end == len(words) else ()
+            end, found = self.described(tokens, 0, ENTITY_TYPES)
+            known = (*known, *(e for e in found if end == len(words) and e not in known))
+            self._meant[words] = known
+        return known
 
     def kind(
         self, tokens: Sequence[Token], at: int, end: int, types: Sequence[EntityType]
@@ -156,8 +170,7 @@ class Lexicon:
 
     def _add_synonyms(self) -> None:
         """Common words for rooms, where just one place can be meant and nothing is called so."""
-        for group in PLACE_SYNONYMS:
-            names = [words_of(name) for name in group]
+        for names in self._rooms:
             meant = {
                 e
                 for e in self.entities
@@ -202,6 +215,7 @@ def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
             thing.ordinal,
             kin,
             frozenset(thing.uses),
+            vocabulary.is_person(thing.object),
         )
         if thing.object in vocabulary.good_for:
             kinds = _names(thing.kind, *thing.categories)

@@ -1,0 +1,385 @@
+"""Facts that statements claim, checked against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fleet.errors import NotUnderstood
+from fleet.language.refusals import one_of
+from fleet.language.resolve.discourse import Discourse
+from fleet.language.resolve.mentions import Mention
+from fleet.language.resolve.nouns import PLACES, THINGS
+from fleet.language.resolve.senses import Senses
+from fleet.language.resolve.wishes import framed
+from fleet.language.tagging.tagger import Tagger
+from fleet.language.tree.nodes import Argument, Clause, Nouns, Place
+from fleet.language.vocabulary import Vocabulary
+from keyexpr_schema.facts import AT, HOLDING, NOTHING, ON, SEARCHED, FactKey, Value
+
+SAY_IT = 'say it like "the first cup is in the kitchen" or "nobody knows where the book is"'
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a sentence asks: `where`, `how many`, `which`, `whether`, `doing` or `who`.
+
+    `subjects` are those it is asked of, `facts` what may be so of them.
+    """
+
+    asks: str
+    subjects: tuple[str, ...] = ()
+    facts: tuple[tuple[str, str, Value], ...] = ()
+
+
+class Claims(Senses):
+    """Collects facts; a later one may not contradict an earlier one."""
+
+    def __init__(
+        self, vocabulary: Vocabulary, tagger: Tagger, said: Discourse, mode: str = ""
+    ) -> None:
+        """`mode`: only a `goal` or a `fact` is understood; else anything."""
+        super().__init__(vocabulary, tagger, said)
+        self.mode = mode
+        self.question: Question | None = None
+
+    def fact(self, relation: str, subject: str, value: Value) -> None:
+        """Keep a fact.
+
+        Raises:
+            NotUnderstood: the text said something else of it.
+        """
+        before = self.said.facts.setdefault(key := FactKey(relation, subject), value)
+        if before != value:
+            shown = ["nobody knows where" if v is None else str(v) for v in (before, value)]
+            raise NotUnderstood(f"it says two things of {key}: {' and '.join(shown)}")
+
+    def placed(self, nouns: Nouns, arguments: Sequence[Argument]) -> None:
+        """These are somewhere.
+
+        Raises:
+            NotUnderstood: it is not said where, or in two places, or which of several.
+        """
+        self.said.elliptic = "is"
+        if nouns.either:
+            raise NotUnderstood("'or' leaves a choice that cannot be left open; say one of them")
+        frame = framed(arguments)
+        where, home = self.whereto(frame)
+        if home or not frame.places:
+            raise NotUnderstood(f"{self.said.clause!r} is not understood as a fact: {SAY_IT}")
+        if where.source is not None or where.target is None:
+            raise NotUnderstood(f"{self.said.clause!r} does not say one place: {SAY_IT}")
+        self.put(nouns, where.target, where.target_surface)
+
+    def _settled(self, nouns: Nouns) -> list[Mention]:
+        mentions = [
+            self.resolve(s) for s in self.subjects(nouns, THINGS, "an object, robot or place")
+        ]
+        for mention in mentions:
+            if mention.open:
+                raise NotUnderstood(
+                    f"{self.said.clause!r} does not say which of "
+                    f"{one_of(mention.subjects)}: name it"
+                )
+        return mentions
+
+    def put(self, nouns: Nouns, target: str, surface: str | None = None) -> None:
+        """These are at the target, on a surface there if one is named."""
+        mentions = self._settled(nouns)
+        for mention in mentions:
+            if mention.type == "robot" and target in self.vocabulary.robots:
+                raise NotUnderstood("a robot is at a place, not on a robot: name the place")
+            if target in mention.subjects:
+                raise NotUnderstood(f"{self.said.clause!r}: nothing can be on or in itself")
+            for name in mention.subjects:
+                robot = mention.type == "robot"
+                self.fact(AT, name, self.place_of(target) if robot else target)
+                if surface is not None and not robot:
+                    self.fact(ON, name, surface)
+        self.said.remember(mentions)
+
+    def lost(self, nouns: Nouns) -> None:
+        """Nobody knows where these are."""
+        mentions = self._settled(nouns)
+        for name in (name for mention in mentions for name in mention.subjects):
+            self.fact(AT, name, None)
+        self.said.remember(mentions)
+
+    def holding(self, robots: Sequence[Mention], held: Nouns | None, in_hand: bool) -> None:
+        """What a robot has in its hand (`None`: nothing) or on it."""
+        names = [name for robot in robots for name in robot.subjects]
+        things = self._settled(held) if held is not None else []
+        objects = [name for thing in things for name in thing.subjects]
+        if held is not None and (len(names) != 1 or (in_hand and len(objects) != 1)):
+            raise NotUnderstood(
+                f"{self.said.clause!r}: one hand holds one thing; say who holds what"
+            )
+        for name in names:
+            if in_hand:
+                self.fact(HOLDING, name, objects[0] if objects else NOTHING)
+            for thing in objects:
+                self.fact(AT, thing, name)
+
+    def looked_around(self, nouns: Nouns | None, value: bool) -> None:
+        """Somebody looked around in these places, or nobody did."""
+        assert nouns is not None
+        names = [n for m in self.place_mentions(nouns) for n in m.subjects]
+        if not value and len(names) > 1:
+            raise NotUnderstood(
+                f"{self.said.clause!r} could mean all or some of them: "
+                "say it of one place at a time"
+            )
+        for place in names:
+            self.fact(SEARCHED, place, value)
+
+    # --- kinds of statements ------------------------------------------------------------------------
+    def _claims(self) -> None:
+        """Whether statements are understood here."""
+        if self.mode == "goal":
+            raise NotUnderstood(
+                f"{self.said.line!r} states a fact; a goal says what should be: "
+                '"the cup should be in the hallway"'
+            )
+
+    def on_being(self, clause: Clause) -> None:
+        assert clause.subject is not None
+        if self.said.elliptic == "be":
+            self._to_be(clause.subject, clause.predicate, clause.arguments)
+            return
+        self._claims()
+        predicate = clause.predicate
+        if predicate is None:
+            raise NotUnderstood(f"{self.said.clause!r} is not understood as a fact: {SAY_IT}")
+        if predicate.kind == "placed":
+            self.placed(clause.subject, predicate.arguments)
+        elif predicate.kind == "state":
+            self._are(clause.subject, predicate.words, False)
+        else:
+            self._were(clause, True)
+
+    def _to_be(self, subject: Nouns, predicate: object, arguments: Sequence[Argument]) -> None:
+        raise NotImplementedError
+
+    def _are(self, nouns: Nouns, words: Sequence[object], negated: bool) -> None:
+        self.said.elliptic = "are"
+        if not self.can_be(nouns, ("object",)):
+            raise NotUnderstood(f"{self.said.clause!r} is not understood as a fact: {SAY_IT}")
+        mentions = self._settled(nouns)
+        for mention in mentions:
+            for name in mention.subjects:
+                thing = self.vocabulary.objects[name]
+                for word in words:
+                    phrases = self.tagger.verbs.states.get(word.words, [])  # type: ignore[attr-defined]
+                    if not any(p.fits(thing) for p in phrases):
+                        raise NotUnderstood(f"{name} cannot be {word.text}")  # type: ignore[attr-defined]
+                    for relation, value in self.stated.wants(word, [name], negated):  # type: ignore[arg-type]
+                        self.fact(relation, name, value)
+        self.said.remember(mentions)
+
+    def on_not_being(self, clause: Clause) -> None:
+        if clause.predicate is not None and clause.predicate.kind == "state":
+            self._claims()
+            assert clause.subject is not None
+            return self._are(clause.subject, clause.predicate.words, True)
+        if clause.predicate is not None and clause.predicate.kind == "done":
+            return self._were(clause, False)
+        raise self.not_so()
+
+    def not_so(self) -> NotUnderstood:
+        """What is said to be not so."""
+        if self.mode == "goal":
+            return NotUnderstood(
+                f"{self.said.clause!r} says what must not be, or leaves something out; say what "
+                "must hold, name by name"
+            )
+        return NotUnderstood(
+            f"{self.said.line!r} says what is not so, which tells nobody where "
+            'things are: say where it is, or "nobody knows where … is"'
+        )
+
+    def _were(self, clause: Clause, value: bool) -> None:
+        """`The kitchen was searched`."""
+        self._claims()
+        predicate = clause.predicate
+        word = predicate.words[0].word if predicate is not None and predicate.words else ""
+        assert clause.subject is not None
+        if word not in self.tagger.book.searched or (predicate and predicate.arguments):
+            if predicate and predicate.kind == "done" and predicate.arguments and value:
+                return self.placed(clause.subject, predicate.arguments)
+            raise NotUnderstood(f"{self.said.clause!r} is not understood as a fact: {SAY_IT}")
+        if not self.can_be(clause.subject, PLACES):
+            raise NotUnderstood(f"{self.said.clause!r}: only places are searched")
+        return self.looked_around(clause.subject, value)
+
+    def on_was(self, clause: Clause) -> None:
+        predicate = clause.predicate
+        if predicate is not None and predicate.kind == "done":
+            return self._were(clause, not clause.has("NOT"))
+        was = next(word.text for word in clause.words if "WAS" in word.tags)
+        raise NotUnderstood(f"{was!r} tells of the past; say what holds now")
+
+    def on_been(self, clause: Clause) -> None:
+        return self._were(clause, not clause.has("NOT"))
+
+    def on_anywhere(self, clause: Clause) -> None:
+        self._claims()
+        assert clause.subject is not None
+        self.lost(clause.subject)
+
+    def on_unknown(self, clause: Clause) -> None:
+        self._claims()
+        assert clause.subject is not None
+        self.lost(clause.subject)
+
+    def on_there(self, clause: Clause) -> None:
+        assert clause.subject is not None
+        if self.said.elliptic == "be":
+            return self._to_be(clause.subject, None, clause.arguments)
+        self._claims()
+        return self.placed(clause.subject, clause.arguments)
+
+    def on_inverted(self, clause: Clause) -> None:
+        self._claims()
+        assert clause.subject is not None
+        self.placed(clause.subject, [a for a in clause.arguments if isinstance(a, Place)])
+
+    def on_has(self, clause: Clause) -> None:
+        self._claims()
+        self._carries(clause, in_hand=False)
+
+    def on_grips(self, clause: Clause) -> None:
+        self._claims()
+        self._carries(clause, in_hand=True)
+
+    def _carries(self, clause: Clause, in_hand: bool) -> None:
+        assert clause.subject is not None
+        held = next((a for a in clause.arguments if isinstance(a, Nouns)), None)
+        if self.can_be(clause.subject, ("robot",)):
+            robots = [self.resolve(s) for s in self.subjects(clause.subject, ("robot",), "a robot")]
+            if any(robot.open for robot in robots):
+                raise NotUnderstood(f"{self.said.clause!r} does not say which robot: name it")
+            if held is None and not in_hand:
+                raise NotUnderstood('what lies in a basket is said thing by thing, not "nothing"')
+            return self.holding(robots, held, in_hand)
+        if held is None:
+            raise NotUnderstood(f"{self.said.clause!r} is not understood as a fact: {SAY_IT}")
+        if self.can_be(clause.subject, ("object",)):
+            by = [n for m in self._settled(clause.subject) for n in m.subjects]
+            person = len(by) == 1 and self.vocabulary.is_person(by[0])
+            if len(by) != 1 or not (person or (by[0] in self.vocabulary.good_for and not in_hand)):
+                raise NotUnderstood(f"{self.said.clause!r} is not understood as a fact: {SAY_IT}")
+            return self.put(held, by[0])
+        places = [n for m in self.place_mentions(clause.subject) for n in m.subjects]
+        if len(places) != 1 or in_hand:
+            raise NotUnderstood(f"{self.said.clause!r} does not say one place: {SAY_IT}")
+        return self.put(held, places[0])
+
+    def on_hand_empty(self, clause: Clause) -> None:
+        self._claims()
+        assert clause.subject is not None
+        robots = [self.resolve(s) for s in self.subjects(clause.subject, ("robot",), "a robot")]
+        self.holding(robots, None, True)
+
+    def on_looked(self, clause: Clause) -> None:
+        self._claims()
+        participle = next((w.word for w in clause.words if "PART" in w.tags), "")
+        if participle not in self.tagger.book.searched:
+            raise NotUnderstood(f"{self.said.clause!r} is not understood as a fact: {SAY_IT}")
+        self.looked_around(clause.subject, not clause.has("NOBODY"))
+
+    def on_seen(self, clause: Clause) -> None:
+        self._claims()
+        assert clause.subject is not None
+        self.placed(clause.subject, clause.arguments)
+
+    def on_speaker_at(self, clause: Clause) -> None:
+        """`I am in the bedroom`."""
+        speaker = self.vocabulary.speaker
+        where, _ = self.whereto(framed(clause.arguments))
+        if speaker is None or where.target is None or self.mode == "goal":
+            raise NotUnderstood(
+                f"{self.said.clause!r} is no goal, and may matter: leave it out, or tell it as a "
+                "fact"
+            )
+        self.fact(AT, speaker, where.target)
+
+    # --- questions ----------------------------------------------------------------------------------
+    def _asks(self, clause: Clause) -> None:
+        if self.mode:
+            raise NotUnderstood(
+                f"{self.said.line!r} is a question; a {self.mode} says what "
+                f"{'should hold' if self.mode == 'goal' else 'holds'}"
+            )
+
+    def ask_where(self, clause: Clause) -> None:
+        """`where is the cup?`"""
+        self._asks(clause)
+        assert clause.subject is not None
+        names = tuple(
+            name
+            for s in self.subjects(clause.subject, THINGS, "an object or a robot")
+            for name in (s.names if not isinstance(s, Mention) else s.subjects)
+        )
+        self.question = Question("where", names)
+
+    def on_how_many(self, clause: Clause) -> None:
+        self._asks(clause)
+        names = self._asked_of(clause)
+        facts = self._asked(clause, names)
+        self.question = Question("how many", names, facts)
+
+    def on_which(self, clause: Clause) -> None:
+        self._asks(clause)
+        if clause.subject is None:
+            names = tuple(self.vocabulary.objects)
+        else:
+            names = self._asked_of(clause)
+        self.question = Question("which", names, self._asked(clause, names))
+
+    def _asked_of(self, clause: Clause) -> tuple[str, ...]:
+        assert clause.subject is not None
+        types = THINGS if self.can_be(clause.subject, THINGS) else PLACES
+        found = self.subjects(clause.subject, types, "an object or a robot")
+        return tuple(
+            dict.fromkeys(
+                n for s in found for n in (s.names if not isinstance(s, Mention) else s.subjects)
+            )
+        )
+
+    def _asked(
+        self, clause: Clause, names: Sequence[str]
+    ) -> tuple[tuple[str, str, Value], ...]:
+        arguments: Sequence[Argument] = clause.arguments
+        if clause.predicate is not None:
+            arguments = clause.predicate.arguments
+        words = clause.predicate.words if clause.predicate is not None else ()
+        words = (*words, *(w for w in clause.words if "ADJ" in w.tags and "BE" not in w.tags))
+        facts: list[tuple[str, str, Value]] = []
+        if words and not (clause.predicate and clause.predicate.kind == "done"):
+            for name in names:
+                for word in words:
+                    facts.extend((r, name, v) for r, v in self.stated.wants(word, [name]))
+            return tuple(facts)
+        if clause.predicate is not None and clause.predicate.kind == "done":
+            if words and words[0].word in self.tagger.book.searched:
+                return tuple((SEARCHED, name, True) for name in names)
+            raise NotUnderstood(f"{self.said.clause!r} is a question that is not understood")
+        if arguments:
+            where, _ = self.whereto(framed(arguments))
+            target = where.target or where.source
+            facts.extend((AT, name, target) for name in names if name != target)
+        return tuple(facts)
+
+    def on_whether(self, clause: Clause) -> None:
+        self._asks(clause)
+        names = self._asked_of(clause)
+        self.question = Question("whether", names, self._asked(clause, names))
+
+    def on_doing(self, clause: Clause) -> None:
+        self._asks(clause)
+        names = self._asked_of(clause) if clause.subject else tuple(self.vocabulary.robots)
+        self.question = Question("doing", names)
+
+    def on_who(self, clause: Clause) -> None:
+        self._asks(clause)
+        self.question = Question("who", self._asked_of(clause))

@@ -1,0 +1,451 @@
+"""Who and what noun phrases mean, in this world and in this text."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+from fleet.errors import NotUnderstood
+from fleet.language.refusals import listed, one_of, suggestion
+from fleet.language.resolve.discourse import Discourse
+from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
+from fleet.language.resolve.states import Stated
+from fleet.language.tagging.lexicon import CATEGORIES, ENTITY_TYPES, Entity, EntityType
+from fleet.language.tagging.tagger import Tagger
+from fleet.language.tree.nodes import Noun, Nouns, Quantity
+from fleet.language.vocabulary import Vocabulary
+from fleet.language.words.morphology import participles
+from fleet.language.words.tokens import ORDINALS, Token, words_of
+from keyexpr_schema.facts import AT, FactKey, Literal
+from keyexpr_schema.payloads.world import Feature
+
+THINGS: tuple[EntityType, ...] = ("object", "robot")
+PLACES: tuple[EntityType, ...] = ("place", "surface")
+SPOTS: tuple[EntityType, ...] = ("place", "robot", "surface")
+_PLURAL = frozenset({"them", "they", "these", "those", "both", "all", "each"})
+
+
+class NounResolver:
+    """Finds out whom noun phrases mean."""
+
+    def __init__(self, vocabulary: Vocabulary, tagger: Tagger, said: Discourse) -> None:
+        self.vocabulary, self.tagger, self.said = vocabulary, tagger, said
+        self.lexicon = tagger.lexicon
+        self.stated = Stated(vocabulary, tagger)
+
+    # --- subjects ---------------------------------------------------------------------------------
+    def subjects(self, nouns: Nouns, types: Sequence[EntityType], what: str) -> list[Subject]:
+        """All that a list of noun phrases means.
+
+        Raises:
+            NotUnderstood: one of them is nothing known of these types.
+        """
+        found = [self.subject(noun, types, what) for noun in nouns.items]
+        if nouns.either:
+            either = found[0]
+            for other in found[1:]:
+                either = self._either(either, other)
+            return [either]
+        for i in range(1, len(found)):
+            found[i] = _determined(found[i], found[i - 1])
+        return found
+
+    def subject(self, noun: Noun, types: Sequence[EntityType], what: str) -> Subject:
+        """Whom one noun phrase or pronoun means."""
+        if noun.form == "pronoun":
+            return self._pronoun(noun)
+        if noun.form == "me":
+            return self.speaker(noun)
+        return self.noun(noun, types, what)
+
+    def can_be(self, nouns: Nouns, types: Sequence[EntityType]) -> bool:
+        """Whether all of them can be of one of these types, by their words."""
+        for noun in nouns.items:
+            if noun.form == "pronoun":
+                if not any(m.type in types for m in self.said.recent):
+                    return False
+            elif noun.form == "me":
+                if self.vocabulary.speaker is None or "object" not in types:
+                    return False
+            else:
+                try:
+                    self.noun(noun, types, "")
+                except NotUnderstood:
+                    return False
+        return True
+
+    def speaker(self, noun: Noun) -> NounPhrase:
+        """Who says "me".
+
+        Raises:
+            NotUnderstood: nobody knows.
+        """
+        text = self.said.quote(noun.first, noun.last)
+        found = tuple(
+            e
+            for e in self.lexicon.entities
+            if e.type == "surface" and e.id == self.vocabulary.speaker
+        )
+        if not found:
+            raise NotUnderstood(
+                f"{text!r} names somebody whose place is not known; name a place or a robot"
+            )
+        return NounPhrase(found, text, noun.first, exact=True)
+
+    def _pronoun(self, noun: Noun) -> Mention:
+        word = noun.words[0]
+        plural = word in _PLURAL or len(noun.words) > 1
+        meant = [m for m in self.said.recent if m.single != plural]
+        count = 2 if word == "both" else int(word) if word.isdecimal() else None
+        if len(meant) == 1 and count in (None, len(meant[0].subjects)):
+            return meant[0]
+        names = sorted({s for m in self.said.recent for s in m.subjects})
+        reason = f"could be {one_of(names)}" if names else "refers to nothing before it"
+        text = self.said.quote(noun.first, noun.last)
+        raise NotUnderstood(f"{text!r} {reason}: name what you mean")
+
+    def _either(self, first: Subject, second: Subject) -> NounPhrase:
+        if not isinstance(first, NounPhrase) or not isinstance(second, NounPhrase):
+            raise NotUnderstood('"or" is understood between names only: name both')
+        if first.type != second.type or not (first.resolve().single and second.resolve().single):
+            raise NotUnderstood(f"{first.text!r} or {second.text!r} leaves too much open")
+        both = (
+            first.among(first.resolve().subjects).found
+            + second.among(second.resolve().subjects).found
+        )
+        return NounPhrase(both, f"{first.text} or {second.text}", first.key, Quantity.ANY)
+
+    # --- noun phrases -----------------------------------------------------------------------------
+    def noun(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
+        """What a noun phrase can mean.
+
+        Raises:
+            NotUnderstood: nothing known of these types; the message lists what is.
+        """
+        text = self.said.quote(noun.first, noun.last)
+        made = NounPhrase((), text, noun.first, noun.quantity, count=noun.count)
+        made = self._headed(noun, made, types, what)
+        if noun.use is not None:
+            made = self._useful(made, noun.use)
+        for adjective in noun.adjectives:
+            made = self.stated.narrowed(made, adjective, self.said)
+        for relative in noun.relatives:
+            if relative.state is not None:
+                made = self.stated.narrowed(made, relative.state, self.said, relative.negated)
+        if noun.but is not None:
+            made = self._without(made, noun.but, types, what)
+        made = replace(made, plural=made.plural and not noun.part)
+        if len(noun.ordinals) > 1:
+            return self._numbered_each(made, noun.ordinals)
+        if noun.ordinals:
+            made = replace(made, ordinal=noun.ordinals[0])
+        return self._others(made, noun.other) if noun.other else made
+
+    def _headed(
+        self, noun: Noun, made: NounPhrase, types: Sequence[EntityType], what: str
+    ) -> NounPhrase:
+        if noun.form == "general":
+            return self._general(noun, made, types, what)
+        if noun.form == "headless" or (noun.form == "one" and len(noun.head) == 1):
+            kin = tuple(e for e in self.kind if e.type in types)
+            if not kin:
+                raise self.unknown(noun, types, what)
+            plural = noun.form == "one" and noun.head[0].spoken == "ones"
+            return replace(made, found=kin, plural=plural)
+        if noun.form != "noun" and noun.form != "one":
+            raise self.unknown(noun, types, what)
+        head = noun.head[0].words
+        if any("UNK" in word.tags for word in noun.head):
+            raise self.unknown(noun, types, what)
+        named = self._named(head, noun.head[0].text, types)
+        if named and not noun.numbers:
+            self._remember_kind(named[0])
+            return replace(made, found=named, exact=True)
+        return self._described(noun, made, types, what)
+
+    def _named(
+        self, words: tuple[str, ...], text: str, types: Sequence[EntityType]
+    ) -> tuple[Entity, ...]:
+        """Those whose whole name it is; a kind that has several members is none."""
+        end, found = self.lexicon.exact(_tokens(words), 0, types)
+        if end != len(words):
+            return ()
+        raw = text.casefold()
+        if len(found) > 1:
+            found = tuple(e for e in found if e.id.casefold() == raw) or found
+        if found and self.lexicon.is_several(words, types):
+            found = tuple(e for e in found if e.id.casefold() == raw)
+        return found
+
+    def _described(
+        self, noun: Noun, made: NounPhrase, types: Sequence[EntityType], what: str
+    ) -> NounPhrase:
+        words = noun.head[0].words
+        tokens = _tokens(words)
+        end, found = self.lexicon.described(tokens, 0, types)
+        # "The kitchen" is the place of that name, and no table that is called by it, too.
+        named_end, named = self.lexicon.exact(tokens, 0, ENTITY_TYPES)
+        other = named and named_end == len(words) and all(e.type == "place" for e in named)
+        if end != len(words) or not found or (other and "place" not in types):
+            raise self.unknown(noun, types, what)
+        plural, generic = False, False
+        kind = self.lexicon.kind(tokens, 0, end, types)
+        if kind is not None and (of_kind := tuple(e for e in found if e in kind[1])):
+            plural, found = kind[0], of_kind
+            category = any(words[0] in (c, f"{c}s") for cs in CATEGORIES.values() for c in cs)
+            generic = len(words) == 1 and len(found) == len(kind[1]) and category
+        if noun.of:
+            found = self._of_what(noun, found, types, what)
+        self._remember_kind(found[0])
+        if noun.form == "one":
+            return replace(made, found=found, plural=noun.head[-1].spoken == "ones")
+        if not noun.numbers:
+            return replace(made, found=found, plural=plural, generic=generic)
+        chosen = tuple(e for number in noun.numbers for e in _numbered(found, number, made.text))
+        quantity = Quantity.ALL if len(noun.numbers) > 1 else noun.quantity
+        return replace(made, found=chosen, quantity=quantity, exact=True)
+
+    def _of_what(
+        self, noun: Noun, found: tuple[Entity, ...], types: Sequence[EntityType], what: str
+    ) -> tuple[Entity, ...]:
+        words = tuple(word for lexeme in noun.of if "NOUN" in lexeme.tags for word in lexeme.words)
+        if any("UNK" in lexeme.tags for lexeme in noun.of):
+            raise self.unknown(noun, types, what)
+        named = self.lexicon.meant(words)
+        narrower = tuple(e for e in found if e in named)
+        if not narrower:
+            raise self.unknown(noun, types, what)
+        return narrower
+
+    def _general(
+        self, noun: Noun, made: NounPhrase, types: Sequence[EntityType], what: str
+    ) -> NounPhrase:
+        tags = noun.head[0].tags
+        entity_type: EntityType = "robot" if "EVERYONE" in tags else "object"
+        quantity = Quantity.ANY if "SOMETHING" in tags else Quantity.ALL
+        found = tuple(e for e in self.lexicon.entities if e.type == entity_type)
+        if entity_type not in types or not found:
+            raise self.unknown(noun, types, what)
+        return replace(made, found=found, quantity=quantity, generic=entity_type == "object")
+
+    def _useful(self, made: NounPhrase, verb: str) -> NounPhrase:
+        known = {use for e in self.lexicon.entities if e.type == "object" for use in e.uses}
+        found = tuple(e for e in made.found if verb in e.uses)
+        if not found:
+            raise NotUnderstood(
+                f"{made.text!r}: nothing of that kind is known to be good for that; say so with "
+                f'the field "uses" of its kind; known uses are {listed(sorted(known))}'
+            )
+        return replace(made, found=found, generic=False)
+
+    def _without(
+        self, made: NounPhrase, but: Nouns, types: Sequence[EntityType], what: str
+    ) -> NounPhrase:
+        gone = {
+            name
+            for subject in self.subjects(but, types, what)
+            for name in self.resolve(subject).subjects
+        }
+        names = set(made.names)
+        if stray := sorted(gone - names):
+            raise NotUnderstood(f"{made.text!r}: {one_of(stray)} is none of {one_of(made.names)}")
+        left = made.among(names - gone)
+        if not left.found or made.quantity not in (Quantity.ALL, Quantity.THE):
+            raise NotUnderstood(f"{made.text!r} leaves nothing, or does not say all of what")
+        return replace(left, quantity=Quantity.ALL)
+
+    def _numbered_each(self, made: NounPhrase, ordinals: Sequence[int]) -> NounPhrase:
+        names = [
+            name
+            for ordinal in ordinals
+            for name in replace(made, ordinal=ordinal, count=None, plural=False).resolve().subjects
+        ]
+        by_name = {e.stands_for: e for e in made.found}
+        return replace(
+            made,
+            found=tuple(by_name[name] for name in names),
+            ordinal=None,
+            quantity=Quantity.ALL,
+            exact=True,
+            plural=True,
+        )
+
+    def _others(self, made: NounPhrase, other: str) -> NounPhrase:
+        """Those of the kind that were not spoken of yet.
+
+        After "a cup", which may be any, "the other one" is any too if there are two, and "another
+        cup" always: that they differ follows from where they are wanted.
+        """
+        known = set(made.names)
+        gone = [m for m in self.said.mentioned if known & set(m.subjects)]
+        opened = {m.key for m in gone if m.open}
+        left = made.among(known - {s for m in gone if not m.open for s in m.subjects})
+        spare = len(left.names) - len(opened)
+        many = spare > 1 or made.plural
+        if not gone or spare < 1 or (opened and other != "another" and many):
+            raise NotUnderstood(
+                f"{made.text!r} could be {' or '.join(made.names)}: call it by its name"
+            )
+        return replace(left, quantity=Quantity.ANY) if opened else left
+
+    @property
+    def kind(self) -> tuple[Entity, ...]:
+        """Whom "one" may mean in "the second one"."""
+        return () if self.said.kind_of is None else self.lexicon.kin(self.said.kind_of)
+
+    def _remember_kind(self, entity: Entity) -> None:
+        if entity.type in ("object", "robot"):
+            self.said.kind_of = entity
+
+    # --- who is meant -----------------------------------------------------------------------------
+    def resolve(
+        self, subject: Subject, source: str | None = None, surface: str | None = None
+    ) -> Mention:
+        """Who is meant; with `source`, by those who are believed to be there (on a `surface`).
+
+        Raises:
+            NotUnderstood: it does not say which of several, or counts wrongly.
+        """
+        if isinstance(subject, Mention):
+            mention = subject
+        else:
+            if subject.source is not None:
+                source, surface = subject.source, subject.source_surface
+            mention = subject.resolve() if source is None else self._at(subject, source, surface)
+        if source is not None and not mention.open:
+            self.said.presumed.extend(
+                Literal(FactKey(AT, name), source) for name in mention.subjects
+            )
+        return mention
+
+    def _at(self, noun: NounPhrase, source: str, surface: str | None) -> Mention:
+        """Who is meant by "all cups" when it is said that they come from a place."""
+        try:
+            mention = noun.resolve()
+            if not mention.selective:
+                return mention
+        except NotUnderstood as error:
+            reason: str | None = str(error)
+        else:
+            reason = None
+        there = [name for name in noun.names if self.vocabulary.is_at(name, source)]
+        if surface is not None:
+            there = self._on(surface, there, all_of_them=reason is None and not mention.open)
+        if there:
+            return replace(noun.among(there).resolve(), key=noun.key)
+        where = f"on {surface}" if surface is not None else f"in {source}"
+        raise NotUnderstood(
+            reason or f"it is not known which of {one_of(noun.names)} are {where}: name them"
+        )
+
+    def _on(self, surface: str, there: Sequence[str], all_of_them: bool) -> list[str]:
+        unsure = [name for name in there if name not in self.vocabulary.rests]
+        if unsure and all_of_them:
+            raise NotUnderstood(
+                f"it is not known whether {one_of(unsure)} lies on {surface}: name the things, or "
+                "have the place searched first"
+            )
+        return [name for name in there if self.vocabulary.rests.get(name) == surface] or unsure
+
+    # --- who can be meant -------------------------------------------------------------------------
+    def movable(self, subject: Subject) -> Subject:
+        """The same, without what cannot be moved where the words leave that open.
+
+        Raises:
+            NotUnderstood: what is named cannot be moved.
+        """
+        if isinstance(subject, Mention) or subject.type != "object":
+            return subject
+        things = self.vocabulary.objects.values()
+        return self.fit(subject, {o.object for o in things if o.is_a(Feature.MOVABLE)}, "move")
+
+    def fit(self, subject: Subject, able: Collection[str], verb: str) -> Subject:
+        """The same, without those that the verb cannot be done to where the words leave that open.
+
+        Raises:
+            NotUnderstood: it cannot be done to what is named.
+        """
+        names = subject.names if isinstance(subject, NounPhrase) else subject.subjects
+        if subject.type != "object" or not (others := [n for n in names if n not in able]):
+            return subject
+        if isinstance(subject, NounPhrase):
+            left = subject.among(able)
+            if left.found and (subject.generic or subject.quantity is Quantity.ANY):
+                return left
+        text = subject.text if isinstance(subject, NounPhrase) else self.said.line
+        done = " ".join([participles(verb.split()[0])[0], *verb.split()[1:]])
+        raise NotUnderstood(f"{text!r}: {one_of(others)} cannot be {done}")
+
+    def drivers(self, subject: Subject) -> Subject:
+        """The same, with only robots that can drive where the words leave open which robot.
+
+        Raises:
+            NotUnderstood: no robot that could be meant can drive.
+        """
+        if isinstance(subject, Mention) or subject.type != "robot" or subject.exact:
+            return subject
+        if subject.quantity is not Quantity.ANY and subject.plural:
+            return subject
+        able = subject.among(self.able_to_drive())
+        if not able.found:
+            raise NotUnderstood(f"{subject.text!r}: no such robot that can drive is known")
+        return able
+
+    def able_to_drive(self) -> list[str]:
+        """Robots with the skill to go somewhere."""
+        return sorted(n for n, spec in self.vocabulary.robots.items() if "navigate" in spec.skills)
+
+    def some_robot(self) -> Mention:
+        """Any robot that can drive, where nobody is named.
+
+        Raises:
+            NotUnderstood: there is none.
+        """
+        able = tuple(self.able_to_drive())
+        if not able:
+            raise NotUnderstood("no robot that can drive is known yet, so nobody can go anywhere")
+        return Mention(able, "robot", self.said.ended, open=len(able) > 1)
+
+    # --- refusals ---------------------------------------------------------------------------------
+    def unknown(self, noun: Noun, types: Sequence[EntityType], what: str) -> NotUnderstood:
+        """The phrase names nothing known of these types."""
+        strange = [word for word in noun.head if "UNK" in word.tags]
+        shown = self.said.quote(noun.first, noun.last)
+        names = self.lexicon.names_in(types) | set(ORDINALS)
+        single = [word.text for word in strange] or shown.split()
+        hint = ""
+        for part in (shown, " ".join(words_of(shown)), *single):
+            if part.casefold() not in ORDINALS and not hint:
+                hint = suggestion(part, names)
+        known = listed(self.lexicon.known(types))
+        bare = what.removeprefix("a ").removeprefix("an ")
+        return NotUnderstood(f"{shown!r} is not a known {bare}{hint}; known are {known}")
+
+
+def _tokens(words: tuple[str, ...]) -> list[Token]:
+    return [Token(word, word, 0, 0) for word in words]
+
+
+def _numbered(found: tuple[Entity, ...], number: int, text: str) -> tuple[Entity, ...]:
+    chosen = tuple(e for e in found if e.ordinal == number) or tuple(
+        e for e in found if any(str(number) in name for name in e.names)
+    )
+    if not chosen:
+        known = ", ".join(dict.fromkeys(e.stands_for for e in found))
+        raise NotUnderstood(f"{text!r}: there is no number {number}; known are {known}")
+    return chosen
+
+
+def _determined(subject: Subject, before: Subject) -> Subject:
+    """The same, with the determiner of the one before if it has none: "all cups and books"."""
+    if (
+        isinstance(subject, NounPhrase)
+        and isinstance(before, NounPhrase)
+        and subject.plural
+        and subject.quantity is Quantity.BARE
+        and subject.count is None
+        and before.quantity in (Quantity.ALL, Quantity.THE)
+        and before.ordinal is None
+    ):
+        return replace(subject, quantity=before.quantity)
+    return subject

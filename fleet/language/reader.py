@@ -10,13 +10,14 @@ from datetime import datetime
 from fleet.errors import NotUnderstood
 from fleet.language.grammar.chart import NotGrammatical, parsed
 from fleet.language.reading import Ambiguity, Reading, WantedGoal
-from fleet.language.refusals import reason_for, suggestion
+from fleet.language.refusals import listed, reason_for, suggestion
 from fleet.language.resolve.claims import SAY_IT, Question
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.resolve.wishes import EXAMPLE
 from fleet.language.segments import Segment, Sentence, cut, sentences_of
+from fleet.language.tagging.lexicon import ENTITY_TYPES
 from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
@@ -29,11 +30,12 @@ from keyexpr_schema.payloads.goals import Condition
 MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 120
+_BEFORE_NOUNS = frozenset({"DET", "INDEF", "UNIV", "NUM", "ORD", "ADJ", "OTHER", "ANOTHER"})
 _READINGS = 12
 """Readings of what was read so far that are followed up."""
 _BORDERS = frozenset({"COMMA", "AND", "THEN", "PREP", "TO", "BE", "MODAL", "HAVE", "END"})
 _REFUSED_OF_GOALS = ("IF", "WHEN", "UNLESS", "UNTIL", "BEFORE", "AFTER", "TIME", "DONT", "NEVER",
-                     "AVOID", "WITHOUT", "ALWAYS")  # fmt: skip
+                     "AVOID", "WITHOUT", "ALWAYS", "NOT")  # fmt: skip
 
 _KEPT: deque[tuple[Vocabulary, Tagger]] = deque(maxlen=4)
 
@@ -150,7 +152,7 @@ class Reader:
                     found.append(_State(said, state.cost + cost, question or state.question))
         if not found:
             if not problems:
-                raise self._ungrammatical(segment, len(segment.words))
+                raise self._ungrammatical(segment, 0)
             raise min(problems, key=lambda row: row[0])[1]
         found.sort(key=lambda state: state.cost)
         return found[:_READINGS]
@@ -188,7 +190,7 @@ class Reader:
             return False
         words = sentence.words
         begins = [token.word for token in self.tokens[words[0].first : words[0].first + 4]]
-        remarks = [p for p, tags in self.tagger.phrases.items() if "REMARK" in tags]
+        remarks = self.tagger.book.remarks
         length = max((len(p) for p in remarks if tuple(begins[: len(p)]) == p), default=0)
         return bool(length) and begins[length : length + 1] != ["to"]
 
@@ -231,7 +233,7 @@ class Reader:
         return "a fact" if self.mode == "fact" else "a goal"
 
     def _check(self, sentence: Sentence) -> None:
-        if not self.mode:
+        if self.mode != "goal":
             return
         for word in sentence.words:
             if any(tag in word.tags for tag in _REFUSED_OF_GOALS) and "NOUN" not in word.tags:
@@ -263,9 +265,24 @@ class Reader:
         if special:
             return NotUnderstood(special)
         example = SAY_IT if self.mode == "fact" else EXAMPLE
+        if at >= len(words) and "PREP" in words[-1].tags:
+            known = listed(self.tagger.lexicon.known(("place",)))
+            return NotUnderstood(
+                f"{self._quote(words)!r} ends where a place is missing; known are {known}"
+            )
         if at >= len(words):
             return NotUnderstood(f"{self._quote(words)!r} ends before it says all: {example}")
         shown = self._quote(words[at:end])
+        begins = at
+        while begins and words[begins - 1].tags & _BEFORE_NOUNS:
+            begins -= 1
+        if "UNK" in words[at].tags and (begins < at or (at and "PREP" in words[at - 1].tags)):
+            types = ENTITY_TYPES
+            hint = suggestion(words[at].text, self.tagger.lexicon.names_in(types))
+            return NotUnderstood(
+                f"{self._quote(words[begins:end])!r} is not a known object, robot or place{hint}; "
+                f"known are {listed(self.tagger.lexicon.known(types))}"
+            )
         if at == 0:
             verbs = {entry.base for entries in self.tagger.verbs.entries.values()
                      for entry in entries}  # fmt: skip
@@ -310,6 +327,10 @@ class Reader:
                 when=tuple(said.when),
             )
             goals = (self._timed(goal, now),)
+        elif self.times and self.mode == "fact":
+            named = [(token.word, token.spoken) for token in self.tokens]
+            reason = reason_for(named, "a fact")
+            raise NotUnderstood(reason or f"{self.line!r} names a time, which a fact cannot")
         elif self.times or said.when:
             raise NotUnderstood(f"{self.line!r} names a time or a condition, but nothing to do")
         presumed = tuple(dict.fromkeys(said.presumed))
@@ -360,6 +381,9 @@ def read_goal(text: str, vocabulary: Vocabulary) -> Reading:
     reading = _one(Reader(text, vocabulary, "goal").read(None))
     if isinstance(reading, Ambiguity):
         raise NotUnderstood(reading.sentence)
+    if reading.facts or any(goal != WantedGoal(goal.stages, priority=goal.priority)
+                            for goal in reading.goals):  # fmt: skip
+        raise NotUnderstood(f"{reading.text!r} says more than what shall be reached: leave it out")
     return reading
 
 

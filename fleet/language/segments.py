@@ -9,6 +9,7 @@ from fleet.language.tagging.tagger import Lexeme
 from fleet.language.words.times import TimePhrase
 
 _OPENING = frozenset({"KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID", "ASKWHERE"})
+_CLAUSAL = _OPENING | {"VERB", "FIN", "GER", "BE", "MODAL", "HAVE", "PREP", "CAUSE", "BELONG"}
 _CONDITIONS = {"IF": "when", "WHEN": "when", "UNLESS": "unless"}
 
 
@@ -78,7 +79,7 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             if "THEN" in word.tags and "NOUN" not in word.tags:
                 segments += _segment(begun, joint, role)
                 joint, begun = "then", []
-            elif word.tags & {"AND", "COMMA"} and begun and _opens(rest):
+            elif word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest):
                 segments += _segment(begun, joint, role)
                 joint, begun = "and", []
             elif "WITHOUT" in word.tags and begun:
@@ -107,6 +108,11 @@ def _commas(words: Sequence[Lexeme]) -> list[Lexeme]:
     while kept and "COMMA" in kept[-1].tags:
         kept.pop()
     return kept
+
+
+def _clausal(words: Sequence[Lexeme]) -> bool:
+    """Whether it is more than a name that somebody is called by, or "first"."""
+    return any(w.tags & _CLAUSAL and not w.tags & {"NOUN"} for w in words)
 
 
 def _opens(rest: Sequence[Lexeme]) -> bool:
@@ -148,6 +154,8 @@ def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
 
 def _segment(words: Sequence[Lexeme], joint: str, role: str) -> list[Segment]:
     words = _commas(words)
+    if len(words) > 1 and words[0].words == ("1st",) and "COMMA" in words[1].tags:
+        words = words[2:]
     while words and words[-1].tags & {"AND"}:
         words = words[:-1]
     if words and words[0].words == ("1st",) and "NOUN" not in words[0].tags:

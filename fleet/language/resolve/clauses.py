@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of, reason_for
-from fleet.language.resolve.claims import Claims
+from fleet.language.resolve.claims import SAY_IT, Claims
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.nouns import PLACES, THINGS
 from fleet.language.resolve.senses import ROBOTS_TELL
@@ -23,6 +23,9 @@ from keyexpr_schema.payloads.goals import Condition
 
 _DONE = {"find": LOCATED, "pick": HELD, "search": SEARCHED}
 """What holds when it has been done: "the book should be found"."""
+_GUESSES = frozenset({"can", "could", "may", "would", "will"})
+_WISHES = frozenset({"do", "told", "wanted", "belongs", "whereto", "enough", "kept", "never_be",
+                     "never_do", "avoid"})  # fmt: skip
 
 
 class Clauses(Claims):
@@ -35,6 +38,10 @@ class Clauses(Claims):
             NotUnderstood: it means nothing here; one sentence.
         """
         self.said.began, self.said.ended = clause.first, clause.last
+        if self.mode == "fact" and clause.kind in _WISHES:
+            if clause.kind in ("do", "told"):
+                raise NotUnderstood(f"{self.said.line!r} is a goal and not a fact: {SAY_IT}")
+            raise NotUnderstood(f"{self.said.clause!r} is not understood as a fact: {SAY_IT}")
         getattr(self, f"on_{clause.kind}")(clause)
 
     # --- commands ---------------------------------------------------------------------------------
@@ -120,6 +127,16 @@ class Clauses(Claims):
 
     # --- what shall be ----------------------------------------------------------------------------
     def on_shall_be(self, clause: Clause) -> None:
+        modal = next((w.word for w in clause.words if "MODAL" in w.tags), "")
+        if modal in _GUESSES:
+            if modal == "can" and clause.predicate is not None and clause.subject is not None:
+                self._claims()
+                return self.placed(clause.subject, clause.predicate.arguments)
+            raise NotUnderstood(
+                f"{modal!r} is uncertain; say what holds, or what should hold"
+            )
+        if self.mode == "fact":
+            raise NotUnderstood(f"{self.said.line!r} is a goal and not a fact: {SAY_IT}")
         self._to_be(clause.subject, clause.predicate, clause.arguments)
 
     def _to_be(
@@ -251,12 +268,13 @@ class Clauses(Claims):
 
     def on_named(self, clause: Clause) -> None:
         assert clause.subject is not None
-        if self.said.elliptic and self.can_be(clause.subject, PLACES):
+        strange = any("UNK" in w.tags for n in clause.subject.items for w in n.head)
+        if self.said.elliptic and not strange and self.can_be(clause.subject, PLACES):
             raise NotUnderstood(
                 f"{self.said.clause!r} is one place too many for one thing; if one is to come "
                 'after the other, say "then"'
             )
-        if self.said.elliptic:
+        if self.said.elliptic and not strange:
             raise NotUnderstood(f"{self.said.clause!r} does not say where to: name a place")
         shown = self.said.clause
         raise NotUnderstood(f"{shown!r} is not understood as a goal: {EXAMPLE}")
@@ -378,10 +396,8 @@ def _fitted(
         if one is not None:
             left.remove(one)
             continue
-        at = next(
-            (p for p in places if tuple(p.preposition.split()) == rest), None
-        )
-        if at is None:
+        at = next((p for p in places if tuple(p.preposition.split()) == rest), None)
+        if at is None or (themes and "find" in senses):
             return None
         if senses & {"find", SKILL} and not themes and at.nouns is not None:
             places.remove(at)

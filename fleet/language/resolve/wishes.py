@@ -93,7 +93,7 @@ class Wishes(PlaceResolver):
                 f"could be given to; known are {known}"
             )
         whereto = where.target is not None or bool(where.each) or home
-        if fetch and not whereto and not to_speaker:
+        if fetch and not whereto:
             return self._fetched(moved, where)
         return self.to_target(moved, where, home or (tidy and where.target is None))
 

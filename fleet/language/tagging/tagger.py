@@ -53,6 +53,9 @@ class Tagger:
             more.setdefault(form, set()).update(tag for tag, _ in senses)
         for state in self.verbs.states:
             more.setdefault(state, set()).add("ADJ")
+        for entity in self.lexicon.entities:
+            for use in entity.uses:
+                more.setdefault((use,), set()).add("USE")
         for form, tags in more.items():
             self.phrases[form] = self.phrases.get(form, frozenset()) | tags
         self._longest: dict[str, int] = {}

@@ -17,11 +17,12 @@ from fleet.language.tree.nodes import (
     Particle,
     Place,
     Predicate,
+    Quantity,
     Relative,
 )
 from fleet.language.words.tokens import number_of
 
-COSTS = {"bare": 2, "whereto": 2, "named": 6, "told": 1, "being": 0, "item": 1, "unknown": 8}
+COSTS = {"bare": 2, "whereto": 2, "named": 6, "told": 1, "being": 0, "item": 5, "unknown": 8}
 """How far from plain speech a derivation is: the plainest ones that mean something are meant."""
 _THINGS: frozenset[EntityType] = frozenset({"object", "robot"})
 _SPOTS: frozenset[EntityType] = frozenset({"place", "surface", "robot"})
@@ -179,7 +180,10 @@ class Builder:
             if not (all(t & _THINGS for t in types) or all(t & _SPOTS for t in types)):
                 return None
         unknown = sum("UNK" in word.tags for item in items for word in item.head)
-        return [(COSTS["unknown"] * bool(unknown), Nouns(items))]
+        bare = len(items) > 1 and items[-1].quantity is Quantity.BARE
+        strange = bare and any("UNK" in word.tags for word in items[-1].head)
+        cost = COSTS["unknown"] * (bool(unknown) + 2 * strange)  # rather a verb that is not known
+        return [(cost, Nouns(items))]
 
     def _either(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         made = self._nps(children, start, end)

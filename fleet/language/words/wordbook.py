@@ -57,7 +57,10 @@ class Wordbook:
 
     def __init__(self, words: Mapping[str, Iterable[str]], verbs: Mapping[str, Any]) -> None:
         found: dict[Phrase, set[str]] = defaultdict(set)
+        self.remarks = tuple(map(phrase_of, words.get("REMARK", ())))
         for tag, phrases in words.items():
+            if tag == "REMARK":
+                continue
             for text in phrases:
                 found[phrase_of(text)].add(tag)
         self.roles: dict[Phrase, str] = {}
@@ -80,6 +83,8 @@ class Wordbook:
             for text in texts:
                 senses[phrase_of(text)].add(sense)
         self.verbs = tuple(self.entry(verb, frozenset(kinds)) for verb, kinds in senses.items())
+        for use in self.uses:
+            found[(use,)].add("USE")
         self.phrases = {phrase: frozenset(tags) for phrase, tags in found.items()}
         self.grammar = frozenset(
             phrase[0]

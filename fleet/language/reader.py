@@ -152,7 +152,8 @@ class Reader:
                     found.append(_State(said, state.cost + cost, question or state.question))
         if not found:
             if not problems:
-                raise self._ungrammatical(segment, 0)
+                strange = [i for i, w in enumerate(segment.words) if "UNK" in w.tags]
+                raise self._ungrammatical(segment, strange[0] if strange else 0)
             raise min(problems, key=lambda row: row[0])[1]
         found.sort(key=lambda state: state.cost)
         return found[:_READINGS]

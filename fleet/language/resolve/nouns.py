@@ -55,7 +55,7 @@ class NounResolver:
         if noun.form == "pronoun":
             return self._pronoun(noun)
         if noun.form == "me":
-            return self.speaker(noun)
+            return self.speaker(noun, "object")
         return self.noun(noun, types, what)
 
     def can_be(self, nouns: Nouns, types: Sequence[EntityType]) -> bool:
@@ -74,7 +74,7 @@ class NounResolver:
                     return False
         return True
 
-    def speaker(self, noun: Noun) -> NounPhrase:
+    def speaker(self, noun: Noun, as_type: EntityType = "surface") -> NounPhrase:
         """Who says "me".
 
         Raises:
@@ -84,7 +84,7 @@ class NounResolver:
         found = tuple(
             e
             for e in self.lexicon.entities
-            if e.type == "surface" and e.id == self.vocabulary.speaker
+            if e.type == as_type and e.id == self.vocabulary.speaker
         )
         if not found:
             raise NotUnderstood(

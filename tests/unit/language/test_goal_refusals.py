@@ -174,7 +174,7 @@ from tests.support.language_house import WORDS
         ),
         (
             "bring the book upstairs",
-            "'upstairs' is not understood after 'bring the book': say where to",
+            "'upstairs' is not understood after 'bring the book'",
         ),
         ("where is the hsr", "'the hsr': robots say themselves where they are; see their states"),
         ("find the hsr", "'the hsr': robots say themselves where they are; see their states"),
@@ -236,7 +236,7 @@ from tests.support.language_house import WORDS
         ("The book belongs to the locobot", "does not say in which place it belongs"),
         ("The book does not belong in the kitchen", "'not' says what must not be"),
         ("The fridge belongs in the hallway", "'The fridge': fridge cannot be moved"),
-        ("The kitchen belongs in the hallway", "'The kitchen belongs': places stay where they are"),
+        ("The kitchen belongs in the hallway", "places stay where they are"),
         ("The book belongs", "'The book belongs' does not say where to"),
         (
             "Clear the coffee table.",

@@ -28,16 +28,35 @@ class SkillPhrase(msgspec.Struct, frozen=True, kw_only=True):
     type: str = msgspec.field(name="sort")
     wants: tuple[tuple[str, Value], ...]
     says: tuple[str, ...] = ()
-    """Other ways to ask for it: `cut up {object}`, `turn {object} off`."""
-    states: tuple[str, ...] = ()
-    """Words for what is so when it has been done, beside its participle: `clean`."""
+    """Other ways to ask for it: `cut {object} [up] [with {tool}]`, `turn {object} off`."""
+    skill: str = ""
 
     def fits(self, thing: Object) -> bool:
         """Whether it can be done to a thing."""
-        return any(
-            all(word.strip() == "object" or thing.is_a(word.strip()) for word in words.split("&"))
-            for words in self.type.split("|")
-        )
+        return _is_of(thing, self.type)
+
+
+class StateWord(msgspec.Struct, frozen=True, kw_only=True):
+    """A word for a value of a relation: "clean" and "dirty" things.
+
+    `type` is that of what it is said of, as skill files write it.
+    """
+
+    word: str
+    type: str
+    relation: str
+    value: Value
+
+    def fits(self, thing: Object) -> bool:
+        """Whether it can be said of a thing."""
+        return _is_of(thing, self.type)
+
+
+def _is_of(thing: Object, type_: str) -> bool:
+    return any(
+        all(word.strip() == "object" or thing.is_a(word.strip()) for word in words.split("&"))
+        for words in type_.split("|")
+    )
 
 
 @dataclass(frozen=True)
@@ -51,7 +70,7 @@ class Vocabulary:
     in, the nearest first: "the fork in the drawer" also of one in a box in that drawer.
     `skill_phrases` are skills that can be asked for by name, where the grammar has no verb of that
     name. `speaker` is the person who speaks: "me". `believed` gives what is believed of other state
-    variables: "the open window", "a clean mug". `language` has the words, where a fleet has words of
+    variables: "the open window", "a clean mug"; `state_words` are the words for that. `language` has the words, where a fleet has words of
     its own.
     """
 
@@ -65,6 +84,7 @@ class Vocabulary:
     speaker: str | None = None
     believed: Mapping[FactKey, Value] = field(default_factory=dict)
     language: Wordbook | None = None
+    state_words: tuple[StateWord, ...] = ()
 
     @property
     def wordbook(self) -> Wordbook:

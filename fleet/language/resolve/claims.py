@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from msgspec.structs import replace
+
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.discourse import Discourse
@@ -12,24 +14,27 @@ from fleet.language.resolve.mentions import Mention
 from fleet.language.resolve.nouns import PLACES, THINGS
 from fleet.language.resolve.senses import Senses
 from fleet.language.resolve.wishes import framed
-from fleet.language.tagging.tagger import Tagger
+from fleet.language.resolve.states import of_each
+from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.nodes import Argument, Clause, Nouns, Place
 from fleet.language.vocabulary import Vocabulary
 from keyexpr_schema.facts import AT, HOLDING, NOTHING, ON, SEARCHED, FactKey, Value
+from keyexpr_schema.payloads.goals import Condition
 
 SAY_IT = 'say it like "the first cup is in the kitchen" or "nobody knows where the book is"'
 
 
 @dataclass(frozen=True)
 class Question:
-    """What a sentence asks: `where`, `how many`, `which`, `whether`, `doing` or `who`.
+    """What a sentence asks: `where`, `how many`, `which`, `whether`, `what doing` or `who`.
 
-    `subjects` are those it is asked of, `facts` what may be so of them.
+    `subjects` are those it is asked of (none: of anything), `holds` what may be so, where the
+    subject `?` stands for each of them.
     """
 
-    asks: str
+    of: str
     subjects: tuple[str, ...] = ()
-    facts: tuple[tuple[str, str, Value], ...] = ()
+    holds: tuple[Condition, ...] = ()
 
 
 class Claims(Senses):
@@ -160,21 +165,16 @@ class Claims(Senses):
     def _to_be(self, subject: Nouns, predicate: object, arguments: Sequence[Argument]) -> None:
         raise NotImplementedError
 
-    def _are(self, nouns: Nouns, words: Sequence[object], negated: bool) -> None:
+    def _are(self, nouns: Nouns, words: Sequence[Lexeme], negated: bool) -> None:
         self.said.elliptic = "are"
-        if not self.can_be(nouns, ("object",)):
-            raise NotUnderstood(f"{self.said.clause!r} is not understood as a fact: {SAY_IT}")
-        mentions = self._settled(nouns)
-        for mention in mentions:
-            for name in mention.subjects:
-                thing = self.vocabulary.objects[name]
-                for word in words:
-                    phrases = self.tagger.verbs.states.get(word.words, [])  # type: ignore[attr-defined]
-                    if not any(p.fits(thing) for p in phrases):
-                        raise NotUnderstood(f"{name} cannot be {word.text}")  # type: ignore[attr-defined]
-                    for relation, value in self.stated.wants(word, [name], negated):  # type: ignore[arg-type]
-                        self.fact(relation, name, value)
-        self.said.remember(mentions)
+        if self.can_be(nouns, THINGS):
+            mentions = self._settled(nouns)
+            self.said.remember(mentions)
+        else:
+            mentions = self.place_mentions(nouns)
+        names = [name for mention in mentions for name in mention.subjects]
+        for relation, name, value in of_each(self.stated, words, names, negated):
+            self.fact(relation, name, value)
 
     def on_not_being(self, clause: Clause) -> None:
         if clause.predicate is not None and clause.predicate.kind == "state":
@@ -323,63 +323,79 @@ class Claims(Senses):
         self.question = Question("where", names)
 
     def on_how_many(self, clause: Clause) -> None:
+        """`how many plates are in the kitchen?`"""
         self._asks(clause)
         names = self._asked_of(clause)
-        facts = self._asked(clause, names)
-        self.question = Question("how many", names, facts)
+        self.question = Question("how many", names, self._asked(clause, names))
 
     def on_which(self, clause: Clause) -> None:
+        """`which windows are open?`, `what is in the fridge?`"""
         self._asks(clause)
-        if clause.subject is None:
-            names = tuple(self.vocabulary.objects)
-        else:
-            names = self._asked_of(clause)
+        names = self._asked_of(clause) if clause.subject is not None else ()
         self.question = Question("which", names, self._asked(clause, names))
 
     def _asked_of(self, clause: Clause) -> tuple[str, ...]:
         assert clause.subject is not None
         types = THINGS if self.can_be(clause.subject, THINGS) else PLACES
-        found = self.subjects(clause.subject, types, "an object or a robot")
+        found = self.subjects(clause.subject, types, "an object, robot or place")
         return tuple(
             dict.fromkeys(
                 n for s in found for n in (s.names if not isinstance(s, Mention) else s.subjects)
             )
         )
 
-    def _asked(
-        self, clause: Clause, names: Sequence[str]
-    ) -> tuple[tuple[str, str, Value], ...]:
-        arguments: Sequence[Argument] = clause.arguments
-        if clause.predicate is not None:
-            arguments = clause.predicate.arguments
-        words = clause.predicate.words if clause.predicate is not None else ()
-        words = (*words, *(w for w in clause.words if "ADJ" in w.tags and "BE" not in w.tags))
-        facts: list[tuple[str, str, Value]] = []
-        if words and not (clause.predicate and clause.predicate.kind == "done"):
-            for name in names:
-                for word in words:
-                    facts.extend((r, name, v) for r, v in self.stated.wants(word, [name]))
-            return tuple(facts)
-        if clause.predicate is not None and clause.predicate.kind == "done":
-            if words and words[0].word in self.tagger.book.searched:
-                return tuple((SEARCHED, name, True) for name in names)
-            raise NotUnderstood(f"{self.said.clause!r} is a question that is not understood")
-        if arguments:
-            where, _ = self.whereto(framed(arguments))
-            target = where.target or where.source
-            facts.extend((AT, name, target) for name in names if name != target)
-        return tuple(facts)
+    def _asked(self, clause: Clause, names: Sequence[str]) -> tuple[Condition, ...]:
+        """What may be so of each of them, who are then called `?`."""
+        predicate = clause.predicate
+        arguments = predicate.arguments if predicate is not None else clause.arguments
+        words = predicate.words if predicate is not None else ()
+        if predicate is not None and predicate.kind == "done":
+            if words[0].words not in self.stated.states:
+                if words[0].word in self.tagger.book.searched:
+                    return (Condition(relation=SEARCHED, subject="?", value=True),)
+                raise NotUnderstood(f"{self.said.clause!r} is a question that is not understood")
+            if predicate.arguments:
+                raise NotUnderstood(f"{self.said.clause!r} is a question that is not understood")
+        if words:
+            held = {
+                (relation, value)
+                for relation, _, value in of_each(self.stated, words, names[:1])
+            }
+            return tuple(Condition(relation=r, subject="?", value=v) for r, v in sorted(held))
+        if not arguments:
+            return ()
+        where, _ = self.whereto(framed(arguments))
+        target = where.target or where.source
+        if target is None:
+            raise NotUnderstood(f"{self.said.clause!r} does not say where")
+        return (Condition(relation=where.relation, subject="?", value=target),)
 
     def on_whether(self, clause: Clause) -> None:
+        """`is the door open?`"""
         self._asks(clause)
-        names = self._asked_of(clause)
-        self.question = Question("whether", names, self._asked(clause, names))
+        assert clause.subject is not None
+        types = THINGS if self.can_be(clause.subject, THINGS) else PLACES
+        mentions = [
+            self.resolve(s) for s in self.subjects(clause.subject, types, "an object or a robot")
+        ]
+        names = [name for mention in mentions for name in mention.subjects]
+        held = self._asked(clause, names)
+        if any(mention.open for mention in mentions):
+            self.question = Question("whether", tuple(names), held)
+            return
+        self.question = Question(
+            "whether",
+            (),
+            tuple(replace(each, subject=name) for name in names for each in held),
+        )
 
     def on_doing(self, clause: Clause) -> None:
+        """`what is the robot doing?`"""
         self._asks(clause)
-        names = self._asked_of(clause) if clause.subject else tuple(self.vocabulary.robots)
-        self.question = Question("doing", names)
+        names = self._asked_of(clause) if clause.subject else ()
+        self.question = Question("what doing", names)
 
     def on_who(self, clause: Clause) -> None:
+        """`who has the book?`"""
         self._asks(clause)
         self.question = Question("who", self._asked_of(clause))

@@ -13,10 +13,9 @@ from fleet.language.resolve.nouns import PLACES, THINGS
 from fleet.language.resolve.senses import ROBOTS_TELL
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.resolve.wishes import EXAMPLE, Frame, framed
-from fleet.language.tagging.skill_words import SKILL
+from fleet.language.tagging.skill_words import SKILL, SkillFrame
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.tree.nodes import Argument, Clause, Nouns, Place, Predicate
-from fleet.language.vocabulary import SkillPhrase
 from fleet.language.words.tokens import Phrase
 from keyexpr_schema.facts import AT, HELD, LOCATED, SEARCHED
 from keyexpr_schema.payloads.goals import Condition
@@ -70,9 +69,11 @@ class Clauses(Claims):
             self.said = before.copy()
             try:
                 if phrases:
-                    self._check_who(who)
+                    if phrases[0].phrase.type != "robot":
+                        self._check_who(who)
                     self.said.elliptic = ""
-                    self.skill(frame, phrases)
+                    self.said.again = (clause.verb, clause.arguments)
+                    self.skill(frame, phrases, who)
                 else:
                     self._sense(frame, who)
                 return
@@ -83,9 +84,9 @@ class Clauses(Claims):
 
     def _frames(
         self, verb: Lexeme, arguments: Sequence[Argument], forms: tuple[str, ...]
-    ) -> list[tuple[Frame, list[SkillPhrase]]]:
+    ) -> list[tuple[Frame, list[SkillFrame]]]:
         """The uses of a verb that its particles and prepositions fit, the longest first."""
-        found: list[tuple[int, Frame, list[SkillPhrase]]] = []
+        found: list[tuple[int, Frame, list[SkillFrame]]] = []
         plain = framed(arguments, verb.word)
         for head in self.tagger.verbs.heads(verb.words, *forms):
             for entry in self.tagger.verbs.entries[head]:
@@ -159,15 +160,21 @@ class Clauses(Claims):
         where, home = self.whereto(frame, each=True)
         return self.to_target(who, where, home)
 
-    def _made(self, subject: Nouns, words: Sequence[Lexeme], places: bool) -> None:
+    def _made(
+        self, subject: Nouns, words: Sequence[Lexeme], places: bool, negated: bool = False
+    ) -> None:
         for word in words:
-            phrases = self.tagger.verbs.states.get(word.words, [])
-            if places or not phrases:
-                raise NotUnderstood(f"{self.said.clause!r}: no known skill makes it {word.text}")
-            things = self.subjects(subject, ("object",), "an object")
-            mentions = self.those(things, phrases)
-            names = [n for m in mentions for n in m.subjects]
-            self.wish(mentions, self.stated.skill(word, names))
+            able = self.stated.able(word)
+            if places:
+                mentions = self.place_mentions(subject)
+            elif self.can_be(subject, ("object",)):
+                things = self.subjects(subject, ("object",), "an object")
+                mentions = self.those(things, able, word.word)
+                self.said.remember(mentions)
+            else:
+                mentions = [self.resolve(s) for s in self.subjects(subject, ("robot",), "a robot")]
+            for mention in mentions:
+                self.wish([mention], self.stated.wants(word, mention.subjects[0], negated))
 
     def _done_to(self, subject: Nouns, predicate: Predicate, places: bool) -> None:
         participle = predicate.words[0]
@@ -181,7 +188,7 @@ class Clauses(Claims):
         raise problems[0] if problems else NotUnderstood(f"{self.said.clause!r}: {EXAMPLE}")
 
     def _passive(
-        self, subject: Nouns, frame: Frame, phrases: Sequence[SkillPhrase], places: bool
+        self, subject: Nouns, frame: Frame, phrases: Sequence[SkillFrame], places: bool
     ) -> None:
         if phrases:
             return self.skill(replace(frame, themes=(subject, *frame.themes)), phrases)
@@ -384,15 +391,15 @@ def _whereto(frame: Frame) -> bool:
 
 
 def _fitted(
-    frame: Frame, behind: Phrase, senses: frozenset[str], verb: str
+    frame: Frame, behind: Sequence[Phrase], senses: frozenset[str], verb: str
 ) -> Frame | None:
     """The frame as that of a verb with these words behind it; `None`: they are not there."""
     left = list(frame.particles)
     places = list(frame.places)
     themes = frame.themes
-    for i, word in enumerate(behind):
-        one = next((p for p in left if p.lexeme.words == (word,)), None)
-        rest = behind[i:]
+    for i, chunk in enumerate(behind):
+        one = next((p for p in left if p.lexeme.words == chunk), None)
+        rest = tuple(word for later in behind[i:] for word in later)
         if one is not None:
             left.remove(one)
             continue

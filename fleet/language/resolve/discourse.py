@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from fleet.language.resolve.mentions import Mention, Subject
 from fleet.language.resolve.stages import GoalDraft
@@ -34,6 +35,8 @@ class Discourse:
     """`move`: "and the book to the kitchen" may follow; `be`: "and the book in the hallway"."""
     verb: str = ""
     addressees: list[Subject] = field(default_factory=list)
+    again: Any = None
+    """The verb and arguments of the last clause: "and then the second one"."""
     began: int = 0
     ended: int = 0
     facts: dict[FactKey, Value] = field(default_factory=dict)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
@@ -11,9 +11,10 @@ from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.nouns import PLACES
 from fleet.language.resolve.places import WHERE
 from fleet.language.resolve.wishes import EXAMPLE, HOME_HINT, Frame, Wishes
+from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tree.nodes import Nouns, Place
 from fleet.language.vocabulary import SkillPhrase
-from keyexpr_schema.facts import AT, HELD, LOCATED, SEARCHED
+from keyexpr_schema.facts import AT, HELD, LOCATED, SEARCHED, Value
 from keyexpr_schema.payloads.world import Feature
 
 ROBOTS_TELL = "robots say themselves where they are; see their states"
@@ -181,22 +182,32 @@ class Senses(Wishes):
         return mentions
 
     # --- skills -----------------------------------------------------------------------------------
-    def skill(self, frame: Frame, phrases: Sequence[SkillPhrase]) -> None:
+    def skill(
+        self, frame: Frame, frames: Sequence[SkillFrame], who: Sequence[Subject] | None = None
+    ) -> None:
         """`vacuum the hallway and the kitchen`, `switch the lamp off`.
 
         Raises:
             NotUnderstood: it cannot be done to what is named; of several skills of that name, the
                 first says why.
         """
+        tools = [p for p in frame.places if p.role == "with"]
+        if tools and any(f.tool for f in frames) and tools[0].nouns is not None:
+            for subject in self.subjects(tools[0].nouns, ("object",), "an object"):
+                self.resolve(subject)
+            frame = replace(frame, places=tuple(p for p in frame.places if p not in tools))
         themes = frame.themes or tuple(p.nouns for p in frame.places[:1] if p.nouns is not None)
         house = next((p for p in frame.places if p.special == "house"), None)
         places = frame.places if frame.themes else frame.places[1:]
+        phrases = [f.phrase for f in frames]
         phrase = phrases[0]
+        if phrase.type == "robot":
+            return self._done_by(frame, phrase, who)
         if phrase.type == "place":
             if house is not None:
                 names = self.places(house)
                 mentions = [Mention((name,), "place", self.said.began) for name in names]
-                return self.wish(mentions, phrase)
+                return self.wish(mentions, phrase.wants)
             if len(themes) != 1:
                 known = listed(self.lexicon.known(("place",)))
                 raise NotUnderstood(
@@ -204,7 +215,7 @@ class Senses(Wishes):
                 )
             named = self.place_mentions(themes[0])
             each = dict.fromkeys(name for m in named for name in m.subjects)
-            return self.wish([Mention((n,), "place", self.said.began) for n in each], phrase)
+            return self.wish([Mention((n,), "place", self.said.began) for n in each], phrase.wants)
         if len(themes) != 1:
             known = listed(self.lexicon.known(("object",)))
             raise NotUnderstood(
@@ -221,13 +232,38 @@ class Senses(Wishes):
             raise NotUnderstood(
                 f"{sorted(frame.particle_words)[0]!r} is not understood after {frame.verb!r}"
             )
-        return self.wish(self.those(things, phrases, where and where.source,
-                                    where and where.source_surface), phrase)  # fmt: skip
+        able = {
+            o.object for o in self.vocabulary.objects.values() if any(p.fits(o) for p in phrases)
+        }
+        source, surface = (where.source, where.source_surface) if where else (None, None)
+        mentions = self.those(things, able, phrase.verb, source, surface)
+        self.said.remember(mentions)
+        for mention in mentions:
+            names = [self.vocabulary.objects[n] for n in mention.subjects]
+            fitting = next((p for p in phrases if all(map(p.fits, names))), phrase)
+            self.wish([mention], fitting.wants)
+        return None
+
+    def _done_by(
+        self, frame: Frame, phrase: SkillPhrase, who: Sequence[Subject] | None
+    ) -> None:
+        """`dock`: a robot does it with itself; any that can, where nobody is named."""
+        if frame.themes or frame.places or frame.particle_words:
+            raise NotUnderstood(f"{self.said.clause!r}: that is done to nothing and nowhere")
+        able = [n for n, spec in self.vocabulary.robots.items() if phrase.skill in spec.skills]
+        if who is None:
+            if not able:
+                raise NotUnderstood(f"no robot that can {phrase.verb} is known")
+            mentions = [Mention(tuple(sorted(able)), "robot", self.said.began, len(able) > 1)]
+        else:
+            mentions = [self.resolve(s) for s in who]
+        return self.wish(mentions, phrase.wants)
 
     def those(
         self,
         things: Sequence[Subject],
-        phrases: Sequence[SkillPhrase],
+        able: Collection[str],
+        verb: str,
         source: str | None = None,
         surface: str | None = None,
     ) -> list[Mention]:
@@ -236,24 +272,19 @@ class Senses(Wishes):
         Raises:
             NotUnderstood: it cannot be done to what is named.
         """
-        able = {
-            o.object for o in self.vocabulary.objects.values() if any(p.fits(o) for p in phrases)
-        }
         found = []
         for thing in things:
             left = thing
             if isinstance(thing, NounPhrase) and thing.quantity.name == "THE" and not thing.exact:
                 left = thing.among(able) if thing.among(able).found else thing
-            fit = self.fit(left, able, phrases[0].verb)
+            fit = self.fit(left, able, verb)
             found.append(self.resolve(fit, source, surface))
         return found
 
-    def wish(self, mentions: Sequence[Mention], phrase: SkillPhrase) -> None:
-        """Wish that these are as the skill makes them."""
-        if phrase.type != "place":
-            self.said.remember(mentions)
+    def wish(self, mentions: Sequence[Mention], wants: Sequence[tuple[str, Value]]) -> None:
+        """Wish that this holds of these."""
         for mention in mentions:
-            for relation, value in phrase.wants:
+            for relation, value in wants:
                 self.said.draft.add(relation, mention, value)
 
     # --- order ------------------------------------------------------------------------------------

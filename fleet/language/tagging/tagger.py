@@ -51,6 +51,8 @@ class Tagger:
         more: dict[Phrase, set[str]] = {}
         for form, senses in self.verbs.forms.items():
             more.setdefault(form, set()).update(tag for tag, _ in senses)
+        for literal in self.verbs.literals:
+            more.setdefault(literal, set()).add("PARTICLE")
         for state in self.verbs.states:
             more.setdefault(state, set()).add("ADJ")
         for entity in self.lexicon.entities:

@@ -43,13 +43,13 @@ class VerbEntry:
     """One way to use a verb: its head, and the particles or the preposition behind it."""
 
     head: Phrase
-    behind: Phrase
+    behind: tuple[Phrase, ...]
     senses: frozenset[str]
 
     @property
     def base(self) -> str:
         """The verb as a data file writes it."""
-        return " ".join((*self.head, *self.behind))
+        return " ".join((*self.head, *(word for chunk in self.behind for word in chunk)))
 
 
 class Wordbook:
@@ -103,7 +103,7 @@ class Wordbook:
             ),
             len(verb),
         )
-        return VerbEntry(verb[:end], verb[end:], senses)
+        return VerbEntry(verb[:end], tuple((word,) for word in verb[end:]), senses)
 
 
 def read_language(*own: Path) -> Wordbook:

@@ -10,7 +10,7 @@ from datetime import datetime
 from fleet.errors import NotUnderstood
 from fleet.language.grammar.chart import NotGrammatical, parsed
 from fleet.language.reading import Ambiguity, Reading, WantedGoal
-from fleet.language.refusals import listed, reason_for, suggestion
+from fleet.language.refusals import listed, nearest, reason_for, suggestion
 from fleet.language.resolve.claims import SAY_IT, Question
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
@@ -121,7 +121,7 @@ class Reader:
                 states = self._sentence(sentence, states)
         return self._ended(states, now, dangling)
 
-    # --- one sentence after the other ---------------------------------------------------------------
+    # --- one sentence after the other -------------------------------------------------------------
     def _sentence(self, sentence: Sentence, states: list[_State]) -> list[_State]:
         for segment in sentence.segments:
             if segment.joint == "then":
@@ -185,7 +185,7 @@ class Reader:
             said.elliptic = ""
         return said, resolver.question
 
-    # --- people speaking of themselves ---------------------------------------------------------------
+    # --- people speaking of themselves ------------------------------------------------------------
     def _said_of_oneself(self, sentence: Sentence) -> bool:
         if self.mode == "fact":
             return False
@@ -229,7 +229,7 @@ class Reader:
         start = self.tokens[words[0].first].start
         return " ".join(self.text[start : self.tokens[words[-1].last - 1].end].split())
 
-    # --- refusals ------------------------------------------------------------------------------------
+    # --- refusals ---------------------------------------------------------------------------------
     def _what(self) -> str:
         return "a fact" if self.mode == "fact" else "a goal"
 
@@ -282,7 +282,7 @@ class Reader:
             hint = suggestion(words[at].text, self.tagger.lexicon.names_in(types))
             return NotUnderstood(
                 f"{self._quote(words[begins:end])!r} is not a known object, robot or place{hint}; "
-                f"known are {listed(self.tagger.lexicon.known(types))}"
+                f"known are {nearest(self.tagger.lexicon.known(types), words[at].text)}"
             )
         if at == 0:
             verbs = {entry.base for entries in self.tagger.verbs.entries.values()
@@ -291,7 +291,7 @@ class Reader:
             return NotUnderstood(f"{shown!r} is not understood as {self._what()}{hint}: {example}")
         return NotUnderstood(f"{shown!r} is not understood after {self._quote(words[:at])!r}")
 
-    # --- the end -------------------------------------------------------------------------------------
+    # --- the end ----------------------------------------------------------------------------------
     def _ended(
         self, states: Sequence[_State], now: datetime | None, dangling: bool
     ) -> list[tuple[int, Reading]]:
@@ -352,9 +352,7 @@ class Reader:
         return goal
 
 
-def read(
-    text: str, vocabulary: Vocabulary, now: datetime | None = None
-) -> Reading | Ambiguity:
+def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Reading | Ambiguity:
     """What a text asks for, says, or asks; of several meanings the plainest.
 
     `now` is what the clock says, with its zone, for times of day.

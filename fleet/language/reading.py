@@ -16,8 +16,8 @@ class WantedGoal:
     `stages` come one after the other; all conditions of a stage hold together at its end. `always`
     must hold all the time, and of `never` nothing may. `priority` above 0 is for what is urgent.
     `not_before_s` and `due_s` count from now, in seconds; `every` is a line of cron or an ISO 8601
-    period. `when` must hold before it is begun. Of each pair of `before`, the first must hold before
-    the second does. `by` are robots that shall do it.
+    period. `when` must hold before it is begun. Of each pair of `before`, the first must hold
+    before the second does. `by` are robots that shall do it.
     """
 
     stages: tuple[tuple[Condition, ...], ...] = ()
@@ -36,8 +36,9 @@ class WantedGoal:
 class Reading:
     """What a text asks for, says or asks.
 
-    `facts` are said in it. `presumed` are facts that it takes for granted: "bring the first cup from
-    the kitchen …" presumes `at(cup_1) = kitchen`; they are no part of the goal. `remarks` are parts
+    `facts` are said in it. `presumed` are facts that it takes for granted: "bring the first cup
+    from the kitchen …" presumes `at(cup_1) = kitchen`; they are no part of the goal. `remarks` are
+    parts
     of the text that ask for nothing, as it was written: "I have a headache".
     """
 
@@ -65,8 +66,10 @@ class Reading:
             parts += [f"every {goal.every}"] if goal.every else []
             said.append(", ".join(parts))
         if self.question is not None:
-            said.append(f"{self.question.of}: {', '.join(self.question.subjects)} "
-                        f"{'; '.join(map(str, self.question.holds))}?")
+            said.append(
+                f"{self.question.of}: {', '.join(self.question.subjects)} "
+                f"{'; '.join(map(str, self.question.holds))}?"
+            )
         return "; ".join(said)
 
 

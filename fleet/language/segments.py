@@ -117,7 +117,7 @@ def _clausal(words: Sequence[Lexeme]) -> bool:
 
 def _opens(rest: Sequence[Lexeme]) -> bool:
     """Whether what follows begins a clause, and cannot go on with a list."""
-    rest = [word for word in rest[:2]]
+    rest = list(rest[:2])
     if rest and rest[0].tags & {"AND", "COMMA"}:
         rest = rest[1:]
     if not rest:
@@ -137,11 +137,7 @@ def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
         if i:
             return [(role, list(words[i + 1 :])), ("", list(words[:i]))]
         end = next(
-            (
-                j
-                for j in range(1, len(words))
-                if words[j].tags & {"COMMA", "THEN"}
-            ),
+            (j for j in range(1, len(words)) if words[j].tags & {"COMMA", "THEN"}),
             None,
         )
         if end is not None:
@@ -166,5 +162,3 @@ def _segment(words: Sequence[Lexeme], joint: str, role: str) -> list[Segment]:
     always = any("ALWAYS" in word.tags for word in words)
     words = [word for word in words if "ALWAYS" not in word.tags]
     return [Segment(tuple(words), joint, role, always)] if words else []
-
-

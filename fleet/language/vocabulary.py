@@ -68,9 +68,9 @@ class Vocabulary:
     up the kitchen" is said of what is believed to be there. `rests` may say on or in what it is
     believed to lie there: a thing, a surface, or `floor`. `carriers` may say all that it is on or
     in, the nearest first: "the fork in the drawer" also of one in a box in that drawer.
-    `skill_phrases` are skills that can be asked for by name, where the grammar has no verb of that
-    name. `speaker` is the person who speaks: "me". `believed` gives what is believed of other state
-    variables: "the open window", "a clean mug"; `state_words` are the words for that. `language` has the words, where a fleet has words of
+    `skill_phrases` are skills that can be asked for by name. `speaker` is the person who speaks:
+    "me". `believed` gives what is believed of other state variables: "the open window", "a clean
+    mug"; `state_words` are the words for that. `language` has the words, where a fleet has words of
     its own.
     """
 

@@ -23,7 +23,9 @@ from keyexpr_schema.facts import AT, IN, ON, FactKey, Literal, parse_literal
 
 _SPACE = re.compile(rf"^\s*{SPACE}\(\s*(\w+)\s*\)\s*$")
 _NEED = re.compile(r"^\s*(\w+)(?:\s*>=\s*(\w+)\(\s*(\w+)\s*\))?\s*$")
-_FIELDS = frozenset({"about", "parameters", "needs", "before", "after", "duration_s", "travel_to", "says"})
+_FIELDS = frozenset(
+    {"about", "parameters", "needs", "before", "after", "duration_s", "travel_to", "says"}
+)
 
 
 def skills_from_data(data: Any, where: str) -> dict[str, SkillModel]:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from lark import Lark, Token
 from lark.exceptions import UnexpectedToken
@@ -34,7 +34,7 @@ class _Word(Token):
     lexeme: Lexeme
 
     def __new__(cls, lexeme: Lexeme) -> _Word:
-        made = super().__new__(cls, "WORD", lexeme.word)
+        made = cast(_Word, super().__new__(cls, "WORD", lexeme.word))
         made.lexeme = lexeme
         return made
 
@@ -45,8 +45,8 @@ class _Tagged(Lexer):
     def __init__(self, _: Any) -> None:
         pass
 
-    def lex(self, words: Any, _: Any = None) -> Iterator[Token]:  # type: ignore[override]
-        yield from (_Word(lexeme) for lexeme in getattr(words, "text", words))
+    def lex(self, lexer_state: Any, parser_state: Any) -> Iterator[Token]:
+        yield from lexer_state.text
 
 
 @cache
@@ -113,7 +113,7 @@ def _with_unique_symbols(parser: Any) -> None:
     unique = {s: _Tag(s.name) if s.is_term else _Name(s.name) for s in symbols}
     same = {
         rule: Rule(
-            unique[rule.origin],
+            cast(_Name, unique[rule.origin]),
             [unique[s] for s in rule.expansion],
             rule.order,
             rule.alias,
@@ -135,13 +135,13 @@ def _forest(parser: Any, words: Sequence[Lexeme]) -> Any:
     """The root of the forest of all derivations (as `lark.parsers.earley.Parser.parse` does it)."""
     columns, to_scan = [parser.Set()], parser.Set()
     for rule in parser.predictions[parser.start]:
-        item = Item(rule, 0, 0)
+        item = Item(rule, 0, 0)  # type: ignore[no-untyped-call]
         (to_scan if item.expect in parser.TERMINALS else columns[0]).add(item)
     to_scan = parser._parse(_Words(words), columns, to_scan, parser.start)
     for item in columns[-1]:
-        if item.is_complete and item.node is not None and item.s is parser.start:
-            if item.start == 0:
-                return item.node
+        ends = item.is_complete and item.node is not None and item.start == 0
+        if ends and item.s is parser.start:
+            return item.node
     raise NotGrammatical(len(words))
 
 

@@ -13,8 +13,8 @@ from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.mentions import Mention
 from fleet.language.resolve.nouns import PLACES, THINGS
 from fleet.language.resolve.senses import Senses
-from fleet.language.resolve.wishes import framed
 from fleet.language.resolve.states import of_each
+from fleet.language.resolve.wishes import framed
 from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.nodes import Argument, Clause, Nouns, Place
 from fleet.language.vocabulary import Vocabulary
@@ -137,7 +137,7 @@ class Claims(Senses):
         for place in names:
             self.fact(SEARCHED, place, value)
 
-    # --- kinds of statements ------------------------------------------------------------------------
+    # --- kinds of statements ----------------------------------------------------------------------
     def _claims(self) -> None:
         """Whether statements are understood here."""
         if self.mode == "goal":
@@ -145,25 +145,6 @@ class Claims(Senses):
                 f"{self.said.line!r} states a fact; a goal says what should be: "
                 '"the cup should be in the hallway"'
             )
-
-    def on_being(self, clause: Clause) -> None:
-        assert clause.subject is not None
-        if self.said.elliptic == "be":
-            self._to_be(clause.subject, clause.predicate, clause.arguments)
-            return
-        self._claims()
-        predicate = clause.predicate
-        if predicate is None:
-            raise NotUnderstood(f"{self.said.clause!r} is not understood as a fact: {SAY_IT}")
-        if predicate.kind == "placed":
-            self.placed(clause.subject, predicate.arguments)
-        elif predicate.kind == "state":
-            self._are(clause.subject, predicate.words, False)
-        else:
-            self._were(clause, True)
-
-    def _to_be(self, subject: Nouns, predicate: object, arguments: Sequence[Argument]) -> None:
-        raise NotImplementedError
 
     def _are(self, nouns: Nouns, words: Sequence[Lexeme], negated: bool) -> None:
         self.said.elliptic = "are"
@@ -231,13 +212,6 @@ class Claims(Senses):
         assert clause.subject is not None
         self.lost(clause.subject)
 
-    def on_there(self, clause: Clause) -> None:
-        assert clause.subject is not None
-        if self.said.elliptic == "be":
-            return self._to_be(clause.subject, None, clause.arguments)
-        self._claims()
-        return self.placed(clause.subject, clause.arguments)
-
     def on_inverted(self, clause: Clause) -> None:
         self._claims()
         assert clause.subject is not None
@@ -303,7 +277,7 @@ class Claims(Senses):
             )
         self.fact(AT, speaker, where.target)
 
-    # --- questions ----------------------------------------------------------------------------------
+    # --- questions --------------------------------------------------------------------------------
     def _asks(self, clause: Clause) -> None:
         if self.mode:
             raise NotUnderstood(
@@ -358,8 +332,7 @@ class Claims(Senses):
                 raise NotUnderstood(f"{self.said.clause!r} is a question that is not understood")
         if words:
             held = {
-                (relation, value)
-                for relation, _, value in of_each(self.stated, words, names[:1])
+                (relation, value) for relation, _, value in of_each(self.stated, words, names[:1])
             }
             return tuple(Condition(relation=r, subject="?", value=v) for r, v in sorted(held))
         if not arguments:

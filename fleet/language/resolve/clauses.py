@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import one_of, reason_for
+from fleet.language.refusals import reason_for
 from fleet.language.resolve.claims import SAY_IT, Claims
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.nouns import PLACES, THINGS
@@ -15,7 +15,7 @@ from fleet.language.resolve.stages import GoalDraft
 from fleet.language.resolve.wishes import EXAMPLE, Frame, framed
 from fleet.language.tagging.skill_words import SKILL, SkillFrame
 from fleet.language.tagging.tagger import Lexeme
-from fleet.language.tree.nodes import Argument, Clause, Nouns, Place, Predicate
+from fleet.language.tree.nodes import Argument, Clause, Nouns, Predicate
 from fleet.language.words.tokens import Phrase
 from keyexpr_schema.facts import AT, HELD, LOCATED, SEARCHED
 from keyexpr_schema.payloads.goals import Condition
@@ -51,9 +51,7 @@ class Clauses(Claims):
         assert clause.subject is not None
         who = self.subjects(clause.subject, THINGS, "an object or a robot")
         self.check_robots(who)
-        self.said.addressees = [
-            s for s in who if not (isinstance(s, NounPhrase) and s.generic)
-        ]
+        self.said.addressees = [s for s in who if not (isinstance(s, NounPhrase) and s.generic)]
         self._verb(clause, who)
 
     def _verb(self, clause: Clause, who: Sequence[Subject] | None) -> None:
@@ -61,9 +59,7 @@ class Clauses(Claims):
         problems: list[NotUnderstood] = []
         frames = self._frames(clause.verb, clause.arguments, ("VERB", "FIN", "GER"))
         if not frames:
-            raise NotUnderstood(
-                f"{clause.verb.text!r} is not understood as a goal: {EXAMPLE}"
-            )
+            raise NotUnderstood(f"{clause.verb.text!r} is not understood as a goal: {EXAMPLE}")
         for frame, phrases in frames:
             before = self.said
             self.said = before.copy()
@@ -133,12 +129,10 @@ class Clauses(Claims):
             if modal == "can" and clause.predicate is not None and clause.subject is not None:
                 self._claims()
                 return self.placed(clause.subject, clause.predicate.arguments)
-            raise NotUnderstood(
-                f"{modal!r} is uncertain; say what holds, or what should hold"
-            )
+            raise NotUnderstood(f"{modal!r} is uncertain; say what holds, or what should hold")
         if self.mode == "fact":
             raise NotUnderstood(f"{self.said.line!r} is a goal and not a fact: {SAY_IT}")
-        self._to_be(clause.subject, clause.predicate, clause.arguments)
+        return self._to_be(clause.subject, clause.predicate, clause.arguments)
 
     def _to_be(
         self, subject: Nouns | None, predicate: Predicate | None, arguments: Sequence[Argument]
@@ -247,7 +241,31 @@ class Clauses(Claims):
             )
         return self.to_target(who, where, home)
 
-    # --- what goes on from a clause before ---------------------------------------------------------
+    # --- what is so, or shall be so after "make sure that" ----------------------------------------
+    def on_being(self, clause: Clause) -> None:
+        assert clause.subject is not None
+        if self.said.elliptic == "be":
+            self._to_be(clause.subject, clause.predicate, clause.arguments)
+            return
+        self._claims()
+        predicate = clause.predicate
+        if predicate is None:
+            raise NotUnderstood(f"{self.said.clause!r} is not understood as a fact: {SAY_IT}")
+        if predicate.kind == "placed":
+            self.placed(clause.subject, predicate.arguments)
+        elif predicate.kind == "state":
+            self._are(clause.subject, predicate.words, False)
+        else:
+            self._were(clause, True)
+
+    def on_there(self, clause: Clause) -> None:
+        assert clause.subject is not None
+        if self.said.elliptic == "be":
+            return self._to_be(clause.subject, None, clause.arguments)
+        self._claims()
+        return self.placed(clause.subject, clause.arguments)
+
+    # --- what goes on from a clause before --------------------------------------------------------
     def on_bare(self, clause: Clause) -> None:
         """`and the book to the kitchen`, `and the second cup in the hallway`."""
         assert clause.subject is not None
@@ -302,7 +320,7 @@ class Clauses(Claims):
             where, home = self.whereto(framed(clause.arguments))
             self.to_target([meant], where, home)
 
-    # --- what shall stay, or never be ---------------------------------------------------------------
+    # --- what shall stay, or never be -------------------------------------------------------------
     def on_kept(self, clause: Clause) -> None:
         self.said.always.extend(self._aside(clause.subject, clause.predicate))
 
@@ -370,7 +388,7 @@ class Clauses(Claims):
         )
         return None
 
-    # --- questions that are goals, for those who cannot be answered ----------------------------------
+    # --- questions that are goals, for those who cannot be answered -------------------------------
     def on_where(self, clause: Clause) -> None:
         assert clause.subject is not None
         if self.mode == "goal":
@@ -411,5 +429,3 @@ def _fitted(
             themes = (at.nouns,)
         break
     return Frame(verb, senses, themes, tuple(places), tuple(left), frame.but)
-
-

@@ -1,4 +1,4 @@
-"""What a text has said so far: whom pronouns mean, where "there" is, what is wanted and held true."""
+"""What a text has said so far: whom pronouns mean, where "there" is, what is wanted and so."""
 
 from __future__ import annotations
 

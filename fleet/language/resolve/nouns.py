@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import listed, one_of, suggestion
+from fleet.language.refusals import listed, nearest, one_of, suggestion
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.states import Stated
@@ -417,7 +417,7 @@ class NounResolver:
         for part in (shown, " ".join(words_of(shown)), *single):
             if part.casefold() not in ORDINALS and not hint:
                 hint = suggestion(part, names)
-        known = listed(self.lexicon.known(types))
+        known = nearest(self.lexicon.known(types), " ".join(single))
         bare = what.removeprefix("a ").removeprefix("an ")
         return NotUnderstood(f"{shown!r} is not a known {bare}{hint}; known are {known}")
 

@@ -151,7 +151,9 @@ class PlaceResolver(NounResolver):
         text, owners = self.said.quote(noun.first, noun.last), self._with_baskets()
         if noun.owner is not None:
             owner = self.noun(noun.owner, ("robot",), "a robot")
-            owner = owner.among(owners) if owner.generic or owner.quantity is Quantity.ANY else owner
+            owner = (
+                owner.among(owners) if owner.generic or owner.quantity is Quantity.ANY else owner
+            )
             if not owner.found:
                 raise NotUnderstood("no robot with a basket is known")
             return owner

@@ -49,7 +49,7 @@ class Senses(Wishes):
 
     def _look_in(self, places: Sequence[Place]) -> None:
         if not places:
-            return
+            return None
         if any(p.role not in ("in", "from", "around") and p.special != "house" for p in places):
             raise NotUnderstood(f"{self.said.clause!r}: things are looked for in places")
         if len(places) > 1 and all(p.nouns and len(p.nouns.items) == 1 for p in places):
@@ -168,8 +168,10 @@ class Senses(Wishes):
         """The places that noun phrases name, and places of surfaces."""
         if not self.vocabulary.places:
             raise NotUnderstood("no place is known yet: register one")
-        if len(nouns.items) == 1 and nouns.items[0].form == "general" and self.can_be(
-            nouns, ("object",)
+        if (
+            len(nouns.items) == 1
+            and nouns.items[0].form == "general"
+            and self.can_be(nouns, ("object",))
         ):  # "everything"
             return [Mention(tuple(self.vocabulary.places), "place", nouns.items[0].first)]
         mentions = []
@@ -239,14 +241,12 @@ class Senses(Wishes):
         mentions = self.those(things, able, phrase.verb, source, surface)
         self.said.remember(mentions)
         for mention in mentions:
-            names = [self.vocabulary.objects[n] for n in mention.subjects]
-            fitting = next((p for p in phrases if all(map(p.fits, names))), phrase)
+            meant = [self.vocabulary.objects[n] for n in mention.subjects]
+            fitting = next((p for p in phrases if all(map(p.fits, meant))), phrase)
             self.wish([mention], fitting.wants)
         return None
 
-    def _done_by(
-        self, frame: Frame, phrase: SkillPhrase, who: Sequence[Subject] | None
-    ) -> None:
+    def _done_by(self, frame: Frame, phrase: SkillPhrase, who: Sequence[Subject] | None) -> None:
         """`dock`: a robot does it with itself; any that can, where nobody is named."""
         if frame.themes or frame.places or frame.particle_words:
             raise NotUnderstood(f"{self.said.clause!r}: that is done to nothing and nowhere")
@@ -429,6 +429,3 @@ class Senses(Wishes):
                     f"{' and '.join(names)} cannot be told to do it: a goal says what must hold, "
                     "and the allocator finds who does it; leave the name out"
                 )
-
-
-

@@ -6,8 +6,8 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.resolve.mentions import Mention
 from fleet.language.refusals import one_of
+from fleet.language.resolve.mentions import Mention
 from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, SEARCHED, Value
 from keyexpr_schema.payloads.goals import Condition
 

@@ -48,7 +48,7 @@ class Stated:
         words = [w for w in self.states.get(lexeme.words, ()) if self.fits(w, name)]
         if not words:
             raise NotUnderstood(f"{name} cannot be {lexeme.text}")
-        wants = dict((w.relation, w.value) for w in reversed(words))
+        wants = {w.relation: w.value for w in reversed(words)}
         if not negated:
             return tuple(wants.items())
         if len(wants) != 1 or not isinstance(words[0].value, bool):

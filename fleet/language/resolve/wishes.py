@@ -273,7 +273,7 @@ class Wishes(PlaceResolver):
 
     def go(self, frame: Frame, who: Sequence[Subject] | None) -> None:
         """`go to PLACE`; any robot goes if nobody is named."""
-        if frame.home or frame.particle_words & {"back"} and not frame.places:
+        if frame.home or (frame.particle_words & {"back"} and not frame.places):
             raise NotUnderstood("a robot has no home: name the place where it shall go")
         if other := [p for p in frame.places if p.role not in WHERE]:
             shown = [(word, word) for word in other[0].preposition.split()]

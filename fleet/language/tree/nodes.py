@@ -23,7 +23,7 @@ class Noun:
 
     `form`: `noun`; `general` (everything, something, everybody); `one` ("the second one");
     `headless` ("the second"); `pronoun`; `me`; `basket`. `other`: "other", "another" or "rest".
-    `part`: "one of", so that a plural noun is one thing. `but` are left out. `owner` has the basket.
+    `part`: "one of", so that a plural noun is one thing. `but` are left out. `owner` has a basket.
     """
 
     form: str

@@ -158,14 +158,13 @@ def _of_day(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
         clock_at = _clock(words, 3) if words[2:3] == ["at"] else None
         hour, minute, end = clock_at or (8, 0, end)
         return end, TimePhrase("start", hour=hour, minute=minute, weekday=day)
-    kind = {"at": "start", "after": "start", "from": "start", "before": "due", "by": "due"}.get(
-        words[0], {"until": "due", "till": "due"}.get(words[0])
-    )
-    clock = _clock(words, 1) if kind else None
-    if kind is None or clock is None:
+    kinds = {"at": "start", "after": "start", "from": "start", "before": "due", "by": "due"}
+    meant = kinds.get(words[0])
+    on_clock = _clock(words, 1) if meant else None
+    if meant is None or on_clock is None:
         return None
     days = 0
-    end = clock[2]
+    hour, minute, end = on_clock
     if words[end : end + 1] in (["today"], ["tomorrow"]):
         days, end = int(words[end] == "tomorrow"), end + 1
-    return end, TimePhrase(kind, hour=clock[0], minute=clock[1], days=days)
+    return end, TimePhrase(meant, hour=hour, minute=minute, days=days)

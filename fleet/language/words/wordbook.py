@@ -17,7 +17,23 @@ from fleet.language.words.tokens import Phrase, tokens_of
 
 _SHIPPED = Path(__file__).parent.parent / "data"
 _GRAMMAR = frozenset(
-    "DET INDEF UNIV PRON BE AND OR THEN OF NOT THERE HERE HAVE BEEN PREP".split()
+    [
+        "DET",
+        "INDEF",
+        "UNIV",
+        "PRON",
+        "BE",
+        "AND",
+        "OR",
+        "THEN",
+        "OF",
+        "NOT",
+        "THERE",
+        "HERE",
+        "HAVE",
+        "BEEN",
+        "PREP",
+    ]
 )
 
 

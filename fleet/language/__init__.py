@@ -7,7 +7,7 @@ sentence that says which words those are and what is known. `docs/language.md` h
 
 from fleet.language.reader import read, read_goal, statement_facts
 from fleet.language.reading import Ambiguity, Reading, WantedGoal
-from fleet.language.resolve.claims import Question
+from fleet.language.resolve.scene import Question
 from fleet.language.vocabulary import SkillPhrase, Vocabulary
 
 __all__ = [

@@ -11,11 +11,11 @@ from fleet.errors import NotUnderstood
 from fleet.language.grammar.chart import NotGrammatical, parsed
 from fleet.language.reading import Ambiguity, Reading, WantedGoal
 from fleet.language.refusals import listed, nearest, reason_for, suggestion
-from fleet.language.resolve.claims import SAY_IT, Question
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
+from fleet.language.resolve.frames import EXAMPLE, SAY_IT
+from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.resolve.wishes import EXAMPLE
 from fleet.language.segments import Segment, Sentence, cut, sentences_of
 from fleet.language.tagging.lexicon import ENTITY_TYPES
 from fleet.language.tagging.tagger import Lexeme, Tagger
@@ -166,10 +166,11 @@ class Reader:
         draft = said.draft
         if segment.always:
             said.draft = GoalDraft(self.vocabulary.is_at)
-        resolver = Clauses(self.vocabulary, self.tagger, said, mode)
+        scene = Scene(self.vocabulary, self.tagger, said, mode)
+        resolver = Clauses(scene)
         for clause in clauses:
             resolver.clause(clause)
-        said = resolver.said
+        said = scene.said
         if segment.always:
             said.always.extend(c for stage in said.draft.conditions() for c in stage)
             said.draft = draft
@@ -183,7 +184,7 @@ class Reader:
                     value = not value
                 said.when.append(Condition(relation=relation, subject=subject, value=value))
             said.elliptic = ""
-        return said, resolver.question
+        return said, scene.question
 
     # --- people speaking of themselves ------------------------------------------------------------
     def _said_of_oneself(self, sentence: Sentence) -> bool:

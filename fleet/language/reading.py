@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fleet.language.resolve.claims import Question
+from fleet.language.resolve.scene import Question
 from keyexpr_schema.facts import Literal
 from keyexpr_schema.payloads.goals import Condition
 
@@ -38,8 +38,7 @@ class Reading:
 
     `facts` are said in it. `presumed` are facts that it takes for granted: "bring the first cup
     from the kitchen …" presumes `at(cup_1) = kitchen`; they are no part of the goal. `remarks` are
-    parts
-    of the text that ask for nothing, as it was written: "I have a headache".
+    parts of the text that ask for nothing, as it was written: "I have a headache".
     """
 
     text: str

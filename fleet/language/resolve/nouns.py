@@ -1,39 +1,34 @@
-"""Who and what noun phrases mean, in this world and in this text."""
+"""What noun phrases can mean, in this world and in this text."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, nearest, one_of, suggestion
-from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
-from fleet.language.resolve.states import Stated
+from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import CATEGORIES, ENTITY_TYPES, Entity, EntityType
-from fleet.language.tagging.tagger import Tagger
-from fleet.language.tree.nodes import Noun, Nouns, Quantity
-from fleet.language.vocabulary import Vocabulary
-from fleet.language.words.morphology import participles
+from fleet.language.tree.nodes import (
+    Noun,
+    Nouns,
+    Quantity,
+)
 from fleet.language.words.tokens import ORDINALS, Token, words_of
-from keyexpr_schema.facts import AT, FactKey, Literal
-from keyexpr_schema.payloads.world import Feature
 
-THINGS: tuple[EntityType, ...] = ("object", "robot")
-PLACES: tuple[EntityType, ...] = ("place", "surface")
-SPOTS: tuple[EntityType, ...] = ("place", "robot", "surface")
 _PLURAL = frozenset({"them", "they", "these", "those", "both", "all", "each"})
 
 
 class NounResolver:
     """Finds out whom noun phrases mean."""
 
-    def __init__(self, vocabulary: Vocabulary, tagger: Tagger, said: Discourse) -> None:
-        self.vocabulary, self.tagger, self.said = vocabulary, tagger, said
-        self.lexicon = tagger.lexicon
-        self.stated = Stated(vocabulary, tagger)
+    def __init__(self, scene: Scene, who: Referents) -> None:
+        self.scene = scene
+        self.who = who
+        self.located: Callable[[Noun, NounPhrase], NounPhrase] = lambda noun, made: made
 
-    # --- subjects ---------------------------------------------------------------------------------
     def subjects(self, nouns: Nouns, types: Sequence[EntityType], what: str) -> list[Subject]:
         """All that a list of noun phrases means.
 
@@ -53,7 +48,7 @@ class NounResolver:
     def subject(self, noun: Noun, types: Sequence[EntityType], what: str) -> Subject:
         """Whom one noun phrase or pronoun means."""
         if noun.form == "pronoun":
-            return self._pronoun(noun)
+            return self.pronoun(noun)
         if noun.form == "me":
             return self.speaker(noun, "object")
         return self.noun(noun, types, what)
@@ -62,10 +57,10 @@ class NounResolver:
         """Whether all of them can be of one of these types, by their words."""
         for noun in nouns.items:
             if noun.form == "pronoun":
-                if not any(m.type in types for m in self.said.recent):
+                if not any(m.type in types for m in self.scene.said.recent):
                     return False
             elif noun.form == "me":
-                if self.vocabulary.speaker is None or "object" not in types:
+                if self.scene.vocabulary.speaker is None or "object" not in types:
                     return False
             else:
                 try:
@@ -80,11 +75,11 @@ class NounResolver:
         Raises:
             NotUnderstood: nobody knows.
         """
-        text = self.said.quote(noun.first, noun.last)
+        text = self.scene.said.quote(noun.first, noun.last)
         found = tuple(
             e
-            for e in self.lexicon.entities
-            if e.type == as_type and e.id == self.vocabulary.speaker
+            for e in self.scene.lexicon.entities
+            if e.type == as_type and e.id == self.scene.vocabulary.speaker
         )
         if not found:
             raise NotUnderstood(
@@ -92,16 +87,16 @@ class NounResolver:
             )
         return NounPhrase(found, text, noun.first, exact=True)
 
-    def _pronoun(self, noun: Noun) -> Mention:
+    def pronoun(self, noun: Noun) -> Mention:
         word = noun.words[0]
         plural = word in _PLURAL or len(noun.words) > 1
-        meant = [m for m in self.said.recent if m.single != plural]
+        meant = [m for m in self.scene.said.recent if m.single != plural]
         count = 2 if word == "both" else int(word) if word.isdecimal() else None
         if len(meant) == 1 and count in (None, len(meant[0].subjects)):
             return meant[0]
-        names = sorted({s for m in self.said.recent for s in m.subjects})
+        names = sorted({s for m in self.scene.said.recent for s in m.subjects})
         reason = f"could be {one_of(names)}" if names else "refers to nothing before it"
-        text = self.said.quote(noun.first, noun.last)
+        text = self.scene.said.quote(noun.first, noun.last)
         raise NotUnderstood(f"{text!r} {reason}: name what you mean")
 
     def _either(self, first: Subject, second: Subject) -> NounPhrase:
@@ -115,23 +110,27 @@ class NounResolver:
         )
         return NounPhrase(both, f"{first.text} or {second.text}", first.key, Quantity.ANY)
 
-    # --- noun phrases -----------------------------------------------------------------------------
     def noun(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
-        """What a noun phrase can mean.
+        """What a noun phrase can mean; its own words may say where it is.
 
         Raises:
             NotUnderstood: nothing known of these types; the message lists what is.
         """
-        text = self.said.quote(noun.first, noun.last)
+        return self.located(noun, self._described_by_words(noun, types, what))
+
+    def _described_by_words(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
+        text = self.scene.said.quote(noun.first, noun.last)
         made = NounPhrase((), text, noun.first, noun.quantity, count=noun.count)
         made = self._headed(noun, made, types, what)
         if noun.use is not None:
             made = self._useful(made, noun.use)
         for adjective in noun.adjectives:
-            made = self.stated.narrowed(made, adjective, self.said)
+            made = self.scene.stated.narrowed(made, adjective, self.scene.said)
         for relative in noun.relatives:
             if relative.state is not None:
-                made = self.stated.narrowed(made, relative.state, self.said, relative.negated)
+                made = self.scene.stated.narrowed(
+                    made, relative.state, self.scene.said, relative.negated
+                )
         if noun.but is not None:
             made = self._without(made, noun.but, types, what)
         made = replace(made, plural=made.plural and not noun.part)
@@ -167,13 +166,13 @@ class NounResolver:
         self, words: tuple[str, ...], text: str, types: Sequence[EntityType]
     ) -> tuple[Entity, ...]:
         """Those whose whole name it is; a kind that has several members is none."""
-        end, found = self.lexicon.exact(_tokens(words), 0, types)
+        end, found = self.scene.lexicon.exact(_tokens(words), 0, types)
         if end != len(words):
             return ()
         raw = text.casefold()
         if len(found) > 1:
             found = tuple(e for e in found if e.id.casefold() == raw) or found
-        if found and self.lexicon.is_several(words, types):
+        if found and self.scene.lexicon.is_several(words, types):
             found = tuple(e for e in found if e.id.casefold() == raw)
         return found
 
@@ -182,14 +181,14 @@ class NounResolver:
     ) -> NounPhrase:
         words = noun.head[0].words
         tokens = _tokens(words)
-        end, found = self.lexicon.described(tokens, 0, types)
+        end, found = self.scene.lexicon.described(tokens, 0, types)
         # "The kitchen" is the place of that name, and no table that is called by it, too.
-        named_end, named = self.lexicon.exact(tokens, 0, ENTITY_TYPES)
+        named_end, named = self.scene.lexicon.exact(tokens, 0, ENTITY_TYPES)
         other = named and named_end == len(words) and all(e.type == "place" for e in named)
         if end != len(words) or not found or (other and "place" not in types):
             raise self.unknown(noun, types, what)
         plural, generic = False, False
-        kind = self.lexicon.kind(tokens, 0, end, types)
+        kind = self.scene.lexicon.kind(tokens, 0, end, types)
         if kind is not None and (of_kind := tuple(e for e in found if e in kind[1])):
             plural, found = kind[0], of_kind
             category = any(words[0] in (c, f"{c}s") for cs in CATEGORIES.values() for c in cs)
@@ -211,7 +210,7 @@ class NounResolver:
         words = tuple(word for lexeme in noun.of if "NOUN" in lexeme.tags for word in lexeme.words)
         if any("UNK" in lexeme.tags for lexeme in noun.of):
             raise self.unknown(noun, types, what)
-        named = self.lexicon.meant(words)
+        named = self.scene.lexicon.meant(words)
         narrower = tuple(e for e in found if e in named)
         if not narrower:
             raise self.unknown(noun, types, what)
@@ -223,13 +222,13 @@ class NounResolver:
         tags = noun.head[0].tags
         entity_type: EntityType = "robot" if "EVERYONE" in tags else "object"
         quantity = Quantity.ANY if "SOMETHING" in tags else Quantity.ALL
-        found = tuple(e for e in self.lexicon.entities if e.type == entity_type)
+        found = tuple(e for e in self.scene.lexicon.entities if e.type == entity_type)
         if entity_type not in types or not found:
             raise self.unknown(noun, types, what)
         return replace(made, found=found, quantity=quantity, generic=entity_type == "object")
 
     def _useful(self, made: NounPhrase, verb: str) -> NounPhrase:
-        known = {use for e in self.lexicon.entities if e.type == "object" for use in e.uses}
+        known = {use for e in self.scene.lexicon.entities if e.type == "object" for use in e.uses}
         found = tuple(e for e in made.found if verb in e.uses)
         if not found:
             raise NotUnderstood(
@@ -244,7 +243,7 @@ class NounResolver:
         gone = {
             name
             for subject in self.subjects(but, types, what)
-            for name in self.resolve(subject).subjects
+            for name in self.who.resolve(subject).subjects
         }
         names = set(made.names)
         if stray := sorted(gone - names):
@@ -277,7 +276,7 @@ class NounResolver:
         cup" always: that they differ follows from where they are wanted.
         """
         known = set(made.names)
-        gone = [m for m in self.said.mentioned if known & set(m.subjects)]
+        gone = [m for m in self.scene.said.mentioned if known & set(m.subjects)]
         opened = {m.key for m in gone if m.open}
         left = made.among(known - {s for m in gone if not m.open for s in m.subjects})
         spare = len(left.names) - len(opened)
@@ -291,133 +290,27 @@ class NounResolver:
     @property
     def kind(self) -> tuple[Entity, ...]:
         """Whom "one" may mean in "the second one"."""
-        return () if self.said.kind_of is None else self.lexicon.kin(self.said.kind_of)
+        return (
+            ()
+            if self.scene.said.kind_of is None
+            else self.scene.lexicon.kin(self.scene.said.kind_of)
+        )
 
     def _remember_kind(self, entity: Entity) -> None:
         if entity.type in ("object", "robot"):
-            self.said.kind_of = entity
+            self.scene.said.kind_of = entity
 
-    # --- who is meant -----------------------------------------------------------------------------
-    def resolve(
-        self, subject: Subject, source: str | None = None, surface: str | None = None
-    ) -> Mention:
-        """Who is meant; with `source`, by those who are believed to be there (on a `surface`).
-
-        Raises:
-            NotUnderstood: it does not say which of several, or counts wrongly.
-        """
-        if isinstance(subject, Mention):
-            mention = subject
-        else:
-            if subject.source is not None:
-                source, surface = subject.source, subject.source_surface
-            mention = subject.resolve() if source is None else self._at(subject, source, surface)
-        if source is not None and not mention.open:
-            self.said.presumed.extend(
-                Literal(FactKey(AT, name), source) for name in mention.subjects
-            )
-        return mention
-
-    def _at(self, noun: NounPhrase, source: str, surface: str | None) -> Mention:
-        """Who is meant by "all cups" when it is said that they come from a place."""
-        try:
-            mention = noun.resolve()
-            if not mention.selective:
-                return mention
-        except NotUnderstood as error:
-            reason: str | None = str(error)
-        else:
-            reason = None
-        there = [name for name in noun.names if self.vocabulary.is_at(name, source)]
-        if surface is not None:
-            there = self._on(surface, there, all_of_them=reason is None and not mention.open)
-        if there:
-            return replace(noun.among(there).resolve(), key=noun.key)
-        where = f"on {surface}" if surface is not None else f"in {source}"
-        raise NotUnderstood(
-            reason or f"it is not known which of {one_of(noun.names)} are {where}: name them"
-        )
-
-    def _on(self, surface: str, there: Sequence[str], all_of_them: bool) -> list[str]:
-        unsure = [name for name in there if name not in self.vocabulary.rests]
-        if unsure and all_of_them:
-            raise NotUnderstood(
-                f"it is not known whether {one_of(unsure)} lies on {surface}: name the things, or "
-                "have the place searched first"
-            )
-        return [name for name in there if self.vocabulary.rests.get(name) == surface] or unsure
-
-    # --- who can be meant -------------------------------------------------------------------------
-    def movable(self, subject: Subject) -> Subject:
-        """The same, without what cannot be moved where the words leave that open.
-
-        Raises:
-            NotUnderstood: what is named cannot be moved.
-        """
-        if isinstance(subject, Mention) or subject.type != "object":
-            return subject
-        things = self.vocabulary.objects.values()
-        return self.fit(subject, {o.object for o in things if o.is_a(Feature.MOVABLE)}, "move")
-
-    def fit(self, subject: Subject, able: Collection[str], verb: str) -> Subject:
-        """The same, without those that the verb cannot be done to where the words leave that open.
-
-        Raises:
-            NotUnderstood: it cannot be done to what is named.
-        """
-        names = subject.names if isinstance(subject, NounPhrase) else subject.subjects
-        if subject.type != "object" or not (others := [n for n in names if n not in able]):
-            return subject
-        if isinstance(subject, NounPhrase):
-            left = subject.among(able)
-            if left.found and (subject.generic or subject.quantity is Quantity.ANY):
-                return left
-        text = subject.text if isinstance(subject, NounPhrase) else self.said.line
-        done = " ".join([participles(verb.split()[0])[0], *verb.split()[1:]])
-        raise NotUnderstood(f"{text!r}: {one_of(others)} cannot be {done}")
-
-    def drivers(self, subject: Subject) -> Subject:
-        """The same, with only robots that can drive where the words leave open which robot.
-
-        Raises:
-            NotUnderstood: no robot that could be meant can drive.
-        """
-        if isinstance(subject, Mention) or subject.type != "robot" or subject.exact:
-            return subject
-        if subject.quantity is not Quantity.ANY and subject.plural:
-            return subject
-        able = subject.among(self.able_to_drive())
-        if not able.found:
-            raise NotUnderstood(f"{subject.text!r}: no such robot that can drive is known")
-        return able
-
-    def able_to_drive(self) -> list[str]:
-        """Robots with the skill to go somewhere."""
-        return sorted(n for n, spec in self.vocabulary.robots.items() if "navigate" in spec.skills)
-
-    def some_robot(self) -> Mention:
-        """Any robot that can drive, where nobody is named.
-
-        Raises:
-            NotUnderstood: there is none.
-        """
-        able = tuple(self.able_to_drive())
-        if not able:
-            raise NotUnderstood("no robot that can drive is known yet, so nobody can go anywhere")
-        return Mention(able, "robot", self.said.ended, open=len(able) > 1)
-
-    # --- refusals ---------------------------------------------------------------------------------
     def unknown(self, noun: Noun, types: Sequence[EntityType], what: str) -> NotUnderstood:
         """The phrase names nothing known of these types."""
         strange = [word for word in noun.head if "UNK" in word.tags]
-        shown = self.said.quote(noun.first, noun.last)
-        names = self.lexicon.names_in(types) | set(ORDINALS)
+        shown = self.scene.said.quote(noun.first, noun.last)
+        names = self.scene.lexicon.names_in(types) | set(ORDINALS)
         single = [word.text for word in strange] or shown.split()
         hint = ""
         for part in (shown, " ".join(words_of(shown)), *single):
             if part.casefold() not in ORDINALS and not hint:
                 hint = suggestion(part, names)
-        known = nearest(self.lexicon.known(types), " ".join(single))
+        known = nearest(self.scene.lexicon.known(types), " ".join(single))
         bare = what.removeprefix("a ").removeprefix("an ")
         return NotUnderstood(f"{shown!r} is not a known {bare}{hint}; known are {known}")
 

@@ -7,11 +7,23 @@ from dataclasses import dataclass, replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of, reason_for
-from fleet.language.resolve.mentions import NounPhrase
-from fleet.language.resolve.nouns import SPOTS, NounResolver
+from fleet.language.resolve.frames import EXAMPLE
+from fleet.language.resolve.mentions import Mention, NounPhrase
+from fleet.language.resolve.nouns import NounResolver
+from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.scene import PLACES, SPOTS, Scene
 from fleet.language.tagging.lexicon import EntityType
-from fleet.language.tree.nodes import Noun, Place, Quantity
-from keyexpr_schema.facts import AT, IN, ON
+from fleet.language.tree.nodes import (
+    Noun,
+    Nouns,
+    Place,
+    Quantity,
+)
+from keyexpr_schema.facts import (
+    AT,
+    IN,
+    ON,
+)
 from keyexpr_schema.payloads.world import Feature
 
 _ON = frozenset({"on", "onto", "top"})
@@ -48,12 +60,14 @@ class Where:
     relation: str = AT
 
 
-class PlaceResolver(NounResolver):
+class PlaceResolver:
     """Finds out where phrases of place point."""
 
-    def noun(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
-        """What a noun phrase can mean; its own words may say where it is."""
-        return self.located(noun, super().noun(noun, types, what))
+    def __init__(self, scene: Scene, who: Referents, nouns: NounResolver) -> None:
+        self.scene = scene
+        self.who = who
+        self.nouns = nouns
+        nouns.located = self.located
 
     def locative(self, place: Place) -> Locative:
         """What a phrase of place says.
@@ -63,7 +77,7 @@ class PlaceResolver(NounResolver):
                 person, a robot, or a robot's basket.
         """
         words = frozenset(place.preposition.split())
-        text = self.said.quote(place.first, place.last)
+        text = self.scene.said.quote(place.first, place.last)
         if place.role not in WHERE:
             shown = [(word, word) for word in place.preposition.split()]
             raise NotUnderstood(reason_for(shown) or f"{text!r} is not understood")
@@ -77,8 +91,9 @@ class PlaceResolver(NounResolver):
             raise NotUnderstood("'or' leaves a choice that cannot be left open; say one of them")
         if len(place.nouns.items) > 1:
             last = place.nouns.items[-1]
+            text = self.scene.said.quote(last.first, last.last)
             raise NotUnderstood(
-                f"{self.said.quote(last.first, last.last)!r} is one place too many for one thing; "
+                f"{text!r} is one place too many for one thing; "
                 'if one is to come after the other, say "then"'
             )
         noun = place.nouns.items[0]
@@ -89,17 +104,17 @@ class PlaceResolver(NounResolver):
         if noun.form == "basket":
             return self._basket(noun)
         if noun.form == "me":
-            return self.speaker(noun)
+            return self.nouns.speaker(noun)
         if noun.form == "pronoun":
             return self._it(noun)
-        if self.vocabulary.good_for:
+        if self.scene.vocabulary.good_for:
             self._refuse_thing(noun)
-        return self.noun(noun, SPOTS, "a place")
+        return self.nouns.noun(noun, SPOTS, "a place")
 
     def _it(self, noun: Noun) -> NounPhrase:
-        mention = self._pronoun(noun)
-        text = self.said.quote(noun.first, noun.last)
-        entities = {e.id: e for e in self.lexicon.entities if e.type in SPOTS}
+        mention = self.nouns.pronoun(noun)
+        text = self.scene.said.quote(noun.first, noun.last)
+        entities = {e.id: e for e in self.scene.lexicon.entities if e.type in SPOTS}
         found = tuple(entities[name] for name in mention.subjects if name in entities)
         if mention.open or len(found) != len(mention.subjects):
             raise NotUnderstood(f"{text!r} is no place: nothing can be put there; name the place")
@@ -112,52 +127,54 @@ class PlaceResolver(NounResolver):
             NotUnderstood: it is.
         """
         try:
-            self.noun(noun, SPOTS, "")
+            self.nouns.noun(noun, SPOTS, "")
         except NotUnderstood:
             pass
         else:
             return
         try:
-            thing = self.noun(noun, ("object",), "")
+            thing = self.nouns.noun(noun, ("object",), "")
         except NotUnderstood:
             return
         raise NotUnderstood(f"{thing.text!r}: nothing can be put on or in {one_of(thing.names)}")
 
     def _there(self, place: Place, text: str) -> NounPhrase:
-        if self.said.last_place is None:
+        if self.scene.said.last_place is None:
             raise NotUnderstood('"there" refers to no place before it: name the place')
-        entities = self.lexicon.entities
-        found = [e for e in entities if e.id == self.said.last_place and e.type != "object"]
+        entities = self.scene.lexicon.entities
+        found = [e for e in entities if e.id == self.scene.said.last_place and e.type != "object"]
         found = [e for e in found if e.type == "place"] or found
         return NounPhrase(tuple(found), text, place.first, exact=True)
 
     def _here(self, text: str) -> NounPhrase:
-        speaker = self.vocabulary.speaker
-        place = None if speaker is None else self.vocabulary.place_of(speaker)
-        found = tuple(e for e in self.lexicon.entities if e.type == "place" and e.id == place)
+        speaker = self.scene.vocabulary.speaker
+        place = None if speaker is None else self.scene.vocabulary.place_of(speaker)
+        found = tuple(e for e in self.scene.lexicon.entities if e.type == "place" and e.id == place)
         if not found:
             raise NotUnderstood(
                 f"{text!r} names somebody whose place is not known; name a place or a robot"
             )
         return NounPhrase(found, text, 0, exact=True)
 
-    def _with_baskets(self) -> list[str]:
+    def with_baskets(self) -> list[str]:
         return sorted(
-            n for n, spec in self.vocabulary.robots.items() if "basket" in spec.capabilities
+            n for n, spec in self.scene.vocabulary.robots.items() if "basket" in spec.capabilities
         )
 
     def _basket(self, noun: Noun) -> NounPhrase:
         """`the basket`, `the locobot's basket`, `the basket of the robot`."""
-        text, owners = self.said.quote(noun.first, noun.last), self._with_baskets()
+        text, owners = self.scene.said.quote(noun.first, noun.last), self.with_baskets()
         if noun.owner is not None:
-            owner = self.noun(noun.owner, ("robot",), "a robot")
+            owner = self.nouns.noun(noun.owner, ("robot",), "a robot")
             owner = (
                 owner.among(owners) if owner.generic or owner.quantity is Quantity.ANY else owner
             )
             if not owner.found:
                 raise NotUnderstood("no robot with a basket is known")
             return owner
-        found = tuple(e for e in self.lexicon.entities if e.type == "robot" and e.id in owners)
+        found = tuple(
+            e for e in self.scene.lexicon.entities if e.type == "robot" and e.id in owners
+        )
         if len(found) != 1:
             reason = f"could be that of {one_of(owners)}" if found else "is no robot's"
             raise NotUnderstood(f"{text!r} {reason}: say whose")
@@ -190,14 +207,14 @@ class PlaceResolver(NounResolver):
         source, _ = self._one(sources) if sources else (None, "place")
         if len(targets) == 1 and targets[0].noun.quantity is Quantity.ALL:
             each = targets[0].noun.resolve()
-            things = all(name in self.vocabulary.objects for name in each.subjects)
+            things = all(name in self.scene.vocabulary.objects for name in each.subjects)
             if (each.type == "place" or things) and len(each.subjects) > 1:
                 return Where(source, each=each.subjects, text=targets[0].noun.text)
         target, target_type = self._one(targets) if targets else (None, "place")
         if source is not None and source == target:
             raise NotUnderstood(f"the sentence says both from and to {source}: say where to")
         kind: EntityType = "robot" if target_type == "robot" else "place"
-        if target in self.vocabulary.objects:
+        if target in self.scene.vocabulary.objects:
             kind = "object"
         return Where(
             source,
@@ -214,13 +231,13 @@ class PlaceResolver(NounResolver):
         Raises:
             NotUnderstood: it is said to be on what opens, and things can only be in.
         """
-        good_for = self.vocabulary.good_for.get(target, frozenset())
+        good_for = self.scene.vocabulary.good_for.get(target, frozenset())
         words = {word for p in locatives if target in p.noun.names for word in p.words}
         if Feature.SUPPORTS in good_for:
             both = Feature.CONTAINS in good_for
             return ON if not both or words & _ON else IN if words & _IN else AT
         if Feature.CONTAINS in good_for:
-            if words & _ON and self.vocabulary.objects[target].is_a(Feature.OPENABLE):
+            if words & _ON and self.scene.vocabulary.objects[target].is_a(Feature.OPENABLE):
                 raise NotUnderstood(f"nothing can be put on {target}, only in it")
             return IN
         return AT
@@ -249,7 +266,10 @@ class PlaceResolver(NounResolver):
             for locative in locatives
             for name in locative.noun.names
             if all(
-                any(name == there or self.vocabulary.is_at(name, there) for there in p.noun.names)
+                any(
+                    name == there or self.scene.vocabulary.is_at(name, there)
+                    for there in p.noun.names
+                )
                 for p in locatives
             )
         )
@@ -262,7 +282,9 @@ class PlaceResolver(NounResolver):
         for relative in noun.relatives:
             if relative.negated:
                 gone = self.where([self.locative(p) for p in relative.places]).target or ""
-                return made.among([n for n in made.names if not self.vocabulary.is_at(n, gone)])
+                return made.among(
+                    [n for n in made.names if not self.scene.vocabulary.is_at(n, gone)]
+                )
         where = self.where([self.locative(place) for place in places])
         return replace(
             made,
@@ -276,10 +298,41 @@ class PlaceResolver(NounResolver):
         Raises:
             NotUnderstood: it is a thing, and not known where.
         """
-        place = self.vocabulary.place_of(target)
+        place = self.scene.vocabulary.place_of(target)
         if place is None:
             raise NotUnderstood(f"it is not known in which place {target} is: name the place")
         return place
+
+    def places(self, place: Place) -> tuple[str, ...]:
+        """The places behind a preposition: one, several, or all of them."""
+        if place.special == "house":
+            return tuple(self.scene.vocabulary.places)
+        if place.special == "there" and self.scene.said.last_place is not None:
+            return (self.scene.said.last_place,)
+        if place.nouns is None:
+            raise NotUnderstood(f"{self.scene.said.quote(place.first, place.last)!r} is no place")
+        return tuple(
+            dict.fromkeys(name for m in self.place_mentions(place.nouns) for name in m.subjects)
+        )
+
+    def place_mentions(self, nouns: Nouns) -> list[Mention]:
+        """The places that noun phrases name, and places of surfaces."""
+        if not self.scene.vocabulary.places:
+            raise NotUnderstood("no place is known yet: register one")
+        if (
+            len(nouns.items) == 1
+            and nouns.items[0].form == "general"
+            and self.nouns.can_be(nouns, ("object",))
+        ):  # "everything"
+            return [Mention(tuple(self.scene.vocabulary.places), "place", nouns.items[0].first)]
+        mentions = []
+        for subject in self.nouns.subjects(nouns, PLACES, "a place"):
+            mention = self.who.resolve(subject)
+            if mention.open or mention.type not in PLACES:
+                raise NotUnderstood(f"it does not say which place: {EXAMPLE}")
+            surfaces = subject.surfaces
+            mentions.append(replace(mention, surfaces=surfaces))
+        return mentions
 
 
 def _surface(locatives: Sequence[Locative], place: str | None) -> str | None:

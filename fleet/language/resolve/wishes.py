@@ -3,63 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, one_of, reason_for
+from fleet.language.resolve.frames import EXAMPLE, HOME_HINT, Frame
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
-from fleet.language.resolve.nouns import THINGS
+from fleet.language.resolve.nouns import NounResolver
 from fleet.language.resolve.places import WHERE, Locative, PlaceResolver, Where
+from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.scene import THINGS, Scene
 from fleet.language.tagging.lexicon import EntityType
-from fleet.language.tree.nodes import Argument, Except, Nouns, Particle, Place
-from keyexpr_schema.facts import AT, HELD, IN, ON
+from fleet.language.tree.nodes import (
+    Nouns,
+)
+from keyexpr_schema.facts import (
+    AT,
+    HELD,
+    IN,
+    ON,
+)
 from keyexpr_schema.payloads.world import Feature
 
-HOME_HINT = 'give it one with the field "home" of the object'
-EXAMPLE = 'say it like "bring the first cup to the hallway" or "send a robot to the kitchen"'
 _LOOSE = frozenset({"back", "away", "up", "over", "down", "off", "out"})
 
 
-@dataclass(frozen=True)
-class Frame:
-    """What stands behind a verb, sorted: noun phrases, phrases of place, particles."""
-
-    verb: str
-    senses: frozenset[str]
-    themes: tuple[Nouns, ...]
-    places: tuple[Place, ...]
-    particles: tuple[Particle, ...] = ()
-    but: tuple[Except, ...] = ()
-
-    @property
-    def home(self) -> bool:
-        """Whether a word says "home"."""
-        return any("HOME" in p.lexeme.tags for p in self.particles) or any(
-            place.special == "home" for place in self.places
-        )
-
-    @property
-    def particle_words(self) -> frozenset[str]:
-        """The particles that are left beside the verb's own."""
-        return frozenset(p.lexeme.word for p in self.particles if "HOME" not in p.lexeme.tags)
-
-
-def framed(
-    arguments: Sequence[Argument], verb: str = "", senses: frozenset[str] = frozenset()
-) -> Frame:
-    """The arguments of a clause, sorted."""
-    return Frame(
-        verb,
-        senses,
-        tuple(a for a in arguments if isinstance(a, Nouns)),
-        tuple(a for a in arguments if isinstance(a, Place)),
-        tuple(a for a in arguments if isinstance(a, Particle)),
-        tuple(a for a in arguments if isinstance(a, Except)),
-    )
-
-
-class Wishes(PlaceResolver):
+class Wishes:
     """Turns clauses about where things and robots shall be into wishes."""
+
+    def __init__(
+        self, scene: Scene, who: Referents, nouns: NounResolver, places: PlaceResolver
+    ) -> None:
+        self.scene = scene
+        self.who = who
+        self.nouns = nouns
+        self.places = places
 
     def move(self, frame: Frame) -> None:
         """`bring NP to PLACE`, `give NP to ROBOT`, `give ROBOT NP`, `put NP back`.
@@ -69,7 +47,7 @@ class Wishes(PlaceResolver):
         give = "give" in frame.senses and "move" not in frame.senses
         fetch, tidy = "fetch" in frame.senses, "tidy" in frame.senses
         if not frame.themes:
-            raise NotUnderstood(f"{self.said.clause!r} does not say what to {frame.verb}")
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say what to {frame.verb}")
         moved_nouns, receiver = frame.themes[-1], None
         to_speaker = False
         if len(frame.themes) == 2:
@@ -78,16 +56,16 @@ class Wishes(PlaceResolver):
             else:
                 receiver = self._receiver(frame)
         moved_nouns = self._excepting(moved_nouns, frame)
-        moved = self.subjects(moved_nouns, THINGS, "an object")
+        moved = self.nouns.subjects(moved_nouns, THINGS, "an object")
         if receiver is not None:
             return self.to_target(moved, Where(None, *receiver), False)
-        fetching = frame.verb.split()[0] in self.tagger.book.fetching
+        fetching = frame.verb.split()[0] in self.scene.tagger.book.fetching
         where, home = self.whereto(frame, each=not give, fetching=fetching)
         if to_speaker and where.target is None and not where.each and not home:
-            where = replace(where, target=self.vocabulary.speaker, target_type="object")
-        if give and where.target is not None and not self._receives(where):
-            people = sorted(filter(self.vocabulary.is_person, self.vocabulary.objects))
-            known = listed([*self.lexicon.known(("robot",)), *people])
+            where = replace(where, target=self.scene.vocabulary.speaker, target_type="object")
+        if give and where.target is not None and not self.receives(where):
+            people = sorted(filter(self.scene.vocabulary.is_person, self.scene.vocabulary.objects))
+            known = listed([*self.scene.lexicon.known(("robot",)), *people])
             raise NotUnderstood(
                 f"{where.target!r} is no {'robot or person' if people else 'robot'} that something "
                 f"could be given to; known are {known}"
@@ -105,33 +83,33 @@ class Wishes(PlaceResolver):
             )
         return nouns
 
-    def _receives(self, where: Where) -> bool:
-        return where.target_type == "robot" or self.vocabulary.is_person(where.target or "")
+    def receives(self, where: Where) -> bool:
+        return where.target_type == "robot" or self.scene.vocabulary.is_person(where.target or "")
 
     def _receiver(self, frame: Frame) -> tuple[str, EntityType]:
-        if frame.verb.split()[0] not in self.tagger.book.offering:
-            raise NotUnderstood(f"{self.said.clause!r} names two things side by side")
-        subject = self.subject(frame.themes[0].items[0], THINGS, "a robot")
+        if frame.verb.split()[0] not in self.scene.tagger.book.offering:
+            raise NotUnderstood(f"{self.scene.said.clause!r} names two things side by side")
+        subject = self.nouns.subject(frame.themes[0].items[0], THINGS, "a robot")
         mention = subject if isinstance(subject, Mention) else subject.resolve()
         name = mention.subjects[0]
         if mention.open or len(mention.subjects) != 1:
-            text = subject.text if isinstance(subject, NounPhrase) else self.said.clause
+            text = subject.text if isinstance(subject, NounPhrase) else self.scene.said.clause
             raise NotUnderstood(f"{text!r} does not say which {mention.type}: name it")
-        if mention.type != "robot" and not self.vocabulary.is_person(name):
+        if mention.type != "robot" and not self.scene.vocabulary.is_person(name):
             raise NotUnderstood(f"{name} is no robot or person that something could be given to")
         return name, mention.type
 
     def _fetched(self, moved: Sequence[Subject], where: Where) -> None:
         if any(subject.type == "robot" for subject in moved):
             raise self._no_target()
-        mentions = [self._from(self.movable(s), where) for s in moved]
+        mentions = [self.from_where(self.who.movable(s), where) for s in moved]
         for mention in mentions:
-            self.said.draft.add(HELD, mention, True, whereto=True)
-        self.said.remember(mentions)
+            self.scene.said.draft.add(HELD, mention, True, whereto=True)
+        self.scene.said.remember(mentions)
 
-    def _from(self, subject: Subject, where: Where) -> Mention:
+    def from_where(self, subject: Subject, where: Where) -> Mention:
         """Who is meant, told apart by where they are."""
-        return self.resolve(subject, where.source, where.source_surface)
+        return self.who.resolve(subject, where.source, where.source_surface)
 
     def locatives(self, frame: Frame) -> tuple[list[Locative], bool]:
         """The phrases of place; whether they say "home".
@@ -145,14 +123,16 @@ class Wishes(PlaceResolver):
                 f"{stray[0]!r} is not understood after {frame.verb or 'it'!r}: {EXAMPLE}"
             )
         locatives = [
-            self.locative(place)
+            self.places.locative(place)
             for place in frame.places
             if place.special not in ("home", "anywhere")
         ]
         placed = any(locative.role != "from" for locative in locatives)
         home = frame.home or bool(particles & {"back", "away"})
         if placed and frame.home:
-            raise NotUnderstood(f'{self.said.clause!r} names a place and says "home": say one')
+            raise NotUnderstood(
+                f'{self.scene.said.clause!r} names a place and says "home": say one'
+            )
         return locatives, home and not placed
 
     def whereto(
@@ -164,13 +144,13 @@ class Wishes(PlaceResolver):
             NotUnderstood: the phrases say "every room", and not `each` of several can be meant.
         """
         locatives, home = self.locatives(frame)
-        where = self.where(locatives, fetching)
+        where = self.places.where(locatives, fetching)
         if where.each and not each:
             raise self._which_of(where)
         if where.target is not None and where.target_type != "robot":
-            self.said.last_place = where.target
-        elif where.source in self.vocabulary.places:
-            self.said.last_place = where.source
+            self.scene.said.last_place = where.target
+        elif where.source in self.scene.vocabulary.places:
+            self.scene.said.last_place = where.source
         return where, home
 
     @staticmethod
@@ -183,7 +163,7 @@ class Wishes(PlaceResolver):
         Raises:
             NotUnderstood: there are fewer than places, or it does not leave open which ones.
         """
-        mentions = [self._from(self.drivers(self.movable(s)), where) for s in moved]
+        mentions = [self.from_where(self.who.drivers(self.who.movable(s)), where) for s in moved]
         if len(mentions) != 1 or not mentions[0].open:
             raise self._which_of(where)
         if len(where.each) > len(mentions[0].subjects):
@@ -195,19 +175,19 @@ class Wishes(PlaceResolver):
             # Each is one of its own: negative keys are those of no word.
             one = replace(mentions[0], key=-(1000 * (mentions[0].key + 1) + number))
             if one.type == "robot":
-                self.said.draft.add(AT, one, self.place_of(place))
+                self.scene.said.draft.add(AT, one, self.places.place_of(place))
             else:
                 self.to_spot(one, place)
-        self.said.moved = []
-        self.said.remember([])
+        self.scene.said.moved = []
+        self.scene.said.remember([])
 
     def to_target(self, moved: Sequence[Subject], where: Where, home: bool) -> None:
         """Wish that these are at the target, or at home."""
         if where.each:
             return self._to_each(moved, where)
-        self.said.moved = list(moved)
-        able = [self.drivers(self.movable(subject)) for subject in moved]
-        mentions = [self._from(subject, where) for subject in able]
+        self.scene.said.moved = list(moved)
+        able = [self.who.drivers(self.who.movable(subject)) for subject in moved]
+        mentions = [self.from_where(subject, where) for subject in able]
         for mention in mentions:
             if home:
                 self.home(mention)
@@ -217,26 +197,26 @@ class Wishes(PlaceResolver):
                 raise NotUnderstood("a robot goes to a place, not to a robot: name the place")
             else:
                 self._put(mention, where, where.target)
-        self.said.remember(mentions)
+        self.scene.said.remember(mentions)
         if where.target is not None and where.target_type == "robot":
-            receiver = Mention((where.target,), "robot", self.said.ended)
-            self.said.recent = [*self.said.recent, receiver]
+            receiver = Mention((where.target,), "robot", self.scene.said.ended)
+            self.scene.said.recent = [*self.scene.said.recent, receiver]
         return None
 
     def _put(self, mention: Mention, where: Where, target: str) -> None:
         if mention.type == "robot":
-            return self.said.draft.add(AT, mention, self.place_of(target))
+            return self.scene.said.draft.add(AT, mention, self.places.place_of(target))
         kept = tuple(name for name in mention.subjects if name != target)
         if not kept:
-            raise NotUnderstood(f"{self.said.clause!r}: nothing can be on or in itself")
+            raise NotUnderstood(f"{self.scene.said.clause!r}: nothing can be on or in itself")
         others = replace(mention, subjects=kept, open=mention.open and len(kept) > 1)
-        handed = where.target_type == "robot" or self.vocabulary.is_person(target)
-        return self.said.draft.add(where.relation, others, target, on_robot=handed)
+        handed = where.target_type == "robot" or self.scene.vocabulary.is_person(target)
+        return self.scene.said.draft.add(where.relation, others, target, on_robot=handed)
 
     def _no_target(self) -> NotUnderstood:
         return NotUnderstood(
-            f"{self.said.clause!r} does not say where to: name a place; known are "
-            f"{listed(self.lexicon.known(('place',)))}"
+            f"{self.scene.said.clause!r} does not say where to: name a place; known are "
+            f"{listed(self.scene.lexicon.known(('place',)))}"
         )
 
     def home(self, mention: Mention) -> None:
@@ -246,9 +226,9 @@ class Wishes(PlaceResolver):
             NotUnderstood: it belongs nowhere in particular.
         """
         homes = {
-            n: self.vocabulary.objects[n].home
+            n: self.scene.vocabulary.objects[n].home
             for n in mention.subjects
-            if n in self.vocabulary.objects
+            if n in self.scene.vocabulary.objects
         }
         homeless = [n for n in mention.subjects if not self.is_spot(homes.get(n))]
         if homeless or (mention.open and len(set(homes.values())) > 1):
@@ -262,14 +242,14 @@ class Wishes(PlaceResolver):
 
     def is_spot(self, name: str | None) -> bool:
         """Whether things can belong there: in a place, or on or in a thing."""
-        return name in self.vocabulary.places or name in self.vocabulary.good_for
+        return name in self.scene.vocabulary.places or name in self.scene.vocabulary.good_for
 
     def to_spot(self, mention: Mention, spot: str | None) -> None:
         """Wish that it is in that place, or on or in that thing."""
-        good_for = self.vocabulary.good_for.get(spot or "", ())
+        good_for = self.scene.vocabulary.good_for.get(spot or "", ())
         on = Feature.SUPPORTS in good_for
         within = Feature.CONTAINS in good_for
-        self.said.draft.add(AT if on == within else ON if on else IN, mention, spot)
+        self.scene.said.draft.add(AT if on == within else ON if on else IN, mention, spot)
 
     def go(self, frame: Frame, who: Sequence[Subject] | None) -> None:
         """`go to PLACE`; any robot goes if nobody is named."""
@@ -277,16 +257,16 @@ class Wishes(PlaceResolver):
             raise NotUnderstood("a robot has no home: name the place where it shall go")
         if other := [p for p in frame.places if p.role not in WHERE]:
             shown = [(word, word) for word in other[0].preposition.split()]
-            text = self.said.quote(other[0].first, other[0].last)
+            text = self.scene.said.quote(other[0].first, other[0].last)
             raise NotUnderstood(reason_for(shown) or f"{text!r} is not understood")
         where, _ = self.whereto(frame)
         if where.target is None or where.target_type == "robot":
-            known = listed(self.lexicon.known(("place",)))
+            known = listed(self.scene.lexicon.known(("place",)))
             raise NotUnderstood(
-                f"{self.said.clause!r} ends where a place is missing; known are {known}"
+                f"{self.scene.said.clause!r} ends where a place is missing; known are {known}"
             )
         if who is not None:
             return self.to_target(who, where, False)
-        self.said.moved = [robot := self.some_robot()]
-        self.said.draft.add(AT, robot, self.place_of(where.target), means=True)
+        self.scene.said.moved = [robot := self.who.some_robot()]
+        self.scene.said.draft.add(AT, robot, self.places.place_of(where.target), means=True)
         return None

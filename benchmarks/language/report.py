@@ -93,8 +93,8 @@ chance, is held out: whoever writes grammar does not look at it.
 - *wrong*: it was taken for something else. Nothing is worse.
 
 *As it should be*: right where it has a meaning, asked back where it has several, well refused
-where it has none (or, in the sentences that are left out of the last row, none that goals, facts and
-skills can express).
+where it has none (or, in the sentences that are left out of the last row, none that goals, facts
+and skills can express).
 
 ## By kind
 

@@ -103,7 +103,8 @@ class Entry(MeaningEntry, frozen=True, kw_only=True):
 
     `asks`: what it could mean, all of which a question back must offer. `refused`: words that the
     refusal must name (`a|b`: one of them). `also`: other meanings that are right as well. `beyond`
-    says what goals, facts and skills cannot express of it: a refusal is right then.
+    says what goals, facts and skills cannot express of it: a refusal is right then. `typo`: a word
+    is misspelt, so that a hint at the right one is as good as the meaning.
     """
 
     id: str
@@ -113,6 +114,7 @@ class Entry(MeaningEntry, frozen=True, kw_only=True):
     refused: tuple[str, ...] = ()
     also: tuple[MeaningEntry, ...] = ()
     beyond: str = ""
+    typo: bool = False
 
     def meanings(self) -> tuple[Meaning, ...]:
         """What it may be taken for; nothing if it is to be asked about or refused."""

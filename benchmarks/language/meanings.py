@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from keyexpr_schema.facts import Value, parse_value
 
-_CONDITION = re.compile(r"([\w.-]+)\(([^()]*)\)\s*(?:=\s*(.+))?")
+_CONDITION = re.compile(r"([\w.-]+)\(([^()]*)\)\s*(?:(!?)=\s*(.+))?")
 
 
 class BadMeaning(ValueError):
@@ -34,7 +34,7 @@ Conditions = frozenset[Wanted]
 
 
 def wanted(text: str) -> Wanted:
-    """`at(cup_1|cup_2) = hallway`; without a value it is `true`.
+    """`at(cup_1|cup_2) = hallway`; without a value it is `true`; `!=` is "has none of them".
 
     Raises:
         BadMeaning: it is no such condition.
@@ -42,9 +42,9 @@ def wanted(text: str) -> Wanted:
     found = _CONDITION.fullmatch(text.strip())
     if found is None:
         raise BadMeaning(f"{text!r} is no condition such as `at(cup_1|cup_2) = hallway`")
-    relation, subjects, values = found.groups()
+    relation, subjects, differs, values = found.groups()
     return Wanted(
-        relation,
+        f"not {relation}" if differs else relation,
         frozenset(part.strip() for part in subjects.split("|")),
         frozenset(parse_value(part.strip()) for part in (values or "true").split("|")),
     )
@@ -147,19 +147,22 @@ class Meaning:
             parts.append(f"question {self.question}")
         return " & ".join(parts) or "nothing"
 
-    def names(self) -> frozenset[str]:
-        """All that its conditions are about, and all values that are words."""
-        found: set[str] = set()
+    def rows(self) -> list[Wanted]:
+        """All conditions in it, whatever part they play."""
         rows: list[Wanted] = list(self.facts)
         for goal in self.goals:
             rows += [row for stage in goal.stages for row in stage]
             rows += [*goal.always, *goal.never, *goal.when]
             rows += [row for pair in goal.before for row in pair]
-            found |= goal.by
         if self.question is not None:
-            found |= self.question.subjects
             rows += self.question.conditions
-        for row in rows:
+        return rows
+
+    def names(self) -> frozenset[str]:
+        """All that its conditions are about, and all values that are words."""
+        found = {name for goal in self.goals for name in goal.by}
+        found |= self.question.subjects if self.question is not None else frozenset()
+        for row in self.rows():
             found |= row.subjects
             found |= {value for value in row.values if isinstance(value, str)}
         return frozenset(found - {"?"})

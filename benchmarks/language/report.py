@@ -8,7 +8,7 @@ from pathlib import Path
 from statistics import median
 
 from benchmarks.language.entries import KINDS, PARTS, Sentence
-from benchmarks.language.reader import Answer
+from benchmarks.language.reader import Answer, Read
 from benchmarks.language.verdict import Verdict, as_it_should_be
 from benchmarks.tables import as_markdown, machine
 
@@ -32,6 +32,11 @@ class Result:
     def good(self) -> bool:
         """Whether nothing better could be expected."""
         return as_it_should_be(self.sentence.entry, self.verdict)
+
+    @property
+    def told(self) -> str:
+        """What it was taken for, or what was said instead."""
+        return str(self.answer.meaning if isinstance(self.answer, Read) else self.answer.sentence)
 
     @property
     def words(self) -> int:
@@ -80,8 +85,8 @@ def write_page(path: Path, results: Sequence[Result]) -> None:
 
 Written by `python -m benchmarks.language.run`; do not edit. {machine()}.
 
-{len(results)} sentences in {len({r.sentence.entry.world for r in results})} worlds, each with
-what a sensible person means by it there; the conventions stand in
+{len(results)} sentences in {len({r.sentence.entry.world for r in results})} worlds, each with what
+a sensible person means by it there; the conventions stand in
 [benchmarks/language/README.md](../../benchmarks/language/README.md). A third of them, chosen by
 chance, is held out: whoever writes grammar does not look at it.
 
@@ -125,7 +130,10 @@ Of the processor, to read one sentence, everything known of the world in hand.
 def _listed(wrong: Sequence[Result]) -> str:
     if not wrong:
         return "None of those that are not held out."
-    rows = [(r.sentence.entry.world, r.sentence.entry.say, f"`{r.answer}`") for r in wrong[:20]]
+    rows = [
+        (r.sentence.entry.world, r.sentence.entry.say, f"`{r.told}`".replace("|", "\\|"))
+        for r in wrong[:20]
+    ]
     return f"{len(wrong)} of those that are not held out, such as:\n\n" + as_markdown(
         ("world", "said", "taken for"), rows
     )

@@ -92,18 +92,13 @@ def _show(results: Sequence[Result], which: str, only: str | None) -> None:
         if hidden or (which not in ("all", verdict.value) and (which != "bad" or result.good)):
             continue
         print(f"{entry.id} [{entry.world}] {entry.say!r}: {verdict.value}")
-        print(f"    got  {_told(result)}")
+        print(f"    got  {result.told}")
         for meaning in entry.meanings():
             print(f"    want {meaning}")
         for meaning in entry.candidates():
             print(f"    ask  {meaning}")
         if entry.refused:
             print(f"    refusal that names {', '.join(entry.refused)}")
-
-
-def _told(result: Result) -> str:
-    meaning = getattr(result.answer, "meaning", None)
-    return str(meaning) if meaning is not None else str(getattr(result.answer, "sentence", ""))
 
 
 def _print(console: Console, head: Row, rows: Sequence[Row]) -> None:

@@ -13,6 +13,7 @@ from benchmarks.language.reader import Answer, AskedBack, Read, Refused
 
 _HINT = re.compile(r"did you mean '([^']+)'")
 _QUOTED = re.compile(r"'((?:[^']|'(?=\w))+)'(?!\w)|\"([^\"]+)\"")
+_ASIDE = re.compile(r"; (?:known|those) are|\(did you mean")
 LONGEST_QUOTE = 4
 """A refusal that quotes more words than these has not said which it is about."""
 
@@ -51,7 +52,7 @@ def as_it_should_be(entry: Entry, verdict: Verdict) -> bool:
     """Whether nothing better can be expected of the answer."""
     if entry.refused:
         return verdict is Verdict.WELL_REFUSED
-    if entry.asks:
+    if entry.asks or (entry.typo and verdict is Verdict.ASKED):
         return verdict is Verdict.ASKED
     return verdict is Verdict.RIGHT or (bool(entry.beyond) and verdict is Verdict.WELL_REFUSED)
 
@@ -64,16 +65,17 @@ def _of_question(entry: Entry, meanings: tuple[Meaning, ...], answer: AskedBack)
         wanted = expected or meanings
         found = [meaning in answer.candidates for meaning in wanted]
         offered = all(found) if expected else any(found)
+    elif expected:
+        offered = _telling_apart(expected) <= answer.names
     else:
-        offered = _telling_apart(expected or meanings) <= answer.names
+        offered = any(meaning.names() & answer.names for meaning in meanings)
     return Verdict.ASKED if offered else Verdict.MISLEADING
 
 
 def _telling_apart(candidates: tuple[Meaning, ...]) -> frozenset[str]:
-    """Names that some of the candidates speak of, and others don't; all if there is one only."""
-    names = [candidate.names() for candidate in candidates]
-    shared = frozenset.intersection(*names) if len(names) > 1 else frozenset()
-    return frozenset().union(*names) - shared
+    """Names that some of the candidates speak of, and others don't."""
+    spoken_of = [candidate.names() for candidate in candidates]
+    return frozenset().union(*spoken_of) - frozenset.intersection(*spoken_of)
 
 
 def _of_refusal(
@@ -104,17 +106,16 @@ def _followed(text: str, hint: str, again: Callable[[str], Answer]) -> Answer:
 
 
 def names(sentence: str, entry: Entry) -> bool:
-    """Whether a refusal names the words that it must, and the first that it quotes is among them.
+    """Whether a refusal names the words that it must, and one of them first.
 
-    A quotation of more than a few words names none of them.
+    A quotation of more than a few words names none of them, nor do lists of what is known.
     """
-    told = sentence.casefold()
+    told = _ASIDE.split(sentence.casefold())[0]
     wanted = [row.casefold().split("|") for row in entry.refused]
     if not all(any(word in told for word in row) for row in wanted):
         return False
     quoted = _QUOTED.search(told)
-    if quoted is None:
-        return True
-    first = quoted[1] or quoted[2]
-    short = len(first.split()) <= LONGEST_QUOTE
-    return short and any(word in first for row in wanted for word in row)
+    first = (quoted[1] or quoted[2]) if quoted is not None else ""
+    if any(word in first for row in wanted for word in row):
+        return len(first.split()) <= LONGEST_QUOTE
+    return any(word in _QUOTED.sub("", told) for row in wanted for word in row)

@@ -16,10 +16,12 @@ from benchmarks.language.entries import KINDS, PARTS, Sentence, load_suite
 from benchmarks.language.reader import answer
 from benchmarks.language.report import (
     HEAD,
+    TARGET_HEAD,
     TIME_HEAD,
     Result,
     Row,
     rows_of,
+    target_rows,
     time_rows,
     write_page,
 )
@@ -45,6 +47,7 @@ def main() -> int:
     if options.show is not None:
         _show(results, options.show, options.only)
     _print(console, HEAD, rows_of(results))
+    _print(console, TARGET_HEAD, target_rows(results))
     _print(console, TIME_HEAD, time_rows(results))
     out = options.out or (
         PAGE if (options.only, options.kind, options.world) == (None,) * 3 else None

@@ -14,7 +14,7 @@ from benchmarks.language.reader import Answer, AskedBack, Read, Refused
 _HINT = re.compile(r"did you mean '([^']+)'")
 _QUOTED = re.compile(r"'((?:[^']|'(?=\w))+)'(?!\w)|\"([^\"]+)\"")
 _ASIDE = re.compile(r"; (?:known|those) are|\(did you mean")
-LONGEST_QUOTE = 4
+LONGEST_QUOTE = 3
 """A refusal that quotes more words than these has not said which it is about."""
 
 

@@ -20,7 +20,7 @@ from benchmarks.language.entries import (
 )
 from benchmarks.language.meanings import Meaning, conditions, wanted
 from benchmarks.language.reader import Answer, AskedBack, Read, Refused, answer, skills_of
-from benchmarks.language.report import Result, rows_of, time_rows, write_page
+from benchmarks.language.report import Result, rows_of, target_rows, time_rows, write_page
 from benchmarks.language.verdict import Verdict, as_it_should_be, judge
 from benchmarks.language.worlds import load_language_world, world_names
 from keyexpr_schema.facts import AT, IN, ON, FactKey
@@ -211,6 +211,8 @@ def test_sentences_are_read_in_their_world_and_counted() -> None:
     simple, *totals = rows_of(results)
     assert simple == ("simple", "2", "1", "0", "0", "0", "0", "1", "50 %")
     assert [row[1:] for row in totals] == [simple[1:], simple[1:]]
+    wrong, plain_ones, *_ = target_rows(results)
+    assert (wrong[-1], plain_ones[-1]) == ("1", "50 %")
     assert time_rows(results) == [("6 to 10", "2", "2.0 ms", "2.0 ms")]
 
 

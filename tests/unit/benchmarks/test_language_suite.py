@@ -26,7 +26,7 @@ from benchmarks.language.worlds import load_language_world, world_names
 from keyexpr_schema.facts import AT, IN, ON, FactKey
 
 SUITE = load_suite()
-STATES = {"held", "located", "searched", "holding", "next_to", "under", "owner"}
+STATES = {"held", "located", "searched", "holding", "next_to", "near", "under", "owner"}
 """Relations that no skill file declares: derived ones, and those that are beyond the fleet."""
 
 

@@ -33,6 +33,9 @@ bench: $(VENV)/development ## measure planner, running plan and start; prints ta
 bench-planning: $(VENV)/development ## the suite of household missions; writes docs/benchmarks/planning.md
 	$(BIN)/python -m benchmarks.planning.run --out docs/benchmarks
 
+bench-language: $(VENV)/development ## what is made of the suite of sentences; writes docs/benchmarks/language.md
+	$(BIN)/python -m benchmarks.language.run
+
 bench-allocation: $(VENV)/development ## allocators and schedulers; writes docs/benchmarks/allocation.md
 	$(BIN)/python -m benchmarks.allocation.run --out docs/benchmarks
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import MutableMapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 
@@ -14,6 +15,7 @@ from fleet.language.refusals import listed, nearest, reason_for, suggestion
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
+from fleet.language.resolve.mentions import WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.segments import Segment, Sentence, cut, sentences_of
@@ -31,6 +33,8 @@ MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 120
 _BEFORE_NOUNS = frozenset({"DET", "INDEF", "UNIV", "NUM", "ORD", "ADJ", "OTHER", "ANOTHER"})
+_CHOICES = 12
+"""Of so many that a noun phrase may mean, one is asked for."""
 _READINGS = 12
 """Readings of what was read so far that are followed up."""
 _BORDERS = frozenset({"COMMA", "AND", "THEN", "PREP", "TO", "BE", "MODAL", "HAVE", "END"})
@@ -61,8 +65,11 @@ def tagger_of(vocabulary: Vocabulary) -> Tagger:
 class _State:
     """One reading of what was read so far."""
 
-    def __init__(self, said: Discourse, cost: int = 0, question: Question | None = None) -> None:
-        self.said, self.cost, self.question = said, cost, question
+    def __init__(
+        self, said: Discourse, cost: int = 0, question: Question | None = None, asked: str = ""
+    ) -> None:
+        """`asked`: the sentence that asks which of several is meant, where it is one of them."""
+        self.said, self.cost, self.question, self.asked = said, cost, question, asked
 
 
 class Reader:
@@ -94,14 +101,14 @@ class Reader:
         self.times: list[TimePhrase] = []
         self.line = " ".join(text.split())
 
-    def read(self, now: datetime | None) -> list[tuple[int, Reading]]:
+    def read(self, now: datetime | None) -> list[tuple[int, str, Reading]]:
         """All that the text can mean, the plainest first.
 
         Raises:
             NotUnderstood: nothing; one sentence says why.
         """
         draft = GoalDraft(self.vocabulary.is_at)
-        states = [_State(Discourse(self.text, self.tokens, draft))]
+        states = [_State(Discourse(self.text, self.tokens, draft, self.vocabulary.is_person))]
         lexemes = self.tagger.tagged(self.tokens, self.text)
         dangling = False
         for words in sentences_of(lexemes):
@@ -149,7 +156,12 @@ class Reader:
                 except NotUnderstood as problem:
                     problems.append((cost, problem))
                 else:
-                    found.append(_State(said, state.cost + cost, question or state.question))
+                    found.append(
+                        _State(said, state.cost + cost, question or state.question, state.asked)
+                    )
+        which = min(problems, key=lambda row: row[0])[1] if problems else None
+        if not found and isinstance(which, WhichOne):
+            found = self._each(which, segment, states)
         if not found:
             if not problems:
                 strange = [i for i, w in enumerate(segment.words) if "UNK" in w.tags]
@@ -157,6 +169,24 @@ class Reader:
             raise min(problems, key=lambda row: row[0])[1]
         found.sort(key=lambda state: state.cost)
         return found[:_READINGS]
+
+    def _each(self, which: WhichOne, segment: Segment, states: Sequence[_State]) -> list[_State]:
+        """The readings in which a noun phrase means one, then another of those that it can."""
+        if len(which.names) > _CHOICES or len(states) > _CHOICES:
+            return []
+        found: list[_State] = []
+        for name in which.names:
+            forked = []
+            for state in states:
+                if which.key in state.said.chosen:
+                    return []
+                said = state.said.copy()
+                said.chosen[which.key] = name
+                asked = state.asked or str(which)
+                forked.append(_State(said, state.cost, state.question, asked))
+            with suppress(NotUnderstood):
+                found += self._segment(segment, forked)
+        return found
 
     def _resolved(
         self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment
@@ -295,8 +325,8 @@ class Reader:
     # --- the end ----------------------------------------------------------------------------------
     def _ended(
         self, states: Sequence[_State], now: datetime | None, dangling: bool
-    ) -> list[tuple[int, Reading]]:
-        found: dict[Reading, int] = {}
+    ) -> list[tuple[int, str, Reading]]:
+        found: dict[Reading, tuple[int, str]] = {}
         problem: NotUnderstood | None = None
         for state in states:
             try:
@@ -304,11 +334,13 @@ class Reader:
             except NotUnderstood as error:
                 problem = problem or error
             else:
-                found[reading] = min(state.cost, found.get(reading, state.cost))
+                row = (state.cost, state.asked)
+                found[reading] = min(row, found.get(reading, row))
         if not found:
             assert problem is not None
             raise problem
-        return sorted(((cost, reading) for reading, cost in found.items()), key=lambda row: row[0])
+        rows = [(cost, asked, reading) for reading, (cost, asked) in found.items()]
+        return sorted(rows, key=lambda row: row[0])
 
     def _reading(self, state: _State, now: datetime | None, dangling: bool) -> Reading:
         said = state.said
@@ -364,12 +396,13 @@ def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Read
     return _one(Reader(text, vocabulary).read(now))
 
 
-def _one(readings: Sequence[tuple[int, Reading]]) -> Reading | Ambiguity:
-    least = readings[0][0]
-    best = [reading for cost, reading in readings if cost == least]
+def _one(readings: Sequence[tuple[int, str, Reading]]) -> Reading | Ambiguity:
+    least, asked = readings[0][:2]
+    best = [reading for cost, _, reading in readings if cost == least]
     if len(best) == 1:
         return best[0]
-    return Ambiguity(best[0].text, tuple((each.understood_as, each) for each in best[:5]))
+    candidates = tuple((each.understood_as, each) for each in best[:_CHOICES])
+    return Ambiguity(best[0].text, candidates, asked)
 
 
 def read_goal(text: str, vocabulary: Vocabulary) -> Reading:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fleet.errors import NotUnderstood
+from fleet.language.refusals import one_of
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.ellipsis import Continuations
@@ -21,6 +22,7 @@ from fleet.language.resolve.tidiness import Tidiness
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import Clause
 
+_COMMANDS = frozenset({"do", "told", "shall_be", "wanted", "belongs", "bare", "needs", "named"})
 _WISHES = frozenset(
     {"wanted", "belongs", "whereto", "enough", "kept", "never_be", "never_do", "avoid"}
 )
@@ -65,3 +67,10 @@ class Clauses:
         if self.scene.mode == "fact" and clause.kind in _WISHES:
             raise NotUnderstood(f"{said.clause!r} is not understood as a fact: {SAY_IT}")
         self._by_kind[clause.kind](clause)
+        said = self.scene.said
+        for mention, wants in said.extra:
+            if self.scene.mode == "fact" or clause.kind not in _COMMANDS:
+                raise NotUnderstood(f"it is not known whether {one_of(mention.subjects)} is so")
+            for relation, value in wants:
+                said.draft.add(relation, mention, value)
+        said.extra = []

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import reason_for
-from fleet.language.resolve.frames import EXAMPLE, Frame, frames_of
+from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of
 from fleet.language.resolve.looking import ROBOTS_TELL, Looking
 from fleet.language.resolve.mentions import NounPhrase, Subject
 from fleet.language.resolve.nouns import NounResolver
@@ -58,11 +58,21 @@ class Commands:
     def on_told(self, clause: Clause) -> None:
         assert clause.subject is not None
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+        if any(s.type == "object" for s in who) and self._goes(clause):
+            return self.wishes.to_target(
+                who, *self.wishes.whereto(framed(clause.arguments), each=True)
+            )
         self.who.check_robots(who)
         self.scene.said.addressees = [
             s for s in who if not (isinstance(s, NounPhrase) and s.generic)
         ]
-        self._verb(clause, who)
+        return self._verb(clause, who)
+
+    def _goes(self, clause: Clause) -> bool:
+        """`the mail should go to Carla`: whether that is what shall be done with a thing."""
+        verb = clause.verb
+        heads = self.scene.tagger.verbs.heads(verb.words, "VERB", "FIN") if verb else ()
+        return ("go",) in heads
 
     def _verb(self, clause: Clause, who: Sequence[Subject] | None) -> None:
         assert clause.verb is not None
@@ -98,6 +108,8 @@ class Commands:
             self.who.check_robots(who or ())
             return self.looking.patrol(frame, who or ())
         self._check_who(who)
+        if "bin" in senses:
+            return self.wishes.throw_away(frame)
         if "clear" in senses and "tidy" not in senses:
             return self.tidiness.clear(frame)
         if "move" in senses and (frame.themes or "tidy" not in senses):

@@ -90,7 +90,7 @@ def _fitted(
             left.remove(one)
             continue
         at = next((p for p in places if tuple(p.preposition.split()) == rest), None)
-        if at is None or (themes and "find" in senses):
+        if at is None or (themes and senses & {"find", SKILL}):
             return None
         if senses & {"find", SKILL} and not themes and at.nouns is not None:
             places.remove(at)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, nearest, one_of, suggestion
-from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
+from fleet.language.resolve.mentions import Mention, NounPhrase, Subject, WhichOne
 from fleet.language.resolve.referents import Referents
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import CATEGORIES, ENTITY_TYPES, Entity, EntityType
@@ -18,6 +18,7 @@ from fleet.language.tree.nodes import (
 )
 from fleet.language.words.tokens import ORDINALS, Token, words_of
 
+_PERSONAL = frozenset({"him", "her", "he", "she"})
 _PLURAL = frozenset({"them", "they", "these", "those", "both", "all", "each"})
 
 
@@ -48,7 +49,7 @@ class NounResolver:
     def subject(self, noun: Noun, types: Sequence[EntityType], what: str) -> Subject:
         """Whom one noun phrase or pronoun means."""
         if noun.form == "pronoun":
-            return self.pronoun(noun)
+            return self.pronoun(noun, types)
         if noun.form == "me":
             return self.speaker(noun, "object")
         return self.noun(noun, types, what)
@@ -57,7 +58,12 @@ class NounResolver:
         """Whether all of them can be of one of these types, by their words."""
         for noun in nouns.items:
             if noun.form == "pronoun":
-                if not any(m.type in types for m in self.scene.said.recent):
+                if noun.words[0] in _PERSONAL and self.scene.said.person is not None:
+                    if "object" not in types:
+                        return False
+                elif "object" not in types and "place" in types and self.scene.said.last_place:
+                    continue
+                elif not any(m.type in types for m in self.scene.said.recent):
                     return False
             elif noun.form == "me":
                 if self.scene.vocabulary.speaker is None or "object" not in types:
@@ -87,8 +93,21 @@ class NounResolver:
             )
         return NounPhrase(found, text, noun.first, exact=True)
 
-    def pronoun(self, noun: Noun) -> Mention:
+    def pronoun(self, noun: Noun, types: Sequence[EntityType]) -> Mention:
+        """Whom a pronoun means.
+
+        Raises:
+            NotUnderstood: nobody was spoken of, or it could be several.
+        """
         word = noun.words[0]
+        said = self.scene.said
+        if word in _PERSONAL and said.person is not None:
+            return Mention((said.person,), "object", noun.first)
+        if (chosen := said.chosen.get(noun.first)) is not None:
+            of_type = next(m.type for m in said.recent if chosen in m.subjects)
+            return Mention((chosen,), of_type, noun.first)
+        if "object" not in types and "place" in types and word == "it" and said.last_place:
+            return Mention((said.last_place,), "place", noun.first)
         plural = word in _PLURAL or len(noun.words) > 1
         meant = [m for m in self.scene.said.recent if m.single != plural]
         count = 2 if word == "both" else int(word) if word.isdecimal() else None
@@ -97,7 +116,8 @@ class NounResolver:
         names = sorted({s for m in self.scene.said.recent for s in m.subjects})
         reason = f"could be {one_of(names)}" if names else "refers to nothing before it"
         text = self.scene.said.quote(noun.first, noun.last)
-        raise NotUnderstood(f"{text!r} {reason}: name what you mean")
+        sentence = f"{text!r} {reason}: name what you mean"
+        raise WhichOne(sentence, noun.first, tuple(names) if len(meant) > 1 else ())
 
     def _either(self, first: Subject, second: Subject) -> NounPhrase:
         if not isinstance(first, NounPhrase) or not isinstance(second, NounPhrase):
@@ -116,7 +136,25 @@ class NounResolver:
         Raises:
             NotUnderstood: nothing known of these types; the message lists what is.
         """
-        return self.located(noun, self._described_by_words(noun, types, what))
+        made = self.located(noun, self._described_by_words(noun, types, what))
+        chosen = self.scene.said.chosen.get(noun.first)
+        if chosen is not None and chosen in made.names:
+            return replace(made.among({chosen}), exact=True, source=None)
+        return self._salient(made)
+
+    def _salient(self, made: NounPhrase) -> NounPhrase:
+        """Of several, the one that was spoken of last: "the plate" after "plate 2"."""
+        if made.quantity is not Quantity.THE or made.plural or made.source is not None:
+            return made
+        if made.ordinal is not None or made.count is not None or len(made.names) < 2:
+            return made
+        for mention in reversed(self.scene.said.mentioned):
+            named = [name for name in made.names if name in mention.subjects]
+            if len(named) == 1 and not mention.open and len(mention.subjects) == 1:
+                return made.among(named)
+            if named:
+                return made
+        return made
 
     def _described_by_words(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
         text = self.scene.said.quote(noun.first, noun.last)

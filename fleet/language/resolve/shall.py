@@ -69,6 +69,12 @@ class Shall:
             raise NotUnderstood(f"{modal!r} is uncertain; say what holds, or what should hold")
         if self.scene.mode == "fact":
             raise NotUnderstood(f"{self.scene.said.line!r} is a goal and not a fact: {SAY_IT}")
+        got = any(w.word == "get" for w in clause.words)
+        if got and clause.predicate is not None and clause.predicate.kind == "placed":
+            raise NotUnderstood(f"{self.scene.said.clause!r}: that is what somebody does")
+        got = any(w.word == "get" for w in clause.words)
+        if got and clause.predicate is not None and clause.predicate.kind == "placed":
+            raise NotUnderstood(f"{self.scene.said.clause!r}: that is what somebody does")
         return self.to_be(clause.subject, clause.predicate, clause.arguments)
 
     def to_be(

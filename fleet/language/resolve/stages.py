@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
@@ -78,10 +79,30 @@ class GoalDraft:
         whereto: bool = False,
     ) -> None:
         """One more wish, for each of those meant, or for any of them."""
-        each = (mention.subjects,) if mention.open else tuple((s,) for s in mention.subjects)
+        each: tuple[tuple[str, ...], ...] = tuple((s,) for s in mention.subjects)
+        each = (mention.subjects,) if mention.open else each
+        if mention.least > 1:  # "two of the three": one of each pair
+            each = tuple(combinations(mention.subjects, len(mention.subjects) - mention.least + 1))
+        if relation not in PLACED and any(
+            wish.relation == relation
+            and wish.value != value
+            and not wish.open
+            and any((wish.subjects[0],) == subjects for subjects in each)
+            for wish in self.stages[-1]
+        ):  # "open the door, …, close it"
+            self.next_stage()
         self.stages[-1].extend(
-            Wish(relation, subjects, value, mention.key, mention.open, on_robot, means, whereto)
-            for subjects in each
+            Wish(
+                relation,
+                subjects,
+                value,
+                mention.key if mention.least == 1 else -(1000 * (mention.key + 1) + number),
+                mention.open,
+                on_robot,
+                means,
+                whereto,
+            )
+            for number, subjects in enumerate(each)
         )
 
     def narrow(self, mention: Mention, subjects: Collection[str]) -> Mention:

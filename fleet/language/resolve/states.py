@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.discourse import Discourse
-from fleet.language.resolve.mentions import NounPhrase
+from fleet.language.resolve.mentions import Mention, NounPhrase
 from fleet.language.tagging.tagger import Lexeme, Tagger
+from fleet.language.tree.nodes import Quantity
 from fleet.language.vocabulary import StateWord, Vocabulary
 from keyexpr_schema.facts import FactKey, Literal, Value
 
@@ -77,6 +78,12 @@ class Stated:
         ]
         if so:
             return noun.among(so)
+        made = {(r, v) for phrase in self.vocabulary.skill_phrases for r, v in phrase.wants}
+        open_ = noun.quantity is Quantity.ANY or noun.quantity is Quantity.BARE
+        if (open_ or len(able.names) == 1) and set(wants[able.names[0]]) <= made:
+            mention = Mention(able.names, able.type, noun.key, open=len(able.names) > 1)
+            said.extra.append((mention, wants[able.names[0]]))
+            return able
         if len(able.names) == 1:
             said.presumed.extend(
                 Literal(FactKey(relation, able.names[0]), value)

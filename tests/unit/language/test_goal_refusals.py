@@ -108,10 +108,6 @@ from tests.support.language_house import WORDS
             "'here' names somebody whose place is not known; name a place or a robot",
         ),
         (
-            "Bring the book to the HSR and bring it to the hallway",
-            "'it' could be book or hsr: name what you mean",
-        ),
-        (
             "send the hsr to the kitchen and bring it to the hallway",
             "it wants hsr in two places: kitchen and hallway",
         ),
@@ -162,7 +158,7 @@ from tests.support.language_house import WORDS
             "'twice' asks for repetition, which a goal cannot: give it again when it was reached",
         ),
         ("bring all 3 cups to the kitchen", "'all 3 cups': there are only 2"),
-        ("get rid of the book", "'rid of the book' is not a known object; known are"),
+        ("get rid of the book", "no bin is known to throw it into"),
         (
             "bring the first elf to the kitchen",
             "'the first elf' is not a known object; known",
@@ -181,10 +177,6 @@ from tests.support.language_house import WORDS
         (
             "bring the book to the kitchen, and the first cup, too",
             "'the first cup' does not say where to",
-        ),
-        (
-            "Put the first cup on the locobot and send it to the hallway",
-            "'it' could be cup_1 or locobot: name what you mean",
         ),
         (
             "bring everything in the kitchen to the hallway",

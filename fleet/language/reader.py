@@ -24,7 +24,6 @@ from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
-from fleet.language.words.times import TimePhrase
 from fleet.language.words.tokens import tokens_of
 from keyexpr_schema.facts import Literal
 from keyexpr_schema.payloads.goals import Condition
@@ -98,7 +97,6 @@ class Reader:
         self.text, self.vocabulary, self.mode = text, vocabulary, mode
         self.tagger = tagger_of(vocabulary)
         self.remarks: list[str] = []
-        self.times: list[TimePhrase] = []
         self.line = " ".join(text.split())
 
     def read(self, now: datetime | None) -> list[tuple[int, str, Reading]]:
@@ -114,10 +112,15 @@ class Reader:
         for words in sentences_of(lexemes):
             sentence = cut(words)
             self._check(sentence)
+            timed = bool(sentence.times) or any(part.role for part in sentence.segments)
             for state in states:
-                state.said.elliptic, state.said.addressees = "", []
-                state.said.urgent |= sentence.urgent
-            self.times.extend(sentence.times)
+                said = state.said
+                said.elliptic, said.addressees, said.done = "", [], False
+                said.urgent = said.urgent or sentence.urgent
+                if timed or said.times or said.when:
+                    with suppress(NotUnderstood):  # the last sentence says it again
+                        self._close(said, now)
+                said.times = list(sentence.times)
             dangling = sentence.dangling
             if self._said_of_oneself(sentence):
                 try:
@@ -163,9 +166,9 @@ class Reader:
         if not found and isinstance(which, WhichOne):
             found = self._each(which, segment, states)
         if not found:
-            if not problems:
-                strange = [i for i, w in enumerate(segment.words) if "UNK" in w.tags]
-                raise self._ungrammatical(segment, strange[0] if strange else 0)
+            strange = [w for w in segment.words if "UNK" in w.tags]
+            if not problems or (strange and strange[0].text not in str(which)):
+                raise self._ungrammatical(segment, 0)
             raise min(problems, key=lambda row: row[0])[1]
         found.sort(key=lambda state: state.cost)
         return found[:_READINGS]
@@ -285,42 +288,45 @@ class Reader:
                 raise NotUnderstood(special)
 
     def _ungrammatical(self, segment: Segment, at: int) -> NotUnderstood:
+        """Why nothing was made of the words: the first that is not known, or where it ends."""
         words = segment.words
         strange = [i for i, word in enumerate(words) if "UNK" in word.tags]
-        if strange and strange[0] < at:
-            at = strange[0]
-        end = at + 1
-        while end < len(words) and not words[end].tags & _BORDERS:
-            end += 1
-        special = reason_for([(w.word, w.text) for w in words[at:end]], self._what())
-        special = special or reason_for([(w.word, w.text) for w in words], self._what())
-        if special:
-            return NotUnderstood(special)
         example = SAY_IT if self.mode == "fact" else EXAMPLE
-        if at >= len(words) and "PREP" in words[-1].tags:
+        if strange:
+            at = strange[0]
+        elif at >= len(words) and "PREP" in words[-1].tags:
             known = listed(self.tagger.lexicon.known(("place",)))
             return NotUnderstood(
                 f"{self._quote(words)!r} ends where a place is missing; known are {known}"
             )
+        end = at + 1
+        while end < len(words) and words[end - 1].tags & _BEFORE_NOUNS:
+            end += 1
+        shown = words[at:end] or words[-1:]
+        special = reason_for([(w.word, w.text) for w in shown], self._what())
+        if not special and not strange:
+            rest = [w for w in words if not w.tags & {"ME", "PEOPLE"}]
+            special = reason_for([(w.word, w.text) for w in rest], self._what())
+        if special:
+            return NotUnderstood(special)
         if at >= len(words):
             return NotUnderstood(f"{self._quote(words)!r} ends before it says all: {example}")
-        shown = self._quote(words[at:end])
         begins = at
         while begins and words[begins - 1].tags & _BEFORE_NOUNS:
             begins -= 1
-        if "UNK" in words[at].tags and (begins < at or (at and "PREP" in words[at - 1].tags)):
-            types = ENTITY_TYPES
-            hint = suggestion(words[at].text, self.tagger.lexicon.names_in(types))
+        if strange and (begins < at or (at and "PREP" in words[at - 1].tags)):
+            hint = suggestion(words[at].text, self.tagger.lexicon.names_in(ENTITY_TYPES))
+            known = nearest(self.tagger.lexicon.known(ENTITY_TYPES), words[at].text)
+            text = self._quote(words[begins : at + 1])
             return NotUnderstood(
-                f"{self._quote(words[begins:end])!r} is not a known object, robot or place{hint}; "
-                f"known are {nearest(self.tagger.lexicon.known(types), words[at].text)}"
+                f"{text!r} is not a known object, robot or place{hint}; known are {known}"
             )
+        text = self._quote(shown)
         if at == 0:
-            verbs = {entry.base for entries in self.tagger.verbs.entries.values()
-                     for entry in entries}  # fmt: skip
-            hint = suggestion(words[0].word, verbs) if "UNK" in words[0].tags else ""
-            return NotUnderstood(f"{shown!r} is not understood as {self._what()}{hint}: {example}")
-        return NotUnderstood(f"{shown!r} is not understood after {self._quote(words[:at])!r}")
+            verbs = {e.base for entries in self.tagger.verbs.entries.values() for e in entries}
+            hint = suggestion(words[0].word, verbs) if strange else ""
+            return NotUnderstood(f"{text!r} is not understood as {self._what()}{hint}: {example}")
+        return NotUnderstood(f"{text!r} is not understood after {self._quote(words[:at])!r}")
 
     # --- the end ----------------------------------------------------------------------------------
     def _ended(
@@ -343,42 +349,53 @@ class Reader:
         return sorted(rows, key=lambda row: row[0])
 
     def _reading(self, state: _State, now: datetime | None, dangling: bool) -> Reading:
-        said = state.said
-        stages = said.draft.conditions()
-        wants = bool(stages or said.always or said.never)
+        said = state.said.copy()
+        self._close(said, now)
         facts = tuple(Literal(key, value) for key, value in said.facts.items())
-        if dangling or not (wants or facts or state.question):
+        if dangling or not (said.goals or facts or state.question):
             if self.mode == "fact":
                 raise NotUnderstood(f"{self.line!r} ends before it says anything: {SAY_IT}")
             raise NotUnderstood(f"{self.line!r} ends before it says what to do: {EXAMPLE}")
-        goals: tuple[WantedGoal, ...] = ()
+        goals = tuple(replace(goal, priority=said.urgent) for goal in said.goals)
+        presumed = tuple(dict.fromkeys(said.presumed))
+        return Reading(self.line, goals, facts, state.question, presumed, tuple(self.remarks))
+
+    def _close(self, said: Discourse, now: datetime | None) -> None:
+        """End the goal that was being said: other times or conditions hold for what follows.
+
+        Raises:
+            NotUnderstood: it cannot be, or a time belongs to nothing.
+        """
+        stages = said.draft.conditions(self.vocabulary.speaker)
+        wants = bool(stages or said.always or said.never)
         if wants:
             goal = WantedGoal(
                 stages,
                 tuple(dict.fromkeys(said.always)),
                 tuple(dict.fromkeys(said.never)),
-                int(said.urgent),
-                when=tuple(said.when),
+                when=tuple(dict.fromkeys(said.when)),
+                by=tuple(dict.fromkeys(said.by)),
             )
-            goals = (self._timed(goal, now),)
-        elif self.times and self.mode == "fact":
+            said.goals.append(self._timed(goal, said, now))
+        elif said.times and self.mode == "fact":
             named = [(token.word, token.spoken) for token in self.tokens]
             reason = reason_for(named, "a fact")
             raise NotUnderstood(reason or f"{self.line!r} names a time, which a fact cannot")
-        elif self.times or said.when:
+        elif said.times or said.when:
             raise NotUnderstood(f"{self.line!r} names a time or a condition, but nothing to do")
-        presumed = tuple(dict.fromkeys(said.presumed))
-        return Reading(self.line, goals, facts, state.question, presumed, tuple(self.remarks))
+        said.draft = GoalDraft(self.vocabulary.is_at)
+        said.always, said.never, said.when, said.times, said.by = [], [], [], [], []
 
-    def _timed(self, goal: WantedGoal, now: datetime | None) -> WantedGoal:
-        for time in self.times:
+    @staticmethod
+    def _timed(goal: WantedGoal, said: Discourse, now: datetime | None) -> WantedGoal:
+        for time in said.times:
             if time.kind == "every":
                 goal = replace(goal, every=time.recurrence)
                 continue
             if time.after_s is None and now is None:
                 raise NotUnderstood("a time of day is named, and what time it is now is not known")
             seconds = time.after_s if now is None or time.after_s is not None else time.seconds(now)
-            if time.kind == "due":
+            if time.kind == "due" or (time.hour is not None and not said.done):
                 goal = replace(goal, due_s=seconds)
             else:
                 goal = replace(goal, not_before_s=seconds)

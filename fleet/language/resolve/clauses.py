@@ -21,10 +21,15 @@ from fleet.language.resolve.skilled import Skilled
 from fleet.language.resolve.tidiness import Tidiness
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import Clause
+from fleet.language.words.tokens import words_in
 
-_COMMANDS = frozenset({"do", "told", "shall_be", "wanted", "belongs", "bare", "needs", "named"})
+_STATES = frozenset({"shall_be", "wanted", "belongs", "bare", "bare_state", "named", "needs"})
+"""Kinds of clauses that say what shall be so, rather than what shall be done."""
+_COMMANDS = _STATES | {"do", "told", "needs_doing"}
 _WISHES = frozenset(
-    {"wanted", "belongs", "whereto", "enough", "kept", "never_be", "never_do", "avoid"}
+    words_in(
+        "wanted belongs whereto enough kept never_be never_do avoid needs needs_doing not_allowed"
+    )
 )
 
 
@@ -67,6 +72,7 @@ class Clauses:
         if self.scene.mode == "fact" and clause.kind in _WISHES:
             raise NotUnderstood(f"{said.clause!r} is not understood as a fact: {SAY_IT}")
         self._by_kind[clause.kind](clause)
+        self.scene.said.done |= clause.kind not in _STATES
         said = self.scene.said
         for mention, wants in said.extra:
             if self.scene.mode == "fact" or clause.kind not in _COMMANDS:

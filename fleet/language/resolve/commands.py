@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace as structs_replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import reason_for
@@ -127,6 +128,21 @@ class Commands:
     def _check_who(self, who: Sequence[Subject] | None) -> None:
         if who is not None:
             self.who.check_who(who)
+
+    def on_needs_doing(self, clause: Clause) -> None:
+        """`the living room needs tidying up`."""
+        assert clause.subject is not None and clause.verb is not None
+        self._verb(structs_replace(clause, arguments=(clause.subject, *clause.arguments)), None)
+
+    def on_not_allowed(self, clause: Clause) -> None:
+        """`Scout isn't allowed in the office`."""
+        assert clause.subject is not None
+        who = self.nouns.subjects(clause.subject, ("robot",), "a robot")
+        names = [n for s in who for n in self.who.resolve(s).subjects]
+        places = self._entered(framed(clause.arguments))
+        self.scene.said.never.extend(
+            Condition(relation=AT, subject=name, value=place) for name in names for place in places
+        )
 
     def on_never_do(self, clause: Clause) -> None:
         """`never go to the kitchen`, `the hsr should never enter it`."""

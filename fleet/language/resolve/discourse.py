@@ -58,7 +58,9 @@ class Discourse:
     never: list[Condition] = field(default_factory=list)
     when: list[Condition] = field(default_factory=list)
     times: list[TimePhrase] = field(default_factory=list)
-    urgent: bool = False
+    urgent: int = 0
+    done: bool = False
+    """Whether the sentence asks that something be done, rather than be so."""
 
     def copy(self) -> Discourse:
         """The same, for another reading to go on from."""

@@ -160,10 +160,13 @@ class NounResolver:
         text = self.scene.said.quote(noun.first, noun.last)
         made = NounPhrase((), text, noun.first, noun.quantity, count=noun.count)
         made = self._headed(noun, made, types, what)
+        made = self._owned(noun, made)
         if noun.use is not None:
             made = self._useful(made, noun.use)
         for adjective in noun.adjectives:
             made = self.scene.stated.narrowed(made, adjective, self.scene.said)
+        if noun.determiner == "any" and (noun.adjectives or noun.relatives):
+            made = replace(made, quantity=Quantity.ALL)  # "any plant that is dry"
         for relative in noun.relatives:
             if relative.state is not None:
                 made = self.scene.stated.narrowed(
@@ -181,6 +184,11 @@ class NounResolver:
     def _headed(
         self, noun: Noun, made: NounPhrase, types: Sequence[EntityType], what: str
     ) -> NounPhrase:
+        if noun.form == "whatever":
+            found = tuple(e for e in self.scene.lexicon.entities if e.type == "object")
+            if "object" not in types or not found:
+                raise self.unknown(noun, types, what)
+            return replace(made, found=found, generic=True)
         if noun.form == "general":
             return self._general(noun, made, types, what)
         if noun.form == "headless" or (noun.form == "one" and len(noun.head) == 1):
@@ -233,6 +241,9 @@ class NounResolver:
             generic = len(words) == 1 and len(found) == len(kind[1]) and category
         if noun.of:
             found = self._of_what(noun, found, types, what)
+        if noun.ordinals or noun.numbers:  # the first cup is no mug
+            closest = tuple(e for e in found if self.scene.lexicon.is_kin(words, e))
+            found = closest or found
         self._remember_kind(found[0])
         if noun.form == "one":
             return replace(made, found=found, plural=noun.head[-1].spoken == "ones")
@@ -264,6 +275,28 @@ class NounResolver:
         if entity_type not in types or not found:
             raise self.unknown(noun, types, what)
         return replace(made, found=found, quantity=quantity, generic=entity_type == "object")
+
+    def _owned(self, noun: Noun, made: NounPhrase) -> NounPhrase:
+        """Those of an owner: of "Anna's mug" only those; of "my mug" those, if there are any."""
+        said = self.scene.said
+        owner: str | None = None
+        if noun.whose is not None:
+            subject = self.subject(noun.whose, ("object", "robot"), "a person")
+            owner = self.who.resolve(subject).subjects[0]
+            said.spoken_of((owner,))
+        elif noun.determiner in ("my", "our"):
+            owner = self.scene.vocabulary.speaker
+        elif noun.determiner in ("his", "her", "their"):
+            owner = said.person
+        things = self.scene.vocabulary.objects
+        owned = [
+            n for n in made.names if n in things and things[n].properties.get("owner") == owner
+        ]
+        if owner is not None and owned:
+            return replace(made.among(owned), exact=made.exact and len(owned) == 1)
+        if noun.whose is not None:
+            raise NotUnderstood(f"{made.text!r}: nothing of that kind is known to be {owner}'s")
+        return made
 
     def _useful(self, made: NounPhrase, verb: str) -> NounPhrase:
         known = {use for e in self.scene.lexicon.entities if e.type == "object" for use in e.uses}

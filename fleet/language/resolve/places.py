@@ -330,6 +330,8 @@ class PlaceResolver:
         mentions = []
         for subject in self.nouns.subjects(nouns, PLACES, "a place"):
             mention = self.who.resolve(subject)
+            if people := [n for n in mention.subjects if self.scene.vocabulary.is_person(n)]:
+                raise NotUnderstood(f"{one_of(people)} is no place")
             if mention.open or mention.type not in PLACES:
                 raise NotUnderstood(f"it does not say which place: {EXAMPLE}")
             surfaces = subject.surfaces

@@ -18,6 +18,7 @@ from fleet.language.tree.nodes import (
     Clause,
 )
 from keyexpr_schema.facts import (
+    AT,
     SEARCHED,
 )
 from keyexpr_schema.payloads.goals import Condition
@@ -72,7 +73,9 @@ class Questions:
             )
         )
 
-    def _asked(self, clause: Clause, names: Sequence[str]) -> tuple[Condition, ...]:
+    def _asked(
+        self, clause: Clause, names: Sequence[str], negated: bool = False
+    ) -> tuple[Condition, ...]:
         """What may be so of each of them, who are then called `?`."""
         predicate = clause.predicate
         arguments = predicate.arguments if predicate is not None else clause.arguments
@@ -91,7 +94,7 @@ class Questions:
         if words:
             held = {
                 (relation, value)
-                for relation, _, value in of_each(self.scene.stated, words, names[:1])
+                for relation, _, value in of_each(self.scene.stated, words, names[:1], negated)
             }
             return tuple(Condition(relation=r, subject="?", value=v) for r, v in sorted(held))
         if not arguments:
@@ -122,6 +125,18 @@ class Questions:
             tuple(replace(each, subject=name) for name in names for each in held),
         )
 
+    def on_which_not(self, clause: Clause) -> None:
+        """`which boxes aren't sealed?`"""
+        self._asks(clause)
+        names = self._asked_of(clause)
+        self.scene.question = Question("which", names, self._asked(clause, names, True))
+
+    def on_who_at(self, clause: Clause) -> None:
+        """`who is in the study?`"""
+        self._asks(clause)
+        held = self._asked(clause, ())
+        self.scene.question = Question("who", (), held)
+
     def on_doing(self, clause: Clause) -> None:
         """`what is the robot doing?`"""
         self._asks(clause)
@@ -131,4 +146,5 @@ class Questions:
     def on_who(self, clause: Clause) -> None:
         """`who has the book?`"""
         self._asks(clause)
-        self.scene.question = Question("who", self._asked_of(clause))
+        held = tuple(Condition(relation=AT, subject=n, value="?") for n in self._asked_of(clause))
+        self.scene.question = Question("who", (), held)

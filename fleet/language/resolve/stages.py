@@ -116,16 +116,21 @@ class GoalDraft:
             ]
         return meant
 
-    def conditions(self) -> tuple[tuple[Condition, ...], ...]:
+    def conditions(self, speaker: str | None = None) -> tuple[tuple[Condition, ...], ...]:
         """The stages, each free of contradictions and of what another wish implies.
+
+        What was fetched, and goes nowhere, is for the `speaker`.
 
         Raises:
             NotUnderstood: two wishes of one stage cannot both come true.
         """
-        _check_carried([wish for stage in self.stages for wish in stage])
-        stages = [
-            part for stage in self.stages for part in _sequenced(_without_implied_travel(stage))
-        ]
+        wished = [wish for stage in self.stages for wish in stage]
+        given = [] if speaker is None else [
+            [_for_speaker(wish, wished, speaker) for wish in stage] for stage in self.stages
+        ]  # fmt: skip
+        stages_ = given or self.stages
+        _check_carried([wish for stage in stages_ for wish in stage])
+        stages = [part for stage in stages_ for part in _sequenced(_without_implied_travel(stage))]
         return tuple(
             tuple(dict.fromkeys(wish.condition() for wish in _consistent(stage, self.is_at)))
             for stage in stages
@@ -156,6 +161,14 @@ def _check_carried(wishes: Sequence[Wish]) -> None:
                 f"it does not say whether {one_of(wish.subjects)} goes along: "
                 'say "bring … to …" to take it somewhere'
             )
+
+
+def _for_speaker(wish: Wish, wishes: Sequence[Wish], speaker: str) -> Wish:
+    """The same, or that the speaker has it, where it was fetched and nothing says where to."""
+    at = next(i for i, other in enumerate(wishes) if other is wish)
+    if not wish.whereto or any(_brings(later, wish) for later in wishes[at + 1 :]):
+        return wish
+    return replace(wish, relation=AT, value=speaker, on_robot=True, whereto=False)
 
 
 def _brings(wish: Wish, held: Wish) -> bool:

@@ -93,7 +93,7 @@ class Wishes:
             )
         whereto = where.target is not None or bool(where.each) or home
         if fetch and not whereto:
-            return self._fetched(moved, where)
+            return self._fetched(moved, where, frame.senses)
         return self.to_target(moved, where, home or (tidy and where.target is None))
 
     def _for_whom(self, frame: Frame) -> tuple[Frame, str | None]:
@@ -162,12 +162,13 @@ class Wishes:
             raise NotUnderstood(f"{name} is no robot or person that something could be given to")
         return name, mention.type
 
-    def _fetched(self, moved: Sequence[Subject], where: Where) -> None:
+    def _fetched(self, moved: Sequence[Subject], where: Where, senses: frozenset[str]) -> None:
         if any(subject.type == "robot" for subject in moved):
             raise self._no_target()
         mentions = [self.from_where(self.who.movable(s), where) for s in moved]
+        later = "hold" not in senses or self.scene.vocabulary.speaker is None
         for mention in mentions:
-            self.scene.said.draft.add(HELD, mention, True, whereto=True)
+            self.scene.said.draft.add(HELD, mention, True, whereto=later)
         self.scene.said.remember(mentions)
 
     def from_where(self, subject: Subject, where: Where) -> Mention:

@@ -93,6 +93,14 @@ class Builder:
                 words.extend(child)
         if name in ("do", "told", "never_do") and verb is None:
             return None
+        if name == "told_after":
+            *arguments_, who = (*arguments, *more) if subject is None else (*arguments, subject)
+            if not all(self._types(noun) <= {"robot"} for noun in who.items):
+                return None
+            name, subject, arguments, more = "told", who, tuple(arguments_), []
+        if name == "where_in":
+            subject, more = (more[0] if more else subject), []
+            name, arguments = "where", ()
         first, last = self._span(start, end)
         return Clause(
             name, first, last, verb, subject, (*more, *arguments), predicate, tuple(words)
@@ -247,6 +255,31 @@ class Builder:
         first, last = self._span(start, end)
         return replace(noun, first=first, last=last)
 
+    def _owned(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        made = self._noun(children[2:], start, end)
+        if made is None:
+            return None
+        quantity = Quantity.THE if made.quantity is Quantity.BARE else made.quantity
+        return replace(made, whose=children[0], quantity=quantity)
+
+    def _whatever(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        places = tuple(child for child in children if isinstance(child, Place))
+        if any(place.role == "to" or place.special for place in places):
+            return None
+        nouns = [c for c in children[1:] if isinstance(c, Lexeme) and "BE" not in c.tags]
+        first, last = self._span(start, end)
+        return Noun(
+            "noun" if nouns else "whatever",
+            first,
+            last,
+            Quantity.ALL,
+            head=tuple(nouns[:1]),
+            relatives=(Relative(places),),
+        )
+
+    def _both_of(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        return self._nps(children[1:], start, end) if children[0].word == "both" else None
+
     def _headless(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         following = self.words[end].tags if end < len(self.words) else frozenset()
         if following & {"NOUN", "UNK", "ONE", "ORD", "BASKET"} or "NUM" in following:
@@ -314,6 +347,8 @@ class Builder:
         """What the noun can be, as far as its words say it."""
         if noun.form == "basket":
             return frozenset({"robot", "surface", "object"})
+        if noun.form == "whatever":
+            return frozenset({"object"})
         if noun.form == "general":
             return frozenset({"robot"} if "EVERYONE" in noun.head[0].tags else {"object"})
         if noun.form != "noun" or any("UNK" in word.tags for word in noun.head):

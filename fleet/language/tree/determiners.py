@@ -35,15 +35,16 @@ def determined(groups: Sequence[Sequence[Lexeme]]) -> Noun | None:
         noun = replace(noun, quantity=Quantity.ALL, count=2 if word.word == "both" else None)
         walk.take("SINGLE")
         walk.take("OF")
-        walk.take("DET")
+        if word := walk.take("DET"):
+            noun = replace(noun, determiner=word.word)
     elif word := walk.take("INDEF"):
-        noun = replace(noun, quantity=Quantity.ANY)
+        noun = replace(noun, quantity=Quantity.ANY, determiner=word.word)
         walk.take("SINGLE")
         if walk.take("OF"):
             walk.take("DET")
             noun = replace(noun, part=word.word != "some")
-    elif walk.take("DET"):
-        noun = replace(noun, quantity=Quantity.THE)
+    elif word := walk.take("DET"):
+        noun = replace(noun, quantity=Quantity.THE, determiner=word.word)
         walk.take("SINGLE")
     elif walk.take("ANOTHER"):
         noun = replace(noun, quantity=Quantity.ANY, other="another")

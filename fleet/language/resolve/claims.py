@@ -188,8 +188,14 @@ class Claims:
         assert clause.subject is not None
         states = self.scene.stated.states
         if predicate is not None and predicate.words and predicate.words[0].words in states:
-            plain = not predicate.arguments and word not in self.scene.tagger.book.searched
-            if plain or (not predicate.arguments and not self.nouns.can_be(clause.subject, PLACES)):
+            names = {
+                n
+                for types in (THINGS, PLACES)
+                if self.nouns.can_be(clause.subject, types)
+                for s in self.nouns.subjects(clause.subject, types, "an object")
+                for n in (s.subjects if isinstance(s, Mention) else s.names)
+            }
+            if not predicate.arguments and names & self.scene.stated.able(predicate.words[0]):
                 return self.are(clause.subject, predicate.words[:1], not value)
         if word not in self.scene.tagger.book.searched or (predicate and predicate.arguments):
             if predicate and predicate.kind == "done" and predicate.arguments and value:

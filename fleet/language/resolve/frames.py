@@ -73,6 +73,7 @@ def frames_of(
                 of_skill = skills if SKILL in entry.senses else []
                 found.append((len(entry.behind), fitted, of_skill))
     longest = max((row[0] for row in found), default=0)
+    found.sort(key=lambda row: not any(frame.phrase.says for frame in row[2]))
     return [(frame, skills) for length, frame, skills in found if length == longest]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace as replace_nouns
 
 from msgspec.structs import replace
 
@@ -66,7 +67,11 @@ class Questions:
     def _asked_of(self, clause: Clause) -> tuple[str, ...]:
         assert clause.subject is not None
         types = THINGS if self.nouns.can_be(clause.subject, THINGS) else PLACES
-        found = self.nouns.subjects(clause.subject, types, "an object, robot or place")
+        plain = replace_nouns(
+            clause.subject,
+            items=tuple(replace_nouns(n, adjectives=()) for n in clause.subject.items),
+        )
+        found = self.nouns.subjects(plain, types, "an object, robot or place")
         return tuple(
             dict.fromkeys(
                 n for s in found for n in (s.names if not isinstance(s, Mention) else s.subjects)
@@ -99,6 +104,8 @@ class Questions:
             return tuple(Condition(relation=r, subject="?", value=v) for r, v in sorted(held))
         if not arguments:
             return ()
+        if negated:
+            raise NotUnderstood(f"{self.scene.said.clause!r}: ask where they are, not where not")
         where, _ = self.wishes.whereto(framed(arguments))
         target = where.target or where.source
         if target is None:
@@ -109,6 +116,17 @@ class Questions:
         """`is the door open?`"""
         self._asks(clause)
         assert clause.subject is not None
+        if not clause.has("DET") and any(
+            n.quantity.name != "THE" and not n.numbers and n.form == "noun" and n.determiner
+            for n in clause.subject.items
+        ):  # "are there any clean glasses?"
+            names_of_any = self._asked_of(clause)
+            held = self._asked(clause, names_of_any)
+            states = [w for n in clause.subject.items for w in n.adjectives]
+            rows = of_each(self.scene.stated, states, names_of_any[:1])
+            told = tuple(Condition(relation=r, subject="?", value=v) for r, _, v in rows)
+            self.scene.question = Question("whether", names_of_any, (*held, *told))
+            return
         types = THINGS if self.nouns.can_be(clause.subject, THINGS) else PLACES
         mentions = [
             self.who.resolve(s)

@@ -139,7 +139,9 @@ class GoalDraft:
 
 
 def _same(one: Wish, other: Wish) -> bool:
-    return one.key == other.key or (one.subjects == other.subjects and one.open == other.open)
+    if one.open or other.open:
+        return one.key == other.key or (one.subjects, one.open) == (other.subjects, other.open)
+    return one.subjects == other.subjects
 
 
 def _check_carried(wishes: Sequence[Wish]) -> None:
@@ -250,7 +252,9 @@ def _finest(stage: Sequence[Wish], is_at: Callable[[str, str], bool]) -> list[Wi
 
 def _implies(wish: Wish, other: Wish, later: bool) -> bool:
     """Whether `other` need not be said beside `wish`."""
-    same = wish.subjects == other.subjects or wish.key == other.key
+    same = _same(wish, other)
+    if other.relation == LOCATED and wish.value in other.subjects:
+        return wish.relation in PLACED  # "find Lily and give her the doll"
     if other.relation == LOCATED:
         return same and wish.relation in {*PLACED, HELD}
     return same and other.relation == HELD and wish.relation in PLACED and later

@@ -191,6 +191,12 @@ class Wishes:
             for place in frame.places
             if place.special not in ("home", "anywhere")
         ]
+        bare = [p.special == "there" and not p.preposition for p in frame.places]
+        if len(locatives) == len(bare) > 1:  # "in the washing machine there"
+            locatives = [
+                replace(loc, role="in") if is_bare else loc
+                for loc, is_bare in zip(locatives, bare, strict=True)
+            ]
         placed = any(locative.role != "from" for locative in locatives)
         home = frame.home or bool(particles & {"back", "away"})
         if placed and frame.home:

@@ -125,8 +125,9 @@ class Builder:
         )
 
     def _arg(self, children: tuple[Any, ...], start: int, end: int) -> Any:
-        if len(children) == 2:
-            return Except(children[1])
+        if isinstance(children[0], Lexeme) and "EXCEPT" in children[0].tags and len(children) > 1:
+            left_out = self._left_out(children[1], children[2:])
+            return left_out and [(not children[2:], Except(left_out))]
         return Particle(children[0]) if isinstance(children[0], Lexeme) else children[0]
 
     def _state(self, children: tuple[Any, ...], start: int, end: int) -> Any:
@@ -210,7 +211,18 @@ class Builder:
         noun = children[0]
         if len(children) == 2:
             return replace(noun, relatives=(*noun.relatives, children[1]))
-        return replace(noun, but=children[2]) if len(children) == 3 else noun
+        if len(children) < 3:
+            return noun
+        left_out = self._left_out(children[2], children[3:])
+        return left_out and [(not children[3:], replace(noun, but=left_out))]
+
+    @staticmethod
+    def _left_out(nouns: Nouns, places: tuple[Any, ...]) -> Nouns | None:
+        """What is left out, with where it is."""
+        if any(place.role == "to" or place.special for place in places):
+            return None
+        last = replace(nouns.items[-1], places=places)
+        return replace(nouns, items=(*nouns.items[:-1], last))
 
     def _rel(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         places = tuple(child for child in children if isinstance(child, Place))

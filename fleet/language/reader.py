@@ -115,7 +115,8 @@ class Reader:
             timed = bool(sentence.times) or any(part.role for part in sentence.segments)
             for state in states:
                 said = state.said
-                said.elliptic, said.addressees, said.done = "", [], False
+                said.elliptic, said.addressees, said.done, said.again = "", [], False, None
+                said.telegraphic = sentence.telegraphic
                 said.urgent = said.urgent or sentence.urgent
                 if timed or said.times or said.when:
                     with suppress(NotUnderstood):  # the last sentence says it again
@@ -388,9 +389,15 @@ class Reader:
 
     @staticmethod
     def _timed(goal: WantedGoal, said: Discourse, now: datetime | None) -> WantedGoal:
+        every = next((time for time in said.times if time.kind == "every"), None)
         for time in said.times:
-            if time.kind == "every":
+            if time is every:
+                at = next((t for t in said.times if t.kind == "start" and t.hour is not None), None)
+                if at is not None and time.every_s is None:
+                    time = replace(time, hour=at.hour, minute=at.minute)
                 goal = replace(goal, every=time.recurrence)
+                continue
+            if every is not None and time.kind == "start" and time.hour is not None:
                 continue
             if time.after_s is None and now is None:
                 raise NotUnderstood("a time of day is named, and what time it is now is not known")

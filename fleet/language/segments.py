@@ -36,6 +36,8 @@ class Sentence:
     times: tuple[TimePhrase, ...] = ()
     urgent: int = 0
     dangling: bool = False
+    telegraphic: bool = False
+    """Whether it has no articles: "toys in box" are all the toys."""
 
 
 def sentences_of(lexemes: Sequence[Lexeme]) -> list[tuple[Lexeme, ...]]:
@@ -97,7 +99,8 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
         segments += _segment(begun, joint, role)
         dangling = not _content(begun) and joint in ("then", "and")
         dangling = dangling or bool(begun and "AND" in begun[-1].tags)
-    return Sentence(tuple(words), tuple(segments), tuple(times), urgent, dangling)
+    telegraphic = not any(word.tags & {"DET", "INDEF"} for word in words)
+    return Sentence(tuple(words), tuple(segments), tuple(times), urgent, dangling, telegraphic)
 
 
 def _content(words: Sequence[Lexeme]) -> list[Lexeme]:
@@ -187,7 +190,7 @@ def _segment(words: Sequence[Lexeme], joint: str, role: str) -> list[Segment]:
     words = _commas(words)
     if len(words) > 1 and words[0].words == ("1st",) and "COMMA" in words[1].tags:
         words = words[2:]
-    while words and words[-1].tags & {"AND"}:
+    while words and words[-1].tags & {"AND", "COMMA"}:
         words = words[:-1]
     numbered = words and "ORD" in words[0].tags and "NOUN" not in words[0].tags
     if numbered:

@@ -51,7 +51,7 @@ class Clauses:
         commands = Commands(
             scene, who, nouns, places, wishes, looking, skilled, tidiness, questions
         )
-        ellipsis = Continuations(scene, who, nouns, wishes, claims)
+        ellipsis = Continuations(scene, who, nouns, wishes, claims, commands)
         self._by_kind: dict[str, Callable[[Clause], None]] = {
             name.removeprefix("on_"): getattr(part, name)
             for part in (claims, questions, shall, commands, ellipsis)

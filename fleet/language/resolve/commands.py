@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace as structs_replace
+from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import reason_for
@@ -19,8 +19,10 @@ from fleet.language.resolve.skilled import Skilled
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.resolve.tidiness import Tidiness
 from fleet.language.resolve.wishes import Wishes
+from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tree.nodes import (
     Clause,
+    Nouns,
 )
 from keyexpr_schema.facts import (
     AT,
@@ -44,6 +46,7 @@ class Commands:
         questions: Questions,
     ) -> None:
         self.scene = scene
+        self._clause: Clause | None = None
         self.who = who
         self.nouns = nouns
         self.places = places
@@ -54,7 +57,22 @@ class Commands:
         self.questions = questions
 
     def on_do(self, clause: Clause) -> None:
+        """`bring the soup to Anna`, `bring me my mug, washed`."""
         self._verb(clause, self.scene.said.addressees or None)
+        for word in clause.words:
+            if word.tags & {"ADJ", "PART"} and "NOUN" not in word.tags:
+                for mention in self.scene.said.recent:
+                    wants = self.scene.stated.wants(word, mention.subjects[0])
+                    self.skilled.wish([mention], wants)
+
+    def once_more(self, clause: Clause) -> bool:
+        """`then the cactus`, after `water the fern`: whether the verb before was of that kind."""
+        before = self.scene.said.again
+        if before is None or clause.subject is None:
+            return False
+        rest = [a for a in before.arguments if not isinstance(a, Nouns)]
+        self._verb(replace(before, arguments=(clause.subject, *rest)), None)
+        return True
 
     def on_told(self, clause: Clause) -> None:
         assert clause.subject is not None
@@ -77,6 +95,7 @@ class Commands:
 
     def _verb(self, clause: Clause, who: Sequence[Subject] | None) -> None:
         assert clause.verb is not None
+        self._clause = clause
         problems: list[NotUnderstood] = []
         frames = frames_of(self.scene.tagger, clause.verb, clause.arguments, ("VERB", "FIN", "GER"))
         if not frames:
@@ -85,11 +104,12 @@ class Commands:
             before = self.scene.said
             self.scene.said = before.copy()
             try:
+                frame = self._for_me(frame, phrases)
                 if phrases:
                     if phrases[0].phrase.type != "robot":
                         self._check_who(who)
                     self.scene.said.elliptic = ""
-                    self.scene.said.again = (clause.verb, clause.arguments)
+                    self.scene.said.again = clause
                     self.skilled.skill(frame, phrases, who)
                 else:
                     self._sense(frame, who)
@@ -99,9 +119,26 @@ class Commands:
                 problems.append(problem)
         raise problems[0]
 
+    def _for_me(self, frame: Frame, skills: Sequence[SkillFrame]) -> Frame:
+        """The frame without "for me" and "me", where that says no more than who asks."""
+        if "move" in frame.senses:
+            return frame
+        for_me = tuple(
+            p for p in frame.places if p.role == "for" and p.nouns and p.nouns.items[0].form == "me"
+        )
+        places = tuple(p for p in frame.places if p not in for_me)
+        themes = frame.themes
+        if skills and len(themes) == 2 and themes[0].items[0].form == "me":
+            themes = themes[1:]
+        if for_me and "pick" in frame.senses and self.scene.vocabulary.speaker is not None:
+            return replace(frame, senses=frozenset({"move"}))
+        return replace(frame, places=places, themes=themes)
+
     def _sense(self, frame: Frame, who: Sequence[Subject] | None) -> None:
         senses = frame.senses
         self.scene.said.verb = frame.verb
+        if not senses & {"move", "go", "give"}:
+            self.scene.said.again = self._clause
         self.scene.said.elliptic = "move" if senses & {"move", "go", "give"} else ""
         if "go" in senses and not frame.themes and ("move" not in senses or _whereto(frame)):
             return self.wishes.go(frame, who)
@@ -132,7 +169,7 @@ class Commands:
     def on_needs_doing(self, clause: Clause) -> None:
         """`the living room needs tidying up`."""
         assert clause.subject is not None and clause.verb is not None
-        self._verb(structs_replace(clause, arguments=(clause.subject, *clause.arguments)), None)
+        self._verb(replace(clause, arguments=(clause.subject, *clause.arguments)), None)
 
     def on_not_allowed(self, clause: Clause) -> None:
         """`Scout isn't allowed in the office`."""

@@ -59,6 +59,8 @@ class Discourse:
     when: list[Condition] = field(default_factory=list)
     times: list[TimePhrase] = field(default_factory=list)
     urgent: int = 0
+    telegraphic: bool = False
+    """Whether the sentence has no articles."""
     done: bool = False
     """Whether the sentence asks that something be done, rather than be so."""
 

@@ -18,6 +18,7 @@ from fleet.language.tree.nodes import (
 )
 from fleet.language.words.tokens import ORDINALS, Token, words_of
 
+_SINGULAR = ("ss", "us", "is")
 _PERSONAL = frozenset({"him", "her", "he", "she"})
 _PLURAL = frozenset({"them", "they", "these", "those", "both", "all", "each"})
 
@@ -140,7 +141,14 @@ class NounResolver:
         chosen = self.scene.said.chosen.get(noun.first)
         if chosen is not None and chosen in made.names:
             return replace(made.among({chosen}), exact=True, source=None)
-        return self._salient(made)
+        return self._salient(self._spoken_briefly(noun, made))
+
+    def _spoken_briefly(self, noun: Noun, made: NounPhrase) -> NounPhrase:
+        """Bare plurals of a sentence without articles are all of them: "lights off"."""
+        bare = made.plural and made.quantity is Quantity.BARE and made.count is None
+        if bare and self.scene.said.telegraphic and self.scene.mode == "":
+            return replace(made, quantity=Quantity.ALL)
+        return made
 
     def _salient(self, made: NounPhrase) -> NounPhrase:
         """Of several, the one that was spoken of last: "the plate" after "plate 2"."""
@@ -237,11 +245,13 @@ class NounResolver:
         kind = self.scene.lexicon.kind(tokens, 0, end, types)
         if kind is not None and (of_kind := tuple(e for e in found if e in kind[1])):
             plural, found = kind[0], of_kind
+            plural = plural or (words[-1].endswith("s") and not words[-1].endswith(_SINGULAR))
             category = any(words[0] in (c, f"{c}s") for cs in CATEGORIES.values() for c in cs)
             generic = len(words) == 1 and len(found) == len(kind[1]) and category
         if noun.of:
             found = self._of_what(noun, found, types, what)
-        if noun.ordinals or noun.numbers:  # the first cup is no mug
+        said_plainly = noun.quantity is Quantity.THE and not plural
+        if noun.ordinals or noun.numbers or said_plainly:  # the first cup is no mug
             closest = tuple(e for e in found if self.scene.lexicon.is_kin(words, e))
             found = closest or found
         self._remember_kind(found[0])

@@ -116,8 +116,11 @@ class Stated:
                 measured[name] = _WEIGHTS[word] * thing.mass_kg
             elif word in _SIZES and sizes:
                 measured[name] = _SIZES[word] * sizes[0]
-        best = [n for n in measured if measured[n] == max(measured.values())]
-        if len(measured) < len(noun.names) or len(best) != 1:
+        order = sorted(measured, key=lambda n: -measured[n])
+        count = noun.count or 1
+        edge = sorted(measured.values(), reverse=True)[:count]
+        best = [n for n in order if edge and measured[n] >= edge[-1]]
+        if len(measured) < len(noun.names) or len(best) != count:
             raise NotUnderstood(
                 f"it is not known which of {one_of(noun.names)} is the {word}: name it"
             )

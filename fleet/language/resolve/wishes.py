@@ -15,7 +15,6 @@ from fleet.language.resolve.referents import Referents
 from fleet.language.resolve.scene import THINGS, Scene
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tree.nodes import (
-    Nouns,
     Place,
 )
 from keyexpr_schema.facts import (
@@ -56,7 +55,6 @@ class Wishes:
                 to_speaker = True
             else:
                 receiver = self._receiver(frame)
-        moved_nouns = self._excepting(moved_nouns, frame)
         moved = self.nouns.subjects(moved_nouns, THINGS, "an object")
         if receiver is not None:
             where, home = self.whereto(frame, fetching=True)
@@ -64,7 +62,7 @@ class Wishes:
                 raise NotUnderstood(f"{self.scene.said.clause!r} says twice where to: say one")
             target = Where(where.source, *receiver, source_surface=where.source_surface)
             return self.to_target(moved, target, False)
-        frame, beneficiary = self._for_whom(frame)
+        frame, beneficiary = self.for_whom(frame)
         frame, inside = self._inside(frame)
         moved_more = [p.nouns for p in frame.places if p.role == "along" and p.nouns is not None]
         if moved_more:
@@ -96,7 +94,7 @@ class Wishes:
             return self._fetched(moved, where, frame.senses)
         return self.to_target(moved, where, home or (tidy and where.target is None))
 
-    def _for_whom(self, frame: Frame) -> tuple[Frame, str | None]:
+    def for_whom(self, frame: Frame) -> tuple[Frame, str | None]:
         """The frame without "for Anna"; for whom it is, if that is known."""
         for place in frame.places:
             if place.role != "for" or place.nouns is None:
@@ -137,14 +135,6 @@ class Wishes:
             token.word in ("it", "them", "put", "place", "give", "bring", "take")
             for token in self.scene.said.tokens[self.scene.said.ended :]
         )
-
-    def _excepting(self, nouns: Nouns, frame: Frame) -> Nouns:
-        """The same, without what is excepted behind the places."""
-        for left_out in frame.but:
-            nouns = replace(
-                nouns, items=(*nouns.items[:-1], replace(nouns.items[-1], but=left_out.nouns))
-            )
-        return nouns
 
     def receives(self, where: Where) -> bool:
         return where.target_type == "robot" or self.scene.vocabulary.is_person(where.target or "")
@@ -340,7 +330,7 @@ class Wishes:
         if where.target is None and len(bins) != 1:
             raise NotUnderstood(f"it could be {one_of(sorted(bins))}: say which bin")
         target = where.target or min(bins)
-        moved = self.nouns.subjects(self._excepting(frame.themes[0], frame), THINGS, "an object")
+        moved = self.nouns.subjects(frame.themes[0], THINGS, "an object")
         where = replace(where, target=target, target_type="object", relation=IN)
         return self.to_target(moved, where, False)
 

@@ -192,7 +192,14 @@ class Builder:
         bare = len(items) > 1 and items[-1].quantity is Quantity.BARE
         strange = bare and any("UNK" in word.tags for word in items[-1].head)
         cost = COSTS["unknown"] * (bool(unknown) + 2 * strange)  # rather a verb that is not known
+        cost += sum(item.but is not None for item in items[:-1])  # rather more is left out
         return [(cost, Nouns(items))]
+
+    def _subject(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        if isinstance(children[0], Nouns):
+            return [(0, children[0])]
+        item = self._item(children, start, end)
+        return item and [(1, Nouns((item,)))]
 
     def _either(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         made = self._nps(children, start, end)

@@ -64,6 +64,9 @@ def determined(groups: Sequence[Sequence[Lexeme]]) -> Noun | None:
     adjectives = []
     while word := walk.take("ADJ", "SUP"):
         adjectives.append(word)
+    if adjectives and "SUP" in adjectives[-1].tags and walk.take("OF"):  # "the larger of the two"
+        walk.take("DET")
+        walk.take("NUM")
     noun = replace(noun, adjectives=tuple(adjectives))
     return noun if walk.at == len(walk.groups) else None
 
@@ -88,7 +91,7 @@ def _ordinals(walk: _Walk) -> tuple[int, ...]:
         return ()
     group = walk.groups[walk.at]
     found = tuple(
-        0 if "LAST" in word.tags else ordinal_of(word.words[0]) or 0
+        0 if "LAST" in word.tags else ordinal_of(word.words[0]) or 1
         for word in group
         if word.tags & {"ORD", "LAST"}
     )

@@ -9,9 +9,10 @@ from dataclasses import replace
 from datetime import datetime
 
 from fleet.errors import NotUnderstood
+from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, parsed
 from fleet.language.reading import Ambiguity, Reading, WantedGoal
-from fleet.language.refusals import listed, nearest, reason_for, suggestion
+from fleet.language.refusals import reason_for
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
@@ -19,7 +20,6 @@ from fleet.language.resolve.mentions import WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.segments import Segment, Sentence, cut, sentences_of
-from fleet.language.tagging.lexicon import ENTITY_TYPES
 from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
@@ -31,15 +31,10 @@ from keyexpr_schema.payloads.goals import Condition
 MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 120
-_BEFORE_NOUNS = frozenset({"DET", "INDEF", "UNIV", "NUM", "ORD", "ADJ", "OTHER", "ANOTHER"})
 _CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 _READINGS = 12
 """Readings of what was read so far that are followed up."""
-_BORDERS = frozenset({"COMMA", "AND", "THEN", "PREP", "TO", "BE", "MODAL", "HAVE", "END"})
-_REFUSED_OF_GOALS = ("IF", "WHEN", "UNLESS", "UNTIL", "BEFORE", "AFTER", "TIME", "DONT", "NEVER",
-                     "AVOID", "WITHOUT", "ALWAYS", "NOT")  # fmt: skip
-
 _KEPT: deque[tuple[Vocabulary, Tagger]] = deque(maxlen=4)
 
 
@@ -97,6 +92,7 @@ class Reader:
         self.text, self.vocabulary, self.mode = text, vocabulary, mode
         self.tagger = tagger_of(vocabulary)
         self.remarks: list[str] = []
+        self.why = Explanations(text, self.tokens, self.tagger, mode)
         self.line = " ".join(text.split())
 
     def read(self, now: datetime | None) -> list[tuple[int, str, Reading]]:
@@ -111,7 +107,7 @@ class Reader:
         dangling = False
         for words in sentences_of(lexemes):
             sentence = cut(words)
-            self._check(sentence)
+            self.why.check(sentence)
             timed = bool(sentence.times) or any(part.role for part in sentence.segments)
             for state in states:
                 said = state.said
@@ -146,11 +142,11 @@ class Reader:
             raise NotUnderstood(
                 f"{len(segment.words)} words are too many for one clause: say it in several"
             )
-        self._unheard_of(segment)
+        self.why.unheard_of(segment)
         try:
             trees = parsed(segment.words, Builder(segment.words, self.tagger))
         except NotGrammatical as error:
-            raise self._ungrammatical(segment, error.at) from None
+            raise self.why.ungrammatical(segment, error.at) from None
         found: list[_State] = []
         problems: list[tuple[int, NotUnderstood]] = []
         for state in states:
@@ -169,7 +165,7 @@ class Reader:
         if not found:
             strange = [w for w in segment.words if "UNK" in w.tags]
             if not problems or (strange and strange[0].text not in str(which)):
-                raise self._ungrammatical(segment, 0)
+                raise self.why.ungrammatical(segment, 0)
             raise min(problems, key=lambda row: row[0])[1]
         found.sort(key=lambda state: state.cost)
         return found[:_READINGS]
@@ -246,7 +242,7 @@ class Reader:
             len(words),
         )
         remark = words[:end]
-        shown = self._quote(remark)
+        shown = self.why.quote(remark)
         special = reason_for([(word.word, word.text) for word in remark])
         if special or any("NOUN" in word.tags for word in remark):
             raise NotUnderstood(
@@ -259,75 +255,6 @@ class Reader:
     def _command(words: Sequence[Lexeme]) -> bool:
         rest = [word for word in words if "POLITE" not in word.tags]
         return bool(rest) and "VERB" in rest[0].tags
-
-    def _quote(self, words: Sequence[Lexeme]) -> str:
-        start = self.tokens[words[0].first].start
-        return " ".join(self.text[start : self.tokens[words[-1].last - 1].end].split())
-
-    # --- refusals ---------------------------------------------------------------------------------
-    def _what(self) -> str:
-        return "a fact" if self.mode == "fact" else "a goal"
-
-    def _check(self, sentence: Sentence) -> None:
-        if self.mode != "goal":
-            return
-        for word in sentence.words:
-            if any(tag in word.tags for tag in _REFUSED_OF_GOALS) and "NOUN" not in word.tags:
-                spoken = [(t.word, self.text[t.start : t.end]) for t in
-                          self.tokens[word.first : word.last]]  # fmt: skip
-                special = reason_for(spoken, self._what())
-                if special:
-                    raise NotUnderstood(special)
-                raise NotUnderstood(f"{word.text!r} is nothing that {self._what()} can say yet")
-
-    def _unheard_of(self, segment: Segment) -> None:
-        """Whether a word stands there that is refused wherever it stands."""
-        for word in segment.words:
-            if "UNK" in word.tags and (
-                special := reason_for([(word.word, word.text)], self._what())
-            ):
-                raise NotUnderstood(special)
-
-    def _ungrammatical(self, segment: Segment, at: int) -> NotUnderstood:
-        """Why nothing was made of the words: the first that is not known, or where it ends."""
-        words = segment.words
-        strange = [i for i, word in enumerate(words) if "UNK" in word.tags]
-        example = SAY_IT if self.mode == "fact" else EXAMPLE
-        if strange:
-            at = strange[0]
-        elif at >= len(words) and "PREP" in words[-1].tags:
-            known = listed(self.tagger.lexicon.known(("place",)))
-            return NotUnderstood(
-                f"{self._quote(words)!r} ends where a place is missing; known are {known}"
-            )
-        end = at + 1
-        while end < len(words) and words[end - 1].tags & _BEFORE_NOUNS:
-            end += 1
-        shown = words[at:end] or words[-1:]
-        special = reason_for([(w.word, w.text) for w in shown], self._what())
-        if not special and not strange:
-            rest = [w for w in words if not w.tags & {"ME", "PEOPLE"}]
-            special = reason_for([(w.word, w.text) for w in rest], self._what())
-        if special:
-            return NotUnderstood(special)
-        if at >= len(words):
-            return NotUnderstood(f"{self._quote(words)!r} ends before it says all: {example}")
-        begins = at
-        while begins and words[begins - 1].tags & _BEFORE_NOUNS:
-            begins -= 1
-        if strange and (begins < at or (at and "PREP" in words[at - 1].tags)):
-            hint = suggestion(words[at].text, self.tagger.lexicon.names_in(ENTITY_TYPES))
-            known = nearest(self.tagger.lexicon.known(ENTITY_TYPES), words[at].text)
-            text = self._quote(words[begins : at + 1])
-            return NotUnderstood(
-                f"{text!r} is not a known object, robot or place{hint}; known are {known}"
-            )
-        text = self._quote(shown)
-        if at == 0:
-            verbs = {e.base for entries in self.tagger.verbs.entries.values() for e in entries}
-            hint = suggestion(words[0].word, verbs) if strange else ""
-            return NotUnderstood(f"{text!r} is not understood as {self._what()}{hint}: {example}")
-        return NotUnderstood(f"{text!r} is not understood after {self._quote(words[:at])!r}")
 
     # --- the end ----------------------------------------------------------------------------------
     def _ended(

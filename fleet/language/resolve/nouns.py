@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, nearest, one_of, suggestion
-from fleet.language.resolve.mentions import Mention, NounPhrase, Subject, WhichOne
+from fleet.language.resolve.mentions import NounPhrase, Subject
+from fleet.language.resolve.pronouns import PERSONAL, Pronouns, either
 from fleet.language.resolve.referents import Referents
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import CATEGORIES, ENTITY_TYPES, Entity, EntityType
@@ -19,8 +20,6 @@ from fleet.language.tree.nodes import (
 from fleet.language.words.tokens import ORDINALS, Token, words_of
 
 _SINGULAR = ("ss", "us", "is")
-_PERSONAL = frozenset({"him", "her", "he", "she"})
-_PLURAL = frozenset({"them", "they", "these", "those", "both", "all", "each"})
 
 
 class NounResolver:
@@ -29,6 +28,7 @@ class NounResolver:
     def __init__(self, scene: Scene, who: Referents) -> None:
         self.scene = scene
         self.who = who
+        self.pronouns = Pronouns(scene)
         self.located: Callable[[Noun, NounPhrase], NounPhrase] = lambda noun, made: made
 
     def subjects(self, nouns: Nouns, types: Sequence[EntityType], what: str) -> list[Subject]:
@@ -39,10 +39,10 @@ class NounResolver:
         """
         found = [self.subject(noun, types, what) for noun in nouns.items]
         if nouns.either:
-            either = found[0]
+            one_of_them = found[0]
             for other in found[1:]:
-                either = self._either(either, other)
-            return [either]
+                one_of_them = either(one_of_them, other)
+            return [one_of_them]
         for i in range(1, len(found)):
             found[i] = _determined(found[i], found[i - 1])
         return found
@@ -50,16 +50,16 @@ class NounResolver:
     def subject(self, noun: Noun, types: Sequence[EntityType], what: str) -> Subject:
         """Whom one noun phrase or pronoun means."""
         if noun.form == "pronoun":
-            return self.pronoun(noun, types)
+            return self.pronouns.pronoun(noun, types)
         if noun.form == "me":
-            return self.speaker(noun, "object")
+            return self.pronouns.speaker(noun, "object")
         return self.noun(noun, types, what)
 
     def can_be(self, nouns: Nouns, types: Sequence[EntityType]) -> bool:
         """Whether all of them can be of one of these types, by their words."""
         for noun in nouns.items:
             if noun.form == "pronoun":
-                if noun.words[0] in _PERSONAL and self.scene.said.person is not None:
+                if noun.words[0] in PERSONAL and self.scene.said.person is not None:
                     if "object" not in types:
                         return False
                 elif "object" not in types and "place" in types and self.scene.said.last_place:
@@ -75,61 +75,6 @@ class NounResolver:
                 except NotUnderstood:
                     return False
         return True
-
-    def speaker(self, noun: Noun, as_type: EntityType = "surface") -> NounPhrase:
-        """Who says "me".
-
-        Raises:
-            NotUnderstood: nobody knows.
-        """
-        text = self.scene.said.quote(noun.first, noun.last)
-        found = tuple(
-            e
-            for e in self.scene.lexicon.entities
-            if e.type == as_type and e.id == self.scene.vocabulary.speaker
-        )
-        if not found:
-            raise NotUnderstood(
-                f"{text!r} names somebody whose place is not known; name a place or a robot"
-            )
-        return NounPhrase(found, text, noun.first, exact=True)
-
-    def pronoun(self, noun: Noun, types: Sequence[EntityType]) -> Mention:
-        """Whom a pronoun means.
-
-        Raises:
-            NotUnderstood: nobody was spoken of, or it could be several.
-        """
-        word = noun.words[0]
-        said = self.scene.said
-        if word in _PERSONAL and said.person is not None:
-            return Mention((said.person,), "object", noun.first)
-        if (chosen := said.chosen.get(noun.first)) is not None:
-            of_type = next(m.type for m in said.recent if chosen in m.subjects)
-            return Mention((chosen,), of_type, noun.first)
-        if "object" not in types and "place" in types and word == "it" and said.last_place:
-            return Mention((said.last_place,), "place", noun.first)
-        plural = word in _PLURAL or len(noun.words) > 1
-        meant = [m for m in self.scene.said.recent if m.single != plural]
-        count = 2 if word == "both" else int(word) if word.isdecimal() else None
-        if len(meant) == 1 and count in (None, len(meant[0].subjects)):
-            return meant[0]
-        names = sorted({s for m in self.scene.said.recent for s in m.subjects})
-        reason = f"could be {one_of(names)}" if names else "refers to nothing before it"
-        text = self.scene.said.quote(noun.first, noun.last)
-        sentence = f"{text!r} {reason}: name what you mean"
-        raise WhichOne(sentence, noun.first, tuple(names) if len(meant) > 1 else ())
-
-    def _either(self, first: Subject, second: Subject) -> NounPhrase:
-        if not isinstance(first, NounPhrase) or not isinstance(second, NounPhrase):
-            raise NotUnderstood('"or" is understood between names only: name both')
-        if first.type != second.type or not (first.resolve().single and second.resolve().single):
-            raise NotUnderstood(f"{first.text!r} or {second.text!r} leaves too much open")
-        both = (
-            first.among(first.resolve().subjects).found
-            + second.among(second.resolve().subjects).found
-        )
-        return NounPhrase(both, f"{first.text} or {second.text}", first.key, Quantity.ANY)
 
     def noun(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
         """What a noun phrase can mean; its own words may say where it is.
@@ -180,6 +125,8 @@ class NounResolver:
                 made = self.scene.stated.narrowed(
                     made, relative.state, self.scene.said, relative.negated
                 )
+        if noun.but is not None and noun.ordinals:
+            raise NotUnderstood(f"{made.text!r} leaves something out of one thing")
         if noun.but is not None:
             made = self._without(made, noun.but, types, what)
         made = replace(made, plural=made.plural and not noun.part)
@@ -330,7 +277,8 @@ class NounResolver:
         if stray := sorted(gone - names):
             raise NotUnderstood(f"{made.text!r}: {one_of(stray)} is none of {one_of(made.names)}")
         left = made.among(names - gone)
-        if not left.found or made.quantity not in (Quantity.ALL, Quantity.THE):
+        several = made.quantity is Quantity.ALL or (made.quantity is Quantity.THE and made.plural)
+        if not left.found or not several or made.count is not None:
             raise NotUnderstood(f"{made.text!r} leaves nothing, or does not say all of what")
         return replace(left, quantity=Quantity.ALL)
 

@@ -104,7 +104,7 @@ class PlaceResolver:
         if noun.form == "basket":
             return self._basket(noun)
         if noun.form == "me":
-            return self.nouns.speaker(noun)
+            return self.nouns.pronouns.speaker(noun)
         if noun.form == "pronoun":
             return self._it(noun)
         if self.scene.vocabulary.good_for:
@@ -112,7 +112,7 @@ class PlaceResolver:
         return self.nouns.noun(noun, SPOTS, "a place")
 
     def _it(self, noun: Noun) -> NounPhrase:
-        mention = self.nouns.pronoun(noun, THINGS)
+        mention = self.nouns.pronouns.pronoun(noun, THINGS)
         text = self.scene.said.quote(noun.first, noun.last)
         entities = {e.id: e for e in self.scene.lexicon.entities if e.type in SPOTS}
         found = tuple(entities[name] for name in mention.subjects if name in entities)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from keyexpr_schema.payloads.goals import *  # noqa: F403
     from keyexpr_schema.payloads.motions import *  # noqa: F403
     from keyexpr_schema.payloads.plans import *  # noqa: F403
+    from keyexpr_schema.payloads.programs import *  # noqa: F403
     from keyexpr_schema.payloads.requests import *  # noqa: F403
     from keyexpr_schema.payloads.robots import *  # noqa: F403
     from keyexpr_schema.payloads.simulation import *  # noqa: F403
@@ -62,6 +63,7 @@ else:
             "payloads.plans": (
                 "ENDED_PLANS Making Plan PlanAddress PlanChange PlanState PlanStatus Task Violation"
             ),
+            "payloads.programs": "DO Program ProgramCall ProgramEnd ProgramTrace",
             "payloads.requests": (
                 "Answer Control ControlRequest PlanRequest ReplanRequest RequestAddress"
             ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterable
 
 from keyexpr_schema.facts import AT, HOLDING, IS_OPEN, NOTHING, ON, FactKey, Literal, Value
 from keyexpr_schema.payloads.motions import (
@@ -50,6 +51,10 @@ class SkillContext:
         """Note that `relation(subject)` is `value` now; `None` says that it is unknown."""
         literal = Literal(FactKey(relation, subject), value)
         self._observed[literal.variable] = Fact.of(literal, self.robot, self.now_s)
+
+    def recall(self, facts: Iterable[Fact]) -> None:
+        """Take over what an earlier run of the worker had observed in this attempt."""
+        self._observed.update((fact.key, fact) for fact in facts)
 
     def observe_failure(self, failure: SkillFailed) -> None:
         """Take over the facts that a failure brought."""

@@ -7,6 +7,7 @@ from enum import Enum
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
 from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.programs import Program
 
 
 class PlanAddress(Address, frozen=True):
@@ -16,7 +17,7 @@ class PlanAddress(Address, frozen=True):
 
 
 class Task(Payload, frozen=True, kw_only=True):
-    """One skill call.
+    """One skill call, or, with the skill `do` and a `program`, a sentence for a robot.
 
     `args` maps parameter names of the skill to ids; `?a1` names the actor `a1`.
     `after` lists tasks that must have succeeded before this one starts.
@@ -29,6 +30,7 @@ class Task(Payload, frozen=True, kw_only=True):
     after: tuple[Id, ...] = ()
     goal: Id | None = None
     duration_s: float = 0.0
+    program: Program | None = None
 
 
 class Making(Payload, frozen=True, kw_only=True):

@@ -14,6 +14,10 @@ class BadSkillFile(FleetError):
     """A skill model cannot be read; the message says which skill and field, and what is right."""
 
 
+class BadLanguageFile(FleetError):
+    """A file with words cannot be read; one sentence says which file, where and why."""
+
+
 class BadLlmConfig(FleetError):
     """Configuration or prompts of a language model are wrong; one sentence says where and why."""
 

@@ -144,6 +144,7 @@ def interpretation_input(state: State, goal: str) -> InterpretationInput:
             whereabouts=dict(words.whereabouts),
             rests=dict(words.rests),
             carriers=dict(words.carriers),
+            believed=dict(words.believed),
             speaker=state.goals[goal].speaker,
         ),
         skills=state.skills,

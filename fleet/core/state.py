@@ -14,7 +14,7 @@ from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.table import Table
 from fleet.language import Vocabulary
-from fleet.language.vocabulary import SkillPhrase
+from fleet.language.vocabulary import SkillPhrase, StateWord
 from keyexpr_schema.facts import HOLDING, FactKey
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Goal, GoalStatus
@@ -34,7 +34,8 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     without being asked for, into a running plan where there is one. `interpreter`: sentences that
     the grammar refuses go to a language model. `lost_after_s`: a robot whose worker is gone for
     longer (wall time, s) counts as lost. `planning_limit_s`: a plan has to be made within that many
-    seconds. `skill_phrases` are skills that goals can ask for by name.
+    seconds. `skill_phrases` are skills that goals can ask for by name, and
+    `state_words` words for states.
     """
 
     approval: bool = False
@@ -43,6 +44,7 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     lost_after_s: float = 30.0
     planning_limit_s: float = 120.0
     skill_phrases: tuple[SkillPhrase, ...] = msgspec.field(default=(), name="deeds")
+    state_words: tuple[StateWord, ...] = ()
 
 
 class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -119,6 +121,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             Resting(self.facts, around, self.places, self.objects),
             self.policy.skill_phrases,
             around,
+            believed=FactValues(self.facts),
+            state_words=self.policy.state_words,
         )
 
     def world(self) -> WorldModel:

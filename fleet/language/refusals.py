@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+
+from rapidfuzz import fuzz, process
+
+_NEAR = 75
+_SHOWN = 5
+"""Names that a refusal lists."""
 
 _WHY: dict[str, str] = {
     word: reason
@@ -78,8 +83,18 @@ def reason_for(words: Iterable[tuple[str, str]], what: str = "a goal") -> str | 
 
 def suggestion(phrase: str, names: Iterable[str]) -> str:
     """` (did you mean 'hallway'?)` for a near miss, else nothing."""
-    close = difflib.get_close_matches(phrase.casefold(), sorted(set(names)), n=1, cutoff=0.75)
+    close = process.extractOne(
+        phrase.casefold(), sorted(set(names)), scorer=fuzz.ratio, score_cutoff=_NEAR
+    )
     return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def nearest(names: Sequence[str], phrase: str) -> str:
+    """At most five of the names, those first that are most like the phrase."""
+    like = {name: fuzz.ratio(phrase.casefold(), name.replace("_", " ")) for name in names}
+    order = sorted(names, key=lambda n: -like[n] if like[n] >= _NEAR else 0)
+    shown = listed(order[:_SHOWN])
+    return f"{shown}, …" if len(names) > _SHOWN else shown
 
 
 def listed(names: Iterable[str]) -> str:

@@ -8,7 +8,8 @@ from functools import cached_property
 
 import msgspec
 
-from keyexpr_schema.facts import Value
+from fleet.language.words.wordbook import Wordbook, shipped_language
+from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Feature, Object, Place
 
@@ -26,13 +27,36 @@ class SkillPhrase(msgspec.Struct, frozen=True, kw_only=True):
     verb: str
     type: str = msgspec.field(name="sort")
     wants: tuple[tuple[str, Value], ...]
+    says: tuple[str, ...] = ()
+    """Other ways to ask for it: `cut {object} [up] [with {tool}]`, `turn {object} off`."""
+    skill: str = ""
 
     def fits(self, thing: Object) -> bool:
         """Whether it can be done to a thing."""
-        return any(
-            all(word.strip() == "object" or thing.is_a(word.strip()) for word in words.split("&"))
-            for words in self.type.split("|")
-        )
+        return _is_of(thing, self.type)
+
+
+class StateWord(msgspec.Struct, frozen=True, kw_only=True):
+    """A word for a value of a relation: "clean" and "dirty" things.
+
+    `type` is that of what it is said of, as skill files write it.
+    """
+
+    word: str
+    type: str
+    relation: str
+    value: Value
+
+    def fits(self, thing: Object) -> bool:
+        """Whether it can be said of a thing."""
+        return _is_of(thing, self.type)
+
+
+def _is_of(thing: Object, type_: str) -> bool:
+    return any(
+        all(word.strip() == "object" or thing.is_a(word.strip()) for word in words.split("&"))
+        for words in type_.split("|")
+    )
 
 
 @dataclass(frozen=True)
@@ -44,8 +68,10 @@ class Vocabulary:
     up the kitchen" is said of what is believed to be there. `rests` may say on or in what it is
     believed to lie there: a thing, a surface, or `floor`. `carriers` may say all that it is on or
     in, the nearest first: "the fork in the drawer" also of one in a box in that drawer.
-    `skill_phrases` are skills that can be asked for by name, where the grammar has no verb of that
-    name. `speaker` is the person who speaks: "me".
+    `skill_phrases` are skills that can be asked for by name. `speaker` is the person who speaks:
+    "me". `believed` gives what is believed of other state variables: "the open window", "a clean
+    mug"; `state_words` are the words for that. `language` has the words, where a fleet has words of
+    its own.
     """
 
     places: Mapping[str, Place]
@@ -56,6 +82,14 @@ class Vocabulary:
     skill_phrases: tuple[SkillPhrase, ...] = ()
     carriers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     speaker: str | None = None
+    believed: Mapping[FactKey, Value] = field(default_factory=dict)
+    language: Wordbook | None = None
+    state_words: tuple[StateWord, ...] = ()
+
+    @property
+    def wordbook(self) -> Wordbook:
+        """The words that sentences are made of."""
+        return self.language or shipped_language()
 
     def is_at(self, name: str, where: str) -> bool:
         """Whether something is believed to be there, directly or on or in what is there."""

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from fleet.core import events
 from fleet.core.effects import DropJob, Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import At, Event
-from fleet.core.model.skills import Skills, phrases_of
+from fleet.core.model.skills import Skills, phrases_of, state_words_of
 from fleet.core.state import LOGIC, Policy, State
 from fleet.errors import FleetError, Superseded
 from fleet.history.archive import Archive
@@ -77,7 +77,9 @@ class PlannerService:
         self._journal = journal
         self._pool = pool
         self._skills = dict(skills)
-        self._policy = replace(policy, skill_phrases=phrases_of(skills))
+        self._policy = replace(
+            policy, skill_phrases=phrases_of(skills), state_words=state_words_of(skills)
+        )
         self._incarnation = uuid.uuid4().hex[:12]
         self._charge = Charge(
             session, self._incarnation, tuple(skills), lambda: self._core.state.epoch

@@ -25,7 +25,7 @@ from fleet.core.state_updates import (
     without_goal,
 )
 from fleet.errors import NotUnderstood
-from fleet.language import Reading, read_goal
+from fleet.language import Reading, WantedGoal, read_goal
 from keyexpr_schema.facts import AT, IN, NOTHING, ON, SEARCHED, Value
 from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.world import Fact
@@ -195,7 +195,7 @@ def _understand(
 
 def _reading(state: State, goal: Goal) -> Reading:
     if goal.conditions:
-        return Reading(goal.text, (goal.conditions,))
+        return Reading(goal.text, (WantedGoal((goal.conditions,)),))
     if goal.speaker is not None and not state.vocabulary().is_person(goal.speaker):
         known = sorted(filter(state.vocabulary().is_person, state.objects))
         raise NotUnderstood(

@@ -14,6 +14,7 @@ from fleet.core.model.formulas.nodes import (
 )
 from fleet.core.model.parameter_types import BadType, narrowed, parse_type
 from fleet.errors import BadSkillFile
+from fleet.language.vocabulary import StateWord
 from keyexpr_schema.facts import Literal, Value, render_value
 
 BOOL, NUMBER = "bool", "number"
@@ -40,7 +41,7 @@ def relation_types(data: Any, where: str) -> dict[str, RelationType]:
 
 
 def _relation_type(row: Any, where: str) -> RelationType:
-    if not isinstance(row, dict) or set(row) != {"of", "values"}:
+    if not isinstance(row, dict) or set(row) - {"says"} != {"of", "values"}:
         raise BadSkillFile(
             f"{where} must have `of`, a type, and `values`: bool, number, a type or a list of words"
         )
@@ -56,6 +57,35 @@ def _relation_type(row: Any, where: str) -> RelationType:
     except BadType as wrong:
         raise BadSkillFile(f"{where}: {wrong}") from None
     raise BadSkillFile(f"{where}: `values` must be bool, number, a type or a list of words")
+
+
+def state_words(
+    data: Mapping[str, Any], relations: Mapping[str, RelationType], where: str
+) -> tuple[StateWord, ...]:
+    """The words that the declarations give for values: `says: {true: [clean], false: [dirty]}`.
+
+    Raises:
+        BadSkillFile: one sentence that names the relation, and says what would be right.
+    """
+    found: list[StateWord] = []
+    for name, row in data.items():
+        says, declared = row.get("says", {}), relations[str(name)]
+        if not isinstance(says, dict) or not all(
+            isinstance(words, list) and all(isinstance(word, str) and word for word in words)
+            for words in says.values()
+        ):
+            raise BadSkillFile(
+                f"{where}: relation {name}: `says` must map values to lists of words, in quotes "
+                "where YAML needs them"
+            )
+        for value, words in says.items():
+            if not _fits(value, declared.values, {}):
+                raise BadSkillFile(f"{where}: relation {name}: {value!r} is none of its values")
+            found.extend(
+                StateWord(word=word, type=declared.of, relation=str(name), value=value)
+                for word in words
+            )
+    return tuple(found)
 
 
 def check_literals(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from fleet.core.model.formulas.nodes import TRUE, ConditionalEffect, Formula, relations_of
@@ -14,14 +14,18 @@ from fleet.core.model.relation_types import (
     check_literals,
     narrowed_parameters,
     relation_types,
+    state_words,
 )
 from fleet.core.model.skills import MEASURES, SPACE, Need, SkillModel
 from fleet.errors import BadSkillFile
+from fleet.language.vocabulary import StateWord
 from keyexpr_schema.facts import AT, IN, ON, FactKey, Literal, parse_literal
 
 _SPACE = re.compile(rf"^\s*{SPACE}\(\s*(\w+)\s*\)\s*$")
 _NEED = re.compile(r"^\s*(\w+)(?:\s*>=\s*(\w+)\(\s*(\w+)\s*\))?\s*$")
-_FIELDS = frozenset({"about", "parameters", "needs", "before", "after", "duration_s", "travel_to"})
+_FIELDS = frozenset(
+    {"about", "parameters", "needs", "before", "after", "duration_s", "travel_to", "says"}
+)
 
 
 def skills_from_data(data: Any, where: str) -> dict[str, SkillModel]:
@@ -32,14 +36,22 @@ def skills_from_data(data: Any, where: str) -> dict[str, SkillModel]:
     """
     if not isinstance(data, dict) or not isinstance(data.get("skills"), dict):
         raise BadSkillFile(f"{where}: there must be a mapping `skills:` of skill names to models")
-    relations = relation_types(data.get("relations", {}), where)
+    declared = data.get("relations", {})
+    relations = relation_types(declared, where)
+    words = state_words(declared, relations, where)
     return {
-        str(name): _skill(str(name), model, relations, f"{where}: skill {name}")
+        str(name): _skill(str(name), model, relations, words, f"{where}: skill {name}")
         for name, model in data["skills"].items()
     }
 
 
-def _skill(name: str, model: Any, relations: Mapping[str, RelationType], where: str) -> SkillModel:
+def _skill(
+    name: str,
+    model: Any,
+    relations: Mapping[str, RelationType],
+    words: Sequence[StateWord],
+    where: str,
+) -> SkillModel:
     if not isinstance(model, dict):
         raise BadSkillFile(f"{where} must be a mapping with {', '.join(sorted(_FIELDS))}")
     if unknown := set(model) - _FIELDS:
@@ -90,6 +102,8 @@ def _skill(name: str, model: Any, relations: Mapping[str, RelationType], where: 
         conditions=conditions,
         conditional=conditional,
         relations={name: relations[name] for name in sorted(spoken_of & relations.keys())},
+        says=_says(model.get("says", []), parameters, f"{where}: `says`"),
+        state_words=tuple(word for word in words if word.relation in spoken_of),
     )
 
 
@@ -103,6 +117,22 @@ def _parameters(data: Any, where: str) -> dict[str, str]:
         return {str(name): str(parse_type(kind)) for name, kind in data.items()}
     except BadType as wrong:
         raise BadSkillFile(f"{where}: `parameters`: {wrong}") from None
+
+
+def _says(value: Any, parameters: Mapping[str, str], where: str) -> tuple[str, ...]:
+    """Frames in which people ask for a skill."""
+    if not isinstance(value, list) or not all(isinstance(v, str) and v.strip() for v in value):
+        raise BadSkillFile(f"{where} must be a list of phrases such as `wash {{object}} [up]`")
+    for text in value:
+        for slot in re.findall(r"\{([^}]*)\}", text):
+            if slot not in parameters:
+                raise BadSkillFile(
+                    f"{where}: {text!r} names {slot!r}, which is not a parameter; "
+                    f"those are {', '.join(parameters)}"
+                )
+        if not re.match(r"[^\W\d_]", text):
+            raise BadSkillFile(f"{where}: {text!r} must begin with a verb")
+    return tuple(value)
 
 
 def _list_of_text(value: Any, where: str) -> list[str]:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from fleet.core.model.formulas.nodes import ConditionalEffect, Formula, grounded, grounded_effect
 from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, ParameterType, parse_type
 from fleet.core.model.relation_types import RelationType
-from fleet.language.vocabulary import SkillPhrase
+from fleet.language.vocabulary import SkillPhrase, StateWord
 from keyexpr_schema.facts import FactKey, Literal
 
 
@@ -85,6 +85,10 @@ class SkillModel:
     """Effects that depend on what holds, or change numbers."""
     relations: Mapping[str, RelationType] = field(default_factory=dict)
     """Those of the relations it speaks of whose types are declared."""
+    says: tuple[str, ...] = ()
+    """Frames in which people ask for it: `cut {food} [up] [with {tool}]`."""
+    state_words: tuple[StateWord, ...] = ()
+    """Words for the values of the relations it speaks of."""
 
     @cached_property
     def robot_parameters(self) -> tuple[str, ...]:
@@ -143,11 +147,26 @@ def phrases_of(skills: Skills) -> tuple[SkillPhrase, ...]:
     for name in sorted(skills):
         skill = skills[name]
         rows = [row for row in skill.after if skill.parameters[row.variable.subject] != ROBOT]
+        if not rows and skill.says:  # a robot does it with itself
+            rows = [row for row in skill.after if row.variable.subject == skill.actor_parameter]
         about = {row.variable.subject for row in rows}
         plain = all(row.value not in skill.parameters for row in rows)
         if len(about) == 1 and plain:
             kind = str(skill.types[about.pop()])
             wants = tuple((key.relation, value) for key, value in rows if value is not None)
             if wants:
-                phrases.append(SkillPhrase(verb=name.replace("_", " "), type=kind, wants=wants))
+                phrases.append(
+                    SkillPhrase(
+                        verb=name.replace("_", " "),
+                        type=kind,
+                        wants=wants,
+                        says=skill.says,
+                        skill=name,
+                    )
+                )
     return tuple(phrases)
+
+
+def state_words_of(skills: Skills) -> tuple[StateWord, ...]:
+    """The words for states that the skills' relations have: "dirty", "unlocked"."""
+    return tuple(dict.fromkeys(word for skill in skills.values() for word in skill.state_words))

@@ -15,6 +15,10 @@ from tests.support.language_house import WORDS, shown
         ("Please take cup 2 into the living room.", "at(cup_2) = living_room"),
         ("deliver the second cup to the lounge!", "at(cup_2) = living_room"),
         ("put the book in the cooking area", "at(book) = kitchen"),
+        (
+            "Bring everything except the book to the kitchen",
+            "at(cup_1) = kitchen; at(cup_2) = kitchen",
+        ),
         ("Move the red book to living_room", "at(book) = living_room"),
         ("Bring both cups to the hallway", "at(cup_1) = hallway; at(cup_2) = hallway"),
         (

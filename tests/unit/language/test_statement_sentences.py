@@ -154,7 +154,10 @@ def test_statements_become_facts(text: str, expected: list[tuple[str, str, Value
             "The book is in the kitchen and the book is in the hallway",
             "it says two things of at(book): kitchen and hallway",
         ),
-        ("The book belongs in the kitchen", "'belongs' is not understood as a fact"),
+        (
+            "The book belongs in the kitchen",
+            "'The book belongs in the kitchen' is not understood as a fact",
+        ),
         (
             "Bring the book to the kitchen",
             "'Bring the book to the kitchen' is a goal and not a fact",

@@ -1,1 +1,0 @@
-"""Goals: clauses that ask for something, to stages of conditions."""

@@ -1,0 +1,1 @@
+"""The grammar, and the chart of all that a sentence can be by it."""

@@ -1,0 +1,399 @@
+"""Reads texts: words to tags, to a chart, to small trees, to what they mean in this world."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import MutableMapping, Sequence
+from dataclasses import replace
+from datetime import datetime
+
+from fleet.errors import NotUnderstood
+from fleet.language.grammar.chart import NotGrammatical, parsed
+from fleet.language.reading import Ambiguity, Reading, WantedGoal
+from fleet.language.refusals import listed, nearest, reason_for, suggestion
+from fleet.language.resolve.clauses import Clauses
+from fleet.language.resolve.discourse import Discourse
+from fleet.language.resolve.frames import EXAMPLE, SAY_IT
+from fleet.language.resolve.scene import Question, Scene
+from fleet.language.resolve.stages import GoalDraft
+from fleet.language.segments import Segment, Sentence, cut, sentences_of
+from fleet.language.tagging.lexicon import ENTITY_TYPES
+from fleet.language.tagging.tagger import Lexeme, Tagger
+from fleet.language.tree.building import Builder
+from fleet.language.tree.nodes import Clause
+from fleet.language.vocabulary import Vocabulary
+from fleet.language.words.times import TimePhrase
+from fleet.language.words.tokens import tokens_of
+from keyexpr_schema.facts import Literal
+from keyexpr_schema.payloads.goals import Condition
+
+MOST_CHARACTERS = 8_000
+MOST_WORDS = 1_000
+MOST_WORDS_TOGETHER = 120
+_BEFORE_NOUNS = frozenset({"DET", "INDEF", "UNIV", "NUM", "ORD", "ADJ", "OTHER", "ANOTHER"})
+_READINGS = 12
+"""Readings of what was read so far that are followed up."""
+_BORDERS = frozenset({"COMMA", "AND", "THEN", "PREP", "TO", "BE", "MODAL", "HAVE", "END"})
+_REFUSED_OF_GOALS = ("IF", "WHEN", "UNLESS", "UNTIL", "BEFORE", "AFTER", "TIME", "DONT", "NEVER",
+                     "AVOID", "WITHOUT", "ALWAYS", "NOT")  # fmt: skip
+
+_KEPT: deque[tuple[Vocabulary, Tagger]] = deque(maxlen=4)
+
+
+def tagger_of(vocabulary: Vocabulary) -> Tagger:
+    """The tagger of a vocabulary: made once for the very same names, where these cannot change."""
+    for known, tagger in _KEPT:
+        if (
+            known.places is vocabulary.places
+            and known.objects is vocabulary.objects
+            and known.robots is vocabulary.robots
+            and known.skill_phrases is vocabulary.skill_phrases
+            and known.wordbook is vocabulary.wordbook
+        ):
+            return tagger
+    tagger = Tagger(vocabulary)
+    mappings = (vocabulary.places, vocabulary.objects, vocabulary.robots)
+    if not any(isinstance(names, MutableMapping) for names in mappings):
+        _KEPT.append((vocabulary, tagger))
+    return tagger
+
+
+class _State:
+    """One reading of what was read so far."""
+
+    def __init__(self, said: Discourse, cost: int = 0, question: Question | None = None) -> None:
+        self.said, self.cost, self.question = said, cost, question
+
+
+class Reader:
+    """Reads one text."""
+
+    def __init__(self, text: str, vocabulary: Vocabulary, mode: str = "") -> None:
+        """`mode`: only a `goal` or a `fact` is understood; else anything.
+
+        Raises:
+            NotUnderstood: the text is empty, or too long.
+        """
+        what = "what holds" if mode == "fact" else "what you want"
+        if len(text) > MOST_CHARACTERS:
+            raise NotUnderstood(
+                f"the text has {len(text):,} characters, and at most {MOST_CHARACTERS:,} are read "
+                "at once: say it in several goals"
+            )
+        self.tokens = tokens_of(text)
+        if len(self.tokens) > MOST_WORDS:
+            raise NotUnderstood(
+                f"the text has {len(self.tokens):,} words, and at most {MOST_WORDS:,} are read at "
+                "once: say it in several goals"
+            )
+        if not any(token.word[0].isalnum() for token in self.tokens):
+            raise NotUnderstood(f"the sentence is empty: say {what}")
+        self.text, self.vocabulary, self.mode = text, vocabulary, mode
+        self.tagger = tagger_of(vocabulary)
+        self.remarks: list[str] = []
+        self.times: list[TimePhrase] = []
+        self.line = " ".join(text.split())
+
+    def read(self, now: datetime | None) -> list[tuple[int, Reading]]:
+        """All that the text can mean, the plainest first.
+
+        Raises:
+            NotUnderstood: nothing; one sentence says why.
+        """
+        draft = GoalDraft(self.vocabulary.is_at)
+        states = [_State(Discourse(self.text, self.tokens, draft))]
+        lexemes = self.tagger.tagged(self.tokens, self.text)
+        dangling = False
+        for words in sentences_of(lexemes):
+            sentence = cut(words)
+            self._check(sentence)
+            for state in states:
+                state.said.elliptic, state.said.addressees = "", []
+                state.said.urgent |= sentence.urgent
+            self.times.extend(sentence.times)
+            dangling = sentence.dangling
+            if self._said_of_oneself(sentence):
+                try:
+                    states = self._sentence(sentence, states)
+                except NotUnderstood:
+                    states = self._remark(sentence, states)
+            else:
+                states = self._sentence(sentence, states)
+        return self._ended(states, now, dangling)
+
+    # --- one sentence after the other -------------------------------------------------------------
+    def _sentence(self, sentence: Sentence, states: list[_State]) -> list[_State]:
+        for segment in sentence.segments:
+            if segment.joint == "then":
+                for state in states:
+                    state.said.draft.next_stage()
+            states = self._segment(segment, states)
+        return states
+
+    def _segment(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
+        if len(segment.words) > MOST_WORDS_TOGETHER:
+            raise NotUnderstood(
+                f"{len(segment.words)} words are too many for one clause: say it in several"
+            )
+        self._unheard_of(segment)
+        try:
+            trees = parsed(segment.words, Builder(segment.words, self.tagger))
+        except NotGrammatical as error:
+            raise self._ungrammatical(segment, error.at) from None
+        found: list[_State] = []
+        problems: list[tuple[int, NotUnderstood]] = []
+        for state in states:
+            for cost, clauses in trees:
+                try:
+                    said, question = self._resolved(clauses, state.said.copy(), segment)
+                except NotUnderstood as problem:
+                    problems.append((cost, problem))
+                else:
+                    found.append(_State(said, state.cost + cost, question or state.question))
+        if not found:
+            if not problems:
+                strange = [i for i, w in enumerate(segment.words) if "UNK" in w.tags]
+                raise self._ungrammatical(segment, strange[0] if strange else 0)
+            raise min(problems, key=lambda row: row[0])[1]
+        found.sort(key=lambda state: state.cost)
+        return found[:_READINGS]
+
+    def _resolved(
+        self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment
+    ) -> tuple[Discourse, Question | None]:
+        mode = "fact" if segment.role else self.mode
+        before = dict(said.facts)
+        draft = said.draft
+        if segment.always:
+            said.draft = GoalDraft(self.vocabulary.is_at)
+        scene = Scene(self.vocabulary, self.tagger, said, mode)
+        resolver = Clauses(scene)
+        for clause in clauses:
+            resolver.clause(clause)
+        said = scene.said
+        if segment.always:
+            said.always.extend(c for stage in said.draft.conditions() for c in stage)
+            said.draft = draft
+        if segment.role:
+            new = {key: value for key, value in said.facts.items() if key not in before}
+            said.facts = before
+            for (relation, subject), value in new.items():
+                if segment.role == "unless":
+                    if not isinstance(value, bool):
+                        raise NotUnderstood(f'{said.clause!r}: say "if …" with what holds then')
+                    value = not value
+                said.when.append(Condition(relation=relation, subject=subject, value=value))
+            said.elliptic = ""
+        return said, scene.question
+
+    # --- people speaking of themselves ------------------------------------------------------------
+    def _said_of_oneself(self, sentence: Sentence) -> bool:
+        if self.mode == "fact":
+            return False
+        words = sentence.words
+        begins = [token.word for token in self.tokens[words[0].first : words[0].first + 4]]
+        remarks = self.tagger.book.remarks
+        length = max((len(p) for p in remarks if tuple(begins[: len(p)]) == p), default=0)
+        return bool(length) and begins[length : length + 1] != ["to"]
+
+    def _remark(self, sentence: Sentence, states: list[_State]) -> list[_State]:
+        """Leave out a sentence that asks for nothing, up to its end or a command.
+
+        Raises:
+            NotUnderstood: it names something known, or has a word for which goals are refused.
+        """
+        words = sentence.words
+        end = next(
+            (
+                i
+                for i, word in enumerate(words[:-1])
+                if "COMMA" in word.tags and self._command(words[i + 1 :])
+            ),
+            len(words),
+        )
+        remark = words[:end]
+        shown = self._quote(remark)
+        special = reason_for([(word.word, word.text) for word in remark])
+        if special or any("NOUN" in word.tags for word in remark):
+            raise NotUnderstood(
+                f"{shown!r} is no goal, and may matter: leave it out, or tell it as a fact"
+            )
+        self.remarks.append(shown)
+        return self._sentence(cut(words[end:]), states) if end < len(words) else states
+
+    @staticmethod
+    def _command(words: Sequence[Lexeme]) -> bool:
+        rest = [word for word in words if "POLITE" not in word.tags]
+        return bool(rest) and "VERB" in rest[0].tags
+
+    def _quote(self, words: Sequence[Lexeme]) -> str:
+        start = self.tokens[words[0].first].start
+        return " ".join(self.text[start : self.tokens[words[-1].last - 1].end].split())
+
+    # --- refusals ---------------------------------------------------------------------------------
+    def _what(self) -> str:
+        return "a fact" if self.mode == "fact" else "a goal"
+
+    def _check(self, sentence: Sentence) -> None:
+        if self.mode != "goal":
+            return
+        for word in sentence.words:
+            if any(tag in word.tags for tag in _REFUSED_OF_GOALS) and "NOUN" not in word.tags:
+                spoken = [(t.word, self.text[t.start : t.end]) for t in
+                          self.tokens[word.first : word.last]]  # fmt: skip
+                special = reason_for(spoken, self._what())
+                if special:
+                    raise NotUnderstood(special)
+                raise NotUnderstood(f"{word.text!r} is nothing that {self._what()} can say yet")
+
+    def _unheard_of(self, segment: Segment) -> None:
+        """Whether a word stands there that is refused wherever it stands."""
+        for word in segment.words:
+            if "UNK" in word.tags and (
+                special := reason_for([(word.word, word.text)], self._what())
+            ):
+                raise NotUnderstood(special)
+
+    def _ungrammatical(self, segment: Segment, at: int) -> NotUnderstood:
+        words = segment.words
+        strange = [i for i, word in enumerate(words) if "UNK" in word.tags]
+        if strange and strange[0] < at:
+            at = strange[0]
+        end = at + 1
+        while end < len(words) and not words[end].tags & _BORDERS:
+            end += 1
+        special = reason_for([(w.word, w.text) for w in words[at:end]], self._what())
+        special = special or reason_for([(w.word, w.text) for w in words], self._what())
+        if special:
+            return NotUnderstood(special)
+        example = SAY_IT if self.mode == "fact" else EXAMPLE
+        if at >= len(words) and "PREP" in words[-1].tags:
+            known = listed(self.tagger.lexicon.known(("place",)))
+            return NotUnderstood(
+                f"{self._quote(words)!r} ends where a place is missing; known are {known}"
+            )
+        if at >= len(words):
+            return NotUnderstood(f"{self._quote(words)!r} ends before it says all: {example}")
+        shown = self._quote(words[at:end])
+        begins = at
+        while begins and words[begins - 1].tags & _BEFORE_NOUNS:
+            begins -= 1
+        if "UNK" in words[at].tags and (begins < at or (at and "PREP" in words[at - 1].tags)):
+            types = ENTITY_TYPES
+            hint = suggestion(words[at].text, self.tagger.lexicon.names_in(types))
+            return NotUnderstood(
+                f"{self._quote(words[begins:end])!r} is not a known object, robot or place{hint}; "
+                f"known are {nearest(self.tagger.lexicon.known(types), words[at].text)}"
+            )
+        if at == 0:
+            verbs = {entry.base for entries in self.tagger.verbs.entries.values()
+                     for entry in entries}  # fmt: skip
+            hint = suggestion(words[0].word, verbs) if "UNK" in words[0].tags else ""
+            return NotUnderstood(f"{shown!r} is not understood as {self._what()}{hint}: {example}")
+        return NotUnderstood(f"{shown!r} is not understood after {self._quote(words[:at])!r}")
+
+    # --- the end ----------------------------------------------------------------------------------
+    def _ended(
+        self, states: Sequence[_State], now: datetime | None, dangling: bool
+    ) -> list[tuple[int, Reading]]:
+        found: dict[Reading, int] = {}
+        problem: NotUnderstood | None = None
+        for state in states:
+            try:
+                reading = self._reading(state, now, dangling)
+            except NotUnderstood as error:
+                problem = problem or error
+            else:
+                found[reading] = min(state.cost, found.get(reading, state.cost))
+        if not found:
+            assert problem is not None
+            raise problem
+        return sorted(((cost, reading) for reading, cost in found.items()), key=lambda row: row[0])
+
+    def _reading(self, state: _State, now: datetime | None, dangling: bool) -> Reading:
+        said = state.said
+        stages = said.draft.conditions()
+        wants = bool(stages or said.always or said.never)
+        facts = tuple(Literal(key, value) for key, value in said.facts.items())
+        if dangling or not (wants or facts or state.question):
+            if self.mode == "fact":
+                raise NotUnderstood(f"{self.line!r} ends before it says anything: {SAY_IT}")
+            raise NotUnderstood(f"{self.line!r} ends before it says what to do: {EXAMPLE}")
+        goals: tuple[WantedGoal, ...] = ()
+        if wants:
+            goal = WantedGoal(
+                stages,
+                tuple(dict.fromkeys(said.always)),
+                tuple(dict.fromkeys(said.never)),
+                int(said.urgent),
+                when=tuple(said.when),
+            )
+            goals = (self._timed(goal, now),)
+        elif self.times and self.mode == "fact":
+            named = [(token.word, token.spoken) for token in self.tokens]
+            reason = reason_for(named, "a fact")
+            raise NotUnderstood(reason or f"{self.line!r} names a time, which a fact cannot")
+        elif self.times or said.when:
+            raise NotUnderstood(f"{self.line!r} names a time or a condition, but nothing to do")
+        presumed = tuple(dict.fromkeys(said.presumed))
+        return Reading(self.line, goals, facts, state.question, presumed, tuple(self.remarks))
+
+    def _timed(self, goal: WantedGoal, now: datetime | None) -> WantedGoal:
+        for time in self.times:
+            if time.kind == "every":
+                goal = replace(goal, every=time.recurrence)
+                continue
+            if time.after_s is None and now is None:
+                raise NotUnderstood("a time of day is named, and what time it is now is not known")
+            seconds = time.after_s if now is None or time.after_s is not None else time.seconds(now)
+            if time.kind == "due":
+                goal = replace(goal, due_s=seconds)
+            else:
+                goal = replace(goal, not_before_s=seconds)
+        return goal
+
+
+def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Reading | Ambiguity:
+    """What a text asks for, says, or asks; of several meanings the plainest.
+
+    `now` is what the clock says, with its zone, for times of day.
+
+    Raises:
+        NotUnderstood: it means nothing here; one sentence says why.
+    """
+    return _one(Reader(text, vocabulary).read(now))
+
+
+def _one(readings: Sequence[tuple[int, Reading]]) -> Reading | Ambiguity:
+    least = readings[0][0]
+    best = [reading for cost, reading in readings if cost == least]
+    if len(best) == 1:
+        return best[0]
+    return Ambiguity(best[0].text, tuple((each.understood_as, each) for each in best[:5]))
+
+
+def read_goal(text: str, vocabulary: Vocabulary) -> Reading:
+    """What a text asks for, where it asks for one goal that is to be reached once.
+
+    Raises:
+        NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
+    """
+    reading = _one(Reader(text, vocabulary, "goal").read(None))
+    if isinstance(reading, Ambiguity):
+        raise NotUnderstood(reading.sentence)
+    if reading.facts or any(goal != WantedGoal(goal.stages, priority=goal.priority)
+                            for goal in reading.goals):  # fmt: skip
+        raise NotUnderstood(f"{reading.text!r} says more than what shall be reached: leave it out")
+    return reading
+
+
+def statement_facts(text: str, vocabulary: Vocabulary) -> tuple[Literal, ...]:
+    """The facts in a statement, where the value `None` is *unknown*.
+
+    Raises:
+        NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
+    """
+    reading = _one(Reader(text, vocabulary, "fact").read(None))
+    if isinstance(reading, Ambiguity):
+        raise NotUnderstood(reading.sentence)
+    return reading.facts

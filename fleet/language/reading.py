@@ -1,0 +1,86 @@
+"""What a text was understood to mean, as data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fleet.language.resolve.scene import Question
+from keyexpr_schema.facts import Literal
+from keyexpr_schema.payloads.goals import Condition
+
+
+@dataclass(frozen=True)
+class WantedGoal:
+    """What shall hold.
+
+    `stages` come one after the other; all conditions of a stage hold together at its end. `always`
+    must hold all the time, and of `never` nothing may. `priority` above 0 is for what is urgent.
+    `not_before_s` and `due_s` count from now, in seconds; `every` is a line of cron or an ISO 8601
+    period. `when` must hold before it is begun. Of each pair of `before`, the first must hold
+    before the second does. `by` are robots that shall do it.
+    """
+
+    stages: tuple[tuple[Condition, ...], ...] = ()
+    always: tuple[Condition, ...] = ()
+    never: tuple[Condition, ...] = ()
+    priority: int = 0
+    not_before_s: float | None = None
+    due_s: float | None = None
+    every: str | None = None
+    when: tuple[Condition, ...] = ()
+    before: tuple[tuple[Condition, Condition], ...] = ()
+    by: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a text asks for, says or asks.
+
+    `facts` are said in it. `presumed` are facts that it takes for granted: "bring the first cup
+    from the kitchen …" presumes `at(cup_1) = kitchen`; they are no part of the goal. `remarks` are
+    parts of the text that ask for nothing, as it was written: "I have a headache".
+    """
+
+    text: str
+    goals: tuple[WantedGoal, ...] = ()
+    facts: tuple[Literal, ...] = ()
+    question: Question | None = None
+    presumed: tuple[Literal, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def stages(self) -> tuple[tuple[Condition, ...], ...]:
+        """The stages of its goals."""
+        return tuple(stage for goal in self.goals for stage in goal.stages)
+
+    @property
+    def understood_as(self) -> str:
+        """What it was understood as, in words made from what must hold."""
+        said = [f"{'; '.join(map(str, self.facts))} is so"] if self.facts else []
+        for goal in self.goals:
+            stages = [" and ".join(map(str, stage)) for stage in goal.stages]
+            parts = [", then ".join(stages)] if stages else []
+            parts += [f"always {c}" for c in goal.always] + [f"never {c}" for c in goal.never]
+            parts += [f"when {c}" for c in goal.when]
+            parts += [f"every {goal.every}"] if goal.every else []
+            said.append(", ".join(parts))
+        if self.question is not None:
+            said.append(
+                f"{self.question.of}: {', '.join(self.question.subjects)} "
+                f"{'; '.join(map(str, self.question.holds))}?"
+            )
+        return "; ".join(said)
+
+
+@dataclass(frozen=True)
+class Ambiguity:
+    """A text that can mean several things here, none of them plainer than the others."""
+
+    text: str
+    candidates: tuple[tuple[str, Reading], ...]
+
+    @property
+    def sentence(self) -> str:
+        """The question to the person who said it."""
+        listed = "; or ".join(words for words, _ in self.candidates)
+        return f"{self.text!r} can mean {listed}: which?"

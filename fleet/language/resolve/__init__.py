@@ -1,0 +1,1 @@
+"""From trees to goals, facts and questions: who and what is meant, in this world."""

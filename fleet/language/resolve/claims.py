@@ -1,0 +1,288 @@
+"""Facts that statements claim, checked against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fleet.errors import NotUnderstood
+from fleet.language.refusals import one_of
+from fleet.language.resolve.frames import SAY_IT, framed
+from fleet.language.resolve.mentions import Mention
+from fleet.language.resolve.nouns import NounResolver
+from fleet.language.resolve.places import PlaceResolver
+from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.scene import PLACES, THINGS, Scene
+from fleet.language.resolve.states import of_each
+from fleet.language.resolve.wishes import Wishes
+from fleet.language.tagging.tagger import Lexeme
+from fleet.language.tree.nodes import (
+    Argument,
+    Clause,
+    Nouns,
+    Place,
+)
+from keyexpr_schema.facts import (
+    AT,
+    HOLDING,
+    NOTHING,
+    ON,
+    SEARCHED,
+    FactKey,
+    Value,
+)
+
+
+class Claims:
+    """Collects facts; a later one may not contradict an earlier one."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        who: Referents,
+        nouns: NounResolver,
+        places: PlaceResolver,
+        wishes: Wishes,
+    ) -> None:
+        self.scene = scene
+        self.who = who
+        self.nouns = nouns
+        self.places = places
+        self.wishes = wishes
+
+    def fact(self, relation: str, subject: str, value: Value) -> None:
+        """Keep a fact.
+
+        Raises:
+            NotUnderstood: the text said something else of it.
+        """
+        before = self.scene.said.facts.setdefault(key := FactKey(relation, subject), value)
+        if before != value:
+            shown = ["nobody knows where" if v is None else str(v) for v in (before, value)]
+            raise NotUnderstood(f"it says two things of {key}: {' and '.join(shown)}")
+
+    def placed(self, nouns: Nouns, arguments: Sequence[Argument]) -> None:
+        """These are somewhere.
+
+        Raises:
+            NotUnderstood: it is not said where, or in two places, or which of several.
+        """
+        self.scene.said.elliptic = "is"
+        if nouns.either:
+            raise NotUnderstood("'or' leaves a choice that cannot be left open; say one of them")
+        frame = framed(arguments)
+        where, home = self.wishes.whereto(frame)
+        if home or not frame.places:
+            raise NotUnderstood(f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}")
+        if where.source is not None or where.target is None:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say one place: {SAY_IT}")
+        self.put(nouns, where.target, where.target_surface)
+
+    def settled(self, nouns: Nouns) -> list[Mention]:
+        mentions = [
+            self.who.resolve(s)
+            for s in self.nouns.subjects(nouns, THINGS, "an object, robot or place")
+        ]
+        for mention in mentions:
+            if mention.open:
+                raise NotUnderstood(
+                    f"{self.scene.said.clause!r} does not say which of "
+                    f"{one_of(mention.subjects)}: name it"
+                )
+        return mentions
+
+    def put(self, nouns: Nouns, target: str, surface: str | None = None) -> None:
+        """These are at the target, on a surface there if one is named."""
+        mentions = self.settled(nouns)
+        for mention in mentions:
+            if mention.type == "robot" and target in self.scene.vocabulary.robots:
+                raise NotUnderstood("a robot is at a place, not on a robot: name the place")
+            if target in mention.subjects:
+                raise NotUnderstood(f"{self.scene.said.clause!r}: nothing can be on or in itself")
+            for name in mention.subjects:
+                robot = mention.type == "robot"
+                self.fact(AT, name, self.places.place_of(target) if robot else target)
+                if surface is not None and not robot:
+                    self.fact(ON, name, surface)
+        self.scene.said.remember(mentions)
+
+    def lost(self, nouns: Nouns) -> None:
+        """Nobody knows where these are."""
+        mentions = self.settled(nouns)
+        for name in (name for mention in mentions for name in mention.subjects):
+            self.fact(AT, name, None)
+        self.scene.said.remember(mentions)
+
+    def holding(self, robots: Sequence[Mention], held: Nouns | None, in_hand: bool) -> None:
+        """What a robot has in its hand (`None`: nothing) or on it."""
+        names = [name for robot in robots for name in robot.subjects]
+        things = self.settled(held) if held is not None else []
+        objects = [name for thing in things for name in thing.subjects]
+        if held is not None and (len(names) != 1 or (in_hand and len(objects) != 1)):
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r}: one hand holds one thing; say who holds what"
+            )
+        for name in names:
+            if in_hand:
+                self.fact(HOLDING, name, objects[0] if objects else NOTHING)
+            for thing in objects:
+                self.fact(AT, thing, name)
+
+    def looked_around(self, nouns: Nouns | None, value: bool) -> None:
+        """Somebody looked around in these places, or nobody did."""
+        assert nouns is not None
+        names = [n for m in self.places.place_mentions(nouns) for n in m.subjects]
+        if not value and len(names) > 1:
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} could mean all or some of them: "
+                "say it of one place at a time"
+            )
+        for place in names:
+            self.fact(SEARCHED, place, value)
+
+    def check_mode(self) -> None:
+        """Whether statements are understood here."""
+        if self.scene.mode == "goal":
+            raise NotUnderstood(
+                f"{self.scene.said.line!r} states a fact; a goal says what should be: "
+                '"the cup should be in the hallway"'
+            )
+
+    def are(self, nouns: Nouns, words: Sequence[Lexeme], negated: bool) -> None:
+        self.scene.said.elliptic = "are"
+        if self.nouns.can_be(nouns, THINGS):
+            mentions = self.settled(nouns)
+            self.scene.said.remember(mentions)
+        else:
+            mentions = self.places.place_mentions(nouns)
+        names = [name for mention in mentions for name in mention.subjects]
+        for relation, name, value in of_each(self.scene.stated, words, names, negated):
+            self.fact(relation, name, value)
+
+    def on_not_being(self, clause: Clause) -> None:
+        if clause.predicate is not None and clause.predicate.kind == "state":
+            self.check_mode()
+            assert clause.subject is not None
+            return self.are(clause.subject, clause.predicate.words, True)
+        if clause.predicate is not None and clause.predicate.kind == "done":
+            return self.were(clause, False)
+        raise self.not_so()
+
+    def not_so(self) -> NotUnderstood:
+        """What is said to be not so."""
+        if self.scene.mode == "goal":
+            return NotUnderstood(
+                f"{self.scene.said.clause!r} says what must not be, or leaves something out; "
+                "say what must hold, name by name"
+            )
+        return NotUnderstood(
+            f"{self.scene.said.line!r} says what is not so, which tells nobody where "
+            'things are: say where it is, or "nobody knows where … is"'
+        )
+
+    def were(self, clause: Clause, value: bool) -> None:
+        """`The kitchen was searched`."""
+        self.check_mode()
+        predicate = clause.predicate
+        word = predicate.words[0].word if predicate is not None and predicate.words else ""
+        assert clause.subject is not None
+        if word not in self.scene.tagger.book.searched or (predicate and predicate.arguments):
+            if predicate and predicate.kind == "done" and predicate.arguments and value:
+                return self.placed(clause.subject, predicate.arguments)
+            raise NotUnderstood(f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}")
+        if not self.nouns.can_be(clause.subject, PLACES):
+            raise NotUnderstood(f"{self.scene.said.clause!r}: only places are searched")
+        return self.looked_around(clause.subject, value)
+
+    def on_was(self, clause: Clause) -> None:
+        predicate = clause.predicate
+        if predicate is not None and predicate.kind == "done":
+            return self.were(clause, not clause.has("NOT"))
+        was = next(word.text for word in clause.words if "WAS" in word.tags)
+        raise NotUnderstood(f"{was!r} tells of the past; say what holds now")
+
+    def on_been(self, clause: Clause) -> None:
+        return self.were(clause, not clause.has("NOT"))
+
+    def on_anywhere(self, clause: Clause) -> None:
+        self.check_mode()
+        assert clause.subject is not None
+        self.lost(clause.subject)
+
+    def on_unknown(self, clause: Clause) -> None:
+        self.check_mode()
+        assert clause.subject is not None
+        self.lost(clause.subject)
+
+    def on_inverted(self, clause: Clause) -> None:
+        self.check_mode()
+        assert clause.subject is not None
+        self.placed(clause.subject, [a for a in clause.arguments if isinstance(a, Place)])
+
+    def on_has(self, clause: Clause) -> None:
+        self.check_mode()
+        self._carries(clause, in_hand=False)
+
+    def on_grips(self, clause: Clause) -> None:
+        self.check_mode()
+        self._carries(clause, in_hand=True)
+
+    def _carries(self, clause: Clause, in_hand: bool) -> None:
+        assert clause.subject is not None
+        held = next((a for a in clause.arguments if isinstance(a, Nouns)), None)
+        if self.nouns.can_be(clause.subject, ("robot",)):
+            robots = [
+                self.who.resolve(s)
+                for s in self.nouns.subjects(clause.subject, ("robot",), "a robot")
+            ]
+            if any(robot.open for robot in robots):
+                raise NotUnderstood(f"{self.scene.said.clause!r} does not say which robot: name it")
+            if held is None and not in_hand:
+                raise NotUnderstood('what lies in a basket is said thing by thing, not "nothing"')
+            return self.holding(robots, held, in_hand)
+        if held is None:
+            raise NotUnderstood(f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}")
+        if self.nouns.can_be(clause.subject, ("object",)):
+            by = [n for m in self.settled(clause.subject) for n in m.subjects]
+            person = len(by) == 1 and self.scene.vocabulary.is_person(by[0])
+            if len(by) != 1 or not (
+                person or (by[0] in self.scene.vocabulary.good_for and not in_hand)
+            ):
+                raise NotUnderstood(
+                    f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}"
+                )
+            return self.put(held, by[0])
+        places = [n for m in self.places.place_mentions(clause.subject) for n in m.subjects]
+        if len(places) != 1 or in_hand:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say one place: {SAY_IT}")
+        return self.put(held, places[0])
+
+    def on_hand_empty(self, clause: Clause) -> None:
+        self.check_mode()
+        assert clause.subject is not None
+        robots = [
+            self.who.resolve(s) for s in self.nouns.subjects(clause.subject, ("robot",), "a robot")
+        ]
+        self.holding(robots, None, True)
+
+    def on_looked(self, clause: Clause) -> None:
+        self.check_mode()
+        participle = next((w.word for w in clause.words if "PART" in w.tags), "")
+        if participle not in self.scene.tagger.book.searched:
+            raise NotUnderstood(f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}")
+        self.looked_around(clause.subject, not clause.has("NOBODY"))
+
+    def on_seen(self, clause: Clause) -> None:
+        self.check_mode()
+        assert clause.subject is not None
+        self.placed(clause.subject, clause.arguments)
+
+    def on_speaker_at(self, clause: Clause) -> None:
+        """`I am in the bedroom`."""
+        speaker = self.scene.vocabulary.speaker
+        where, _ = self.wishes.whereto(framed(clause.arguments))
+        if speaker is None or where.target is None or self.scene.mode == "goal":
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} is no goal, and may matter: leave it out, or tell it "
+                "as a fact"
+            )
+        self.fact(AT, speaker, where.target)

@@ -1,0 +1,67 @@
+"""Clauses, each to the part that knows its kind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from fleet.errors import NotUnderstood
+from fleet.language.resolve.claims import Claims
+from fleet.language.resolve.commands import Commands
+from fleet.language.resolve.ellipsis import Continuations
+from fleet.language.resolve.frames import SAY_IT
+from fleet.language.resolve.looking import Looking
+from fleet.language.resolve.nouns import NounResolver
+from fleet.language.resolve.places import PlaceResolver
+from fleet.language.resolve.questions import Questions
+from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.scene import Scene
+from fleet.language.resolve.shall import Shall
+from fleet.language.resolve.skilled import Skilled
+from fleet.language.resolve.tidiness import Tidiness
+from fleet.language.resolve.wishes import Wishes
+from fleet.language.tree.nodes import Clause
+
+_WISHES = frozenset(
+    {"wanted", "belongs", "whereto", "enough", "kept", "never_be", "never_do", "avoid"}
+)
+
+
+class Clauses:
+    """Takes clauses into what is said, one after the other."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        who = Referents(scene)
+        nouns = NounResolver(scene, who)
+        places = PlaceResolver(scene, who, nouns)
+        wishes = Wishes(scene, who, nouns, places)
+        looking = Looking(scene, who, nouns, places, wishes)
+        skilled = Skilled(scene, who, nouns, places)
+        tidiness = Tidiness(scene, nouns, places, wishes)
+        claims = Claims(scene, who, nouns, places, wishes)
+        questions = Questions(scene, who, nouns, wishes)
+        shall = Shall(scene, who, nouns, places, wishes, looking, skilled, claims)
+        commands = Commands(
+            scene, who, nouns, places, wishes, looking, skilled, tidiness, questions
+        )
+        ellipsis = Continuations(scene, who, nouns, wishes, claims)
+        self._by_kind: dict[str, Callable[[Clause], None]] = {
+            name.removeprefix("on_"): getattr(part, name)
+            for part in (claims, questions, shall, commands, ellipsis)
+            for name in dir(part)
+            if name.startswith("on_")
+        }
+
+    def clause(self, clause: Clause) -> None:
+        """Take a clause into what is said.
+
+        Raises:
+            NotUnderstood: it means nothing here; one sentence.
+        """
+        said = self.scene.said
+        said.began, said.ended = clause.first, clause.last
+        if self.scene.mode == "fact" and clause.kind in ("do", "told"):
+            raise NotUnderstood(f"{said.line!r} is a goal and not a fact: {SAY_IT}")
+        if self.scene.mode == "fact" and clause.kind in _WISHES:
+            raise NotUnderstood(f"{said.clause!r} is not understood as a fact: {SAY_IT}")
+        self._by_kind[clause.kind](clause)

@@ -1,0 +1,194 @@
+"""Clauses with a verb that somebody shall do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fleet.errors import NotUnderstood
+from fleet.language.refusals import reason_for
+from fleet.language.resolve.frames import EXAMPLE, Frame, frames_of
+from fleet.language.resolve.looking import ROBOTS_TELL, Looking
+from fleet.language.resolve.mentions import NounPhrase, Subject
+from fleet.language.resolve.nouns import NounResolver
+from fleet.language.resolve.places import PlaceResolver
+from fleet.language.resolve.questions import Questions
+from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.scene import THINGS, Scene
+from fleet.language.resolve.skilled import Skilled
+from fleet.language.resolve.stages import GoalDraft
+from fleet.language.resolve.tidiness import Tidiness
+from fleet.language.resolve.wishes import Wishes
+from fleet.language.tree.nodes import (
+    Clause,
+)
+from keyexpr_schema.facts import (
+    AT,
+)
+from keyexpr_schema.payloads.goals import Condition
+
+
+class Commands:
+    """Turns clauses with a verb into wishes."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        who: Referents,
+        nouns: NounResolver,
+        places: PlaceResolver,
+        wishes: Wishes,
+        looking: Looking,
+        skilled: Skilled,
+        tidiness: Tidiness,
+        questions: Questions,
+    ) -> None:
+        self.scene = scene
+        self.who = who
+        self.nouns = nouns
+        self.places = places
+        self.wishes = wishes
+        self.looking = looking
+        self.skilled = skilled
+        self.tidiness = tidiness
+        self.questions = questions
+
+    def on_do(self, clause: Clause) -> None:
+        self._verb(clause, self.scene.said.addressees or None)
+
+    def on_told(self, clause: Clause) -> None:
+        assert clause.subject is not None
+        who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+        self.who.check_robots(who)
+        self.scene.said.addressees = [
+            s for s in who if not (isinstance(s, NounPhrase) and s.generic)
+        ]
+        self._verb(clause, who)
+
+    def _verb(self, clause: Clause, who: Sequence[Subject] | None) -> None:
+        assert clause.verb is not None
+        problems: list[NotUnderstood] = []
+        frames = frames_of(self.scene.tagger, clause.verb, clause.arguments, ("VERB", "FIN", "GER"))
+        if not frames:
+            raise NotUnderstood(f"{clause.verb.text!r} is not understood as a goal: {EXAMPLE}")
+        for frame, phrases in frames:
+            before = self.scene.said
+            self.scene.said = before.copy()
+            try:
+                if phrases:
+                    if phrases[0].phrase.type != "robot":
+                        self._check_who(who)
+                    self.scene.said.elliptic = ""
+                    self.scene.said.again = (clause.verb, clause.arguments)
+                    self.skilled.skill(frame, phrases, who)
+                else:
+                    self._sense(frame, who)
+                return
+            except NotUnderstood as problem:
+                self.scene.said = before
+                problems.append(problem)
+        raise problems[0]
+
+    def _sense(self, frame: Frame, who: Sequence[Subject] | None) -> None:
+        senses = frame.senses
+        self.scene.said.verb = frame.verb
+        self.scene.said.elliptic = "move" if senses & {"move", "go", "give"} else ""
+        if "go" in senses and not frame.themes and ("move" not in senses or _whereto(frame)):
+            return self.wishes.go(frame, who)
+        if "patrol" in senses and any(not self.who.any_robot(s) for s in who or ()):
+            self.who.check_robots(who or ())
+            return self.looking.patrol(frame, who or ())
+        self._check_who(who)
+        if "clear" in senses and "tidy" not in senses:
+            return self.tidiness.clear(frame)
+        if "move" in senses and (frame.themes or "tidy" not in senses):
+            return self.wishes.move(frame)
+        if "give" in senses:
+            return self.wishes.move(frame)
+        if "tidy" in senses:
+            return self.tidiness.tidy(frame)
+        if "find" in senses:
+            return self.looking.find(frame)
+        if "pick" in senses:
+            return self.looking.pick(frame)
+        return self.looking.search(frame)
+
+    def _check_who(self, who: Sequence[Subject] | None) -> None:
+        if who is not None:
+            self.who.check_who(who)
+
+    def on_never_do(self, clause: Clause) -> None:
+        """`never go to the kitchen`, `the hsr should never enter it`."""
+        assert clause.verb is not None
+        who = None
+        if clause.subject is not None:
+            who = self.nouns.subjects(clause.subject, ("robot",), "a robot")
+        self._never(clause, who)
+
+    def _never(self, clause: Clause, who: Sequence[Subject] | None) -> None:
+        assert clause.verb is not None
+        frames = frames_of(self.scene.tagger, clause.verb, clause.arguments, ("VERB", "FIN", "GER"))
+        going = [frame for frame, _ in frames if "go" in frame.senses]
+        making = [(frame, phrases) for frame, phrases in frames if phrases]
+        if going:
+            where = self._entered(going[0])
+            names = [n for s in who or () for n in self.who.resolve(s).subjects]
+            names = names or self.who.able_to_drive()
+            self.scene.said.never.extend(
+                Condition(relation=AT, subject=name, value=place)
+                for name in names
+                for place in where
+            )
+            return
+        if making:
+            draft, self.scene.said.draft = (
+                self.scene.said.draft,
+                GoalDraft(self.scene.vocabulary.is_at),
+            )
+            try:
+                self.skilled.skill(*making[0])
+                self.scene.said.never.extend(
+                    c for s in self.scene.said.draft.conditions() for c in s
+                )
+            finally:
+                self.scene.said.draft = draft
+            return
+        raise NotUnderstood(
+            f'"{self.scene.said.clause}" {reason_for([("not", "not")], "a goal")}'[0:200]
+        )
+
+    def _entered(self, frame: Frame) -> list[str]:
+        nouns = list(frame.themes) + [p.nouns for p in frame.places if p.nouns is not None]
+        if not nouns or frame.particle_words:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say which place: name it")
+        return [n for each in nouns for m in self.places.place_mentions(each) for n in m.subjects]
+
+    def on_avoid(self, clause: Clause) -> None:
+        """`avoid the kitchen`, `without entering the kitchen`."""
+        if clause.verb is not None:
+            return self._never(clause, self.scene.said.addressees or None)
+        assert clause.subject is not None
+        self.scene.said.never.extend(
+            Condition(relation=AT, subject=name, value=place)
+            for name in self.who.able_to_drive()
+            for m in self.places.place_mentions(clause.subject)
+            for place in m.subjects
+        )
+        return None
+
+    def on_where(self, clause: Clause) -> None:
+        assert clause.subject is not None
+        if self.scene.mode == "goal":
+            if self.nouns.can_be(clause.subject, ("robot",)) and not self.nouns.can_be(
+                clause.subject, ("object",)
+            ):
+                text = self.scene.said.clause
+                subject = clause.subject.items
+                text = self.scene.said.quote(subject[0].first, subject[-1].last)
+                raise NotUnderstood(f"{text!r}: {ROBOTS_TELL}")
+            return self.looking.find_these(clause.subject, ())
+        self.questions.ask_where(clause)
+        return None
+
+
+def _whereto(frame: Frame) -> bool:
+    return bool(frame.places) or frame.home or "back" in frame.particle_words

@@ -1,0 +1,89 @@
+"""What a text has said so far: whom pronouns mean, where "there" is, what is wanted and so."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from fleet.language.resolve.mentions import Mention, Subject
+from fleet.language.resolve.stages import GoalDraft
+from fleet.language.tagging.lexicon import Entity, EntityType
+from fleet.language.words.times import TimePhrase
+from fleet.language.words.tokens import Token
+from keyexpr_schema.facts import FactKey, Literal, Value
+from keyexpr_schema.payloads.goals import Condition
+
+
+@dataclass
+class Discourse:
+    """The state in which a clause is resolved; every reading of a text has one of its own."""
+
+    text: str
+    tokens: Sequence[Token]
+    draft: GoalDraft
+    recent: list[Mention] = field(default_factory=list)
+    """Whom "it" and "them" may mean."""
+    mentioned: list[Mention] = field(default_factory=list)
+    """Whom "the other cup" does not mean."""
+    kind_of: Entity | None = None
+    """Of whose kind "the second one" is."""
+    kind_type: EntityType = "object"
+    moved: list[Subject] = field(default_factory=list)
+    last_place: str | None = None
+    elliptic: str = ""
+    """`move`: "and the book to the kitchen" may follow; `be`: "and the book in the hallway"."""
+    verb: str = ""
+    addressees: list[Subject] = field(default_factory=list)
+    again: Any = None
+    """The verb and arguments of the last clause: "and then the second one"."""
+    began: int = 0
+    ended: int = 0
+    facts: dict[FactKey, Value] = field(default_factory=dict)
+    presumed: list[Literal] = field(default_factory=list)
+    always: list[Condition] = field(default_factory=list)
+    never: list[Condition] = field(default_factory=list)
+    when: list[Condition] = field(default_factory=list)
+    times: list[TimePhrase] = field(default_factory=list)
+    urgent: bool = False
+
+    def copy(self) -> Discourse:
+        """The same, for another reading to go on from."""
+        return replace(
+            self,
+            draft=self.draft.copy(),
+            recent=list(self.recent),
+            mentioned=list(self.mentioned),
+            moved=list(self.moved),
+            addressees=list(self.addressees),
+            facts=dict(self.facts),
+            presumed=list(self.presumed),
+            always=list(self.always),
+            never=list(self.never),
+            when=list(self.when),
+            times=list(self.times),
+        )
+
+    def quote(self, first: int, last: int) -> str:
+        """The text of some tokens, as it was written."""
+        chosen = self.tokens[first:last]
+        return " ".join(self.text[chosen[0].start : chosen[-1].end].split()) if chosen else ""
+
+    @property
+    def clause(self) -> str:
+        """The clause that is being read, as it was written."""
+        return self.quote(self.began, self.ended)
+
+    @property
+    def line(self) -> str:
+        """The whole text on one line."""
+        return " ".join(self.text.split())
+
+    def remember(self, mentions: Sequence[Mention]) -> None:
+        """These are whom a pronoun means from now on."""
+        self.mentioned.extend(mentions)
+        if len(mentions) > 1 and not any(m.open for m in mentions):
+            names = tuple(dict.fromkeys(s for m in mentions for s in m.subjects))
+            self.recent = [Mention(names, mentions[0].type, mentions[0].key)]
+        else:
+            self.recent = list(mentions)

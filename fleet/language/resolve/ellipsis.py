@@ -1,0 +1,84 @@
+"""Clauses that go on from one before: "and then to the kitchen", "and the second one"."""
+
+from __future__ import annotations
+
+from fleet.errors import NotUnderstood
+from fleet.language.resolve.claims import Claims
+from fleet.language.resolve.frames import EXAMPLE, framed
+from fleet.language.resolve.mentions import Subject
+from fleet.language.resolve.nouns import NounResolver
+from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.scene import PLACES, THINGS, Scene
+from fleet.language.resolve.wishes import Wishes
+from fleet.language.tree.nodes import (
+    Clause,
+)
+
+
+class Continuations:
+    """Turns clauses that go on from one before into wishes."""
+
+    def __init__(
+        self, scene: Scene, who: Referents, nouns: NounResolver, wishes: Wishes, claims: Claims
+    ) -> None:
+        self.scene = scene
+        self.who = who
+        self.nouns = nouns
+        self.wishes = wishes
+        self.claims = claims
+
+    def on_bare(self, clause: Clause) -> None:
+        """`and the book to the kitchen`, `and the second cup in the hallway`."""
+        assert clause.subject is not None
+        if self.scene.said.elliptic == "is":
+            return self.claims.placed(clause.subject, clause.arguments)
+        if self.scene.mode == "fact":
+            return self.claims.placed(clause.subject, clause.arguments)
+        if not self.scene.said.elliptic:
+            subject = clause.subject.items
+            shown = self.scene.said.quote(subject[0].first, subject[-1].last)
+            raise NotUnderstood(f"{shown!r} is not understood as a goal: {EXAMPLE}")
+        who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+        verb = self.scene.said.verb.split() if self.scene.said.elliptic == "move" else [""]
+        fetching = verb[0] in self.scene.tagger.book.fetching
+        where, home = self.wishes.whereto(framed(clause.arguments), each=True, fetching=fetching)
+        return self.wishes.to_target(who, where, home)
+
+    def on_whereto(self, clause: Clause) -> None:
+        """`and then to the kitchen`."""
+        if not self.scene.said.elliptic or not (self.scene.said.recent or self.scene.said.moved):
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} is not understood as a goal: {EXAMPLE}"
+            )
+        where, home = self.wishes.whereto(framed(clause.arguments))
+        same: list[Subject] = list(self.scene.said.recent[:1]) or self.scene.said.moved
+        return self.wishes.to_target(same, where, home)
+
+    def on_named(self, clause: Clause) -> None:
+        assert clause.subject is not None
+        strange = any("UNK" in w.tags for n in clause.subject.items for w in n.head)
+        if self.scene.said.elliptic and not strange and self.nouns.can_be(clause.subject, PLACES):
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} is one place too many for one thing; if one is to "
+                'come after the other, say "then"'
+            )
+        if self.scene.said.elliptic and not strange:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say where to: name a place")
+        shown = self.scene.said.clause
+        raise NotUnderstood(f"{shown!r} is not understood as a goal: {EXAMPLE}")
+
+    def on_enough(self, clause: Clause) -> None:
+        """`a bottle in the kitchen would do`: which of what was asked for before, and where to."""
+        assert clause.subject is not None
+        noun = self.nouns.subject(clause.subject.items[0], ("object",), "an object")
+        will_do = self.who.resolve(self.who.movable(noun)).subjects
+        asked = [m for m in self.scene.said.recent if m.open and set(m.subjects) & set(will_do)]
+        if len(asked) != 1:
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r}: nothing was asked for before that it could do for"
+            )
+        meant = self.scene.said.draft.narrow(asked[0], will_do)
+        self.scene.said.remember([meant])
+        if clause.arguments:
+            where, home = self.wishes.whereto(framed(clause.arguments))
+            self.wishes.to_target([meant], where, home)

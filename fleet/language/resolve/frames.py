@@ -1,0 +1,99 @@
+"""What stands behind a verb, sorted, and the uses of the verb that it fits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fleet.language.tagging.skill_words import SKILL, SkillFrame
+from fleet.language.tagging.tagger import Lexeme, Tagger
+from fleet.language.tree.nodes import (
+    Argument,
+    Except,
+    Nouns,
+    Particle,
+    Place,
+)
+from fleet.language.words.tokens import Phrase
+
+HOME_HINT = 'give it one with the field "home" of the object'
+EXAMPLE = 'say it like "bring the first cup to the hallway" or "send a robot to the kitchen"'
+SAY_IT = 'say it like "the first cup is in the kitchen" or "nobody knows where the book is"'
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What stands behind a verb, sorted: noun phrases, phrases of place, particles."""
+
+    verb: str
+    senses: frozenset[str]
+    themes: tuple[Nouns, ...]
+    places: tuple[Place, ...]
+    particles: tuple[Particle, ...] = ()
+    but: tuple[Except, ...] = ()
+
+    @property
+    def home(self) -> bool:
+        """Whether a word says "home"."""
+        return any("HOME" in p.lexeme.tags for p in self.particles) or any(
+            place.special == "home" for place in self.places
+        )
+
+    @property
+    def particle_words(self) -> frozenset[str]:
+        """The particles that are left beside the verb's own."""
+        return frozenset(p.lexeme.word for p in self.particles if "HOME" not in p.lexeme.tags)
+
+
+def framed(
+    arguments: Sequence[Argument], verb: str = "", senses: frozenset[str] = frozenset()
+) -> Frame:
+    """The arguments of a clause, sorted."""
+    return Frame(
+        verb,
+        senses,
+        tuple(a for a in arguments if isinstance(a, Nouns)),
+        tuple(a for a in arguments if isinstance(a, Place)),
+        tuple(a for a in arguments if isinstance(a, Particle)),
+        tuple(a for a in arguments if isinstance(a, Except)),
+    )
+
+
+def frames_of(
+    tagger: Tagger, verb: Lexeme, arguments: Sequence[Argument], forms: tuple[str, ...]
+) -> list[tuple[Frame, list[SkillFrame]]]:
+    """The uses of a verb that its particles and prepositions fit, the longest first."""
+    found: list[tuple[int, Frame, list[SkillFrame]]] = []
+    plain = framed(arguments, verb.word)
+    for head in tagger.verbs.heads(verb.words, *forms):
+        for entry in tagger.verbs.entries[head]:
+            fitted = _fitted(plain, entry.behind, entry.senses, entry.base)
+            if fitted is not None:
+                skills = tagger.verbs.skills.get((head, entry.behind), [])
+                of_skill = skills if SKILL in entry.senses else []
+                found.append((len(entry.behind), fitted, of_skill))
+    longest = max((row[0] for row in found), default=0)
+    return [(frame, skills) for length, frame, skills in found if length == longest]
+
+
+def _fitted(
+    frame: Frame, behind: Sequence[Phrase], senses: frozenset[str], verb: str
+) -> Frame | None:
+    """The frame as that of a verb with these words behind it; `None`: they are not there."""
+    left = list(frame.particles)
+    places = list(frame.places)
+    themes = frame.themes
+    for i, chunk in enumerate(behind):
+        one = next((p for p in left if p.lexeme.words == chunk), None)
+        rest = tuple(word for later in behind[i:] for word in later)
+        if one is not None:
+            left.remove(one)
+            continue
+        at = next((p for p in places if tuple(p.preposition.split()) == rest), None)
+        if at is None or (themes and "find" in senses):
+            return None
+        if senses & {"find", SKILL} and not themes and at.nouns is not None:
+            places.remove(at)
+            themes = (at.nouns,)
+        break
+    return Frame(verb, senses, themes, tuple(places), tuple(left), frame.but)

@@ -1,0 +1,130 @@
+"""Noun phrases as they were read, and who is meant by them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+from fleet.errors import NotUnderstood
+from fleet.language.refusals import one_of
+from fleet.language.tagging.lexicon import Entity, EntityType
+from fleet.language.tree.nodes import Quantity
+
+
+@dataclass(frozen=True)
+class Mention:
+    """Who is meant: all of `subjects`, or with `open` any one of them.
+
+    `key` tells one mention from another: two that say "a cup" may mean different cups.
+    `selective`: other words would narrow it down, as in "all cups" but not in "the first cup".
+    `surfaces` are those by which places were named.
+    """
+
+    subjects: tuple[str, ...]
+    type: EntityType
+    key: int
+    open: bool = False
+    selective: bool = False
+    surfaces: tuple[str, ...] = ()
+
+    @property
+    def single(self) -> bool:
+        """Whether just one is meant, known or open."""
+        return self.open or len(self.subjects) == 1
+
+
+@dataclass(frozen=True)
+class NounPhrase:
+    """A noun phrase before it is resolved to those meant; `ordinal` 0 is the last one.
+
+    `exact`: the words name each of `found`. `generic`: the words say no more than "thing".
+    `source`: its own words say where it is ("the cup that is on the table").
+    """
+
+    found: tuple[Entity, ...]
+    text: str
+    key: int
+    quantity: Quantity = Quantity.BARE
+    plural: bool = False
+    exact: bool = False
+    generic: bool = False
+    count: int | None = None
+    ordinal: int | None = None
+    source: str | None = None
+    source_surface: str | None = None
+
+    @property
+    def type(self) -> EntityType:
+        """The type of those that could be meant."""
+        return self.found[0].type
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Everybody who could be meant."""
+        return tuple(dict.fromkeys(e.stands_for for e in self.found))
+
+    @property
+    def surfaces(self) -> tuple[str, ...]:
+        """The surfaces that could be meant."""
+        return tuple(e.id for e in self.found if e.type == "surface")
+
+    def among(self, subjects: Collection[str]) -> NounPhrase:
+        """The same phrase, said of some of those that it could be."""
+        return replace(self, found=tuple(e for e in self.found if e.stands_for in subjects))
+
+    def resolve(self) -> Mention:
+        """Who is meant.
+
+        Raises:
+            NotUnderstood: it does not say which of several, or counts more than there are.
+        """
+        names, listing = self.names, ", ".join(self.names)
+        if len({e.type for e in self.found}) > 1 and self.exact:
+            both = one_of(f"the {e.type} {e.id}" for e in self.found)
+            raise NotUnderstood(f"{self.text!r} could be {both}: give one of them another name")
+        if self.ordinal is not None:
+            return Mention(self._by_ordinal(), self.type, self.key)
+        if self.count is not None and self.count != len(names):
+            verb = "is" if len(names) == 1 else "are"
+            reason = (
+                f"say which {self.count}"
+                if 0 < self.count < len(names)
+                else f"there {verb} only {len(names)}"
+            )
+            raise NotUnderstood(f"{self.text!r}: {reason}; known are {listing}")
+        if self.quantity is Quantity.ALL or self.count is not None:
+            selective = len(names) > 1 and not self.exact and self.count is None
+            return Mention(names, self.type, self.key, selective=selective)
+        if self.plural and self.quantity in (Quantity.ANY, Quantity.BARE):
+            raise NotUnderstood(
+                f"{self.text!r} does not say how many: say all of them or which ones; "
+                f"known are {listing}"
+            )
+        if len(names) == 1:
+            return Mention(names, self.type, self.key)
+        if self.quantity is Quantity.ANY:
+            return Mention(names, self.type, self.key, open=True, selective=True)
+        if self.plural:
+            return Mention(names, self.type, self.key, selective=True)
+        what = "place" if self.type == "surface" else self.type
+        raise NotUnderstood(f"{self.text!r} could be {one_of(names)}: say which {what}")
+
+    def _by_ordinal(self) -> tuple[str, ...]:
+        ordered = sorted(self.found, key=lambda e: e.rank)
+        chosen: list[Entity] = []
+        if all(e.ordinal is not None for e in ordered):
+            if self.count is None:
+                wanted = self.ordinal or max(e.ordinal or 0 for e in ordered)
+                chosen = [e for e in ordered if e.ordinal == wanted]
+            elif self.count <= len(ordered) and self.ordinal in (0, 1):
+                chosen = ordered[: self.count] if self.ordinal else ordered[-self.count :]
+        names = tuple(e.stands_for for e in chosen)
+        if not names:
+            raise NotUnderstood(f"there is no {self.text!r}; known are {', '.join(self.names)}")
+        if len(names) > 1 and self.count is None:
+            raise NotUnderstood(f"{self.text!r} could be {one_of(names)}: say which")
+        return names
+
+
+Subject = NounPhrase | Mention
+"""Whom a clause is about: a noun phrase, or somebody who was settled before ("it")."""

@@ -1,0 +1,344 @@
+"""What noun phrases can mean, in this world and in this text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from fleet.errors import NotUnderstood
+from fleet.language.refusals import listed, nearest, one_of, suggestion
+from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
+from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.scene import Scene
+from fleet.language.tagging.lexicon import CATEGORIES, ENTITY_TYPES, Entity, EntityType
+from fleet.language.tree.nodes import (
+    Noun,
+    Nouns,
+    Quantity,
+)
+from fleet.language.words.tokens import ORDINALS, Token, words_of
+
+_PLURAL = frozenset({"them", "they", "these", "those", "both", "all", "each"})
+
+
+class NounResolver:
+    """Finds out whom noun phrases mean."""
+
+    def __init__(self, scene: Scene, who: Referents) -> None:
+        self.scene = scene
+        self.who = who
+        self.located: Callable[[Noun, NounPhrase], NounPhrase] = lambda noun, made: made
+
+    def subjects(self, nouns: Nouns, types: Sequence[EntityType], what: str) -> list[Subject]:
+        """All that a list of noun phrases means.
+
+        Raises:
+            NotUnderstood: one of them is nothing known of these types.
+        """
+        found = [self.subject(noun, types, what) for noun in nouns.items]
+        if nouns.either:
+            either = found[0]
+            for other in found[1:]:
+                either = self._either(either, other)
+            return [either]
+        for i in range(1, len(found)):
+            found[i] = _determined(found[i], found[i - 1])
+        return found
+
+    def subject(self, noun: Noun, types: Sequence[EntityType], what: str) -> Subject:
+        """Whom one noun phrase or pronoun means."""
+        if noun.form == "pronoun":
+            return self.pronoun(noun)
+        if noun.form == "me":
+            return self.speaker(noun, "object")
+        return self.noun(noun, types, what)
+
+    def can_be(self, nouns: Nouns, types: Sequence[EntityType]) -> bool:
+        """Whether all of them can be of one of these types, by their words."""
+        for noun in nouns.items:
+            if noun.form == "pronoun":
+                if not any(m.type in types for m in self.scene.said.recent):
+                    return False
+            elif noun.form == "me":
+                if self.scene.vocabulary.speaker is None or "object" not in types:
+                    return False
+            else:
+                try:
+                    self.noun(noun, types, "")
+                except NotUnderstood:
+                    return False
+        return True
+
+    def speaker(self, noun: Noun, as_type: EntityType = "surface") -> NounPhrase:
+        """Who says "me".
+
+        Raises:
+            NotUnderstood: nobody knows.
+        """
+        text = self.scene.said.quote(noun.first, noun.last)
+        found = tuple(
+            e
+            for e in self.scene.lexicon.entities
+            if e.type == as_type and e.id == self.scene.vocabulary.speaker
+        )
+        if not found:
+            raise NotUnderstood(
+                f"{text!r} names somebody whose place is not known; name a place or a robot"
+            )
+        return NounPhrase(found, text, noun.first, exact=True)
+
+    def pronoun(self, noun: Noun) -> Mention:
+        word = noun.words[0]
+        plural = word in _PLURAL or len(noun.words) > 1
+        meant = [m for m in self.scene.said.recent if m.single != plural]
+        count = 2 if word == "both" else int(word) if word.isdecimal() else None
+        if len(meant) == 1 and count in (None, len(meant[0].subjects)):
+            return meant[0]
+        names = sorted({s for m in self.scene.said.recent for s in m.subjects})
+        reason = f"could be {one_of(names)}" if names else "refers to nothing before it"
+        text = self.scene.said.quote(noun.first, noun.last)
+        raise NotUnderstood(f"{text!r} {reason}: name what you mean")
+
+    def _either(self, first: Subject, second: Subject) -> NounPhrase:
+        if not isinstance(first, NounPhrase) or not isinstance(second, NounPhrase):
+            raise NotUnderstood('"or" is understood between names only: name both')
+        if first.type != second.type or not (first.resolve().single and second.resolve().single):
+            raise NotUnderstood(f"{first.text!r} or {second.text!r} leaves too much open")
+        both = (
+            first.among(first.resolve().subjects).found
+            + second.among(second.resolve().subjects).found
+        )
+        return NounPhrase(both, f"{first.text} or {second.text}", first.key, Quantity.ANY)
+
+    def noun(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
+        """What a noun phrase can mean; its own words may say where it is.
+
+        Raises:
+            NotUnderstood: nothing known of these types; the message lists what is.
+        """
+        return self.located(noun, self._described_by_words(noun, types, what))
+
+    def _described_by_words(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
+        text = self.scene.said.quote(noun.first, noun.last)
+        made = NounPhrase((), text, noun.first, noun.quantity, count=noun.count)
+        made = self._headed(noun, made, types, what)
+        if noun.use is not None:
+            made = self._useful(made, noun.use)
+        for adjective in noun.adjectives:
+            made = self.scene.stated.narrowed(made, adjective, self.scene.said)
+        for relative in noun.relatives:
+            if relative.state is not None:
+                made = self.scene.stated.narrowed(
+                    made, relative.state, self.scene.said, relative.negated
+                )
+        if noun.but is not None:
+            made = self._without(made, noun.but, types, what)
+        made = replace(made, plural=made.plural and not noun.part)
+        if len(noun.ordinals) > 1:
+            return self._numbered_each(made, noun.ordinals)
+        if noun.ordinals:
+            made = replace(made, ordinal=noun.ordinals[0])
+        return self._others(made, noun.other) if noun.other else made
+
+    def _headed(
+        self, noun: Noun, made: NounPhrase, types: Sequence[EntityType], what: str
+    ) -> NounPhrase:
+        if noun.form == "general":
+            return self._general(noun, made, types, what)
+        if noun.form == "headless" or (noun.form == "one" and len(noun.head) == 1):
+            kin = tuple(e for e in self.kind if e.type in types)
+            if not kin:
+                raise self.unknown(noun, types, what)
+            plural = noun.form == "one" and noun.head[0].spoken == "ones"
+            return replace(made, found=kin, plural=plural)
+        if noun.form != "noun" and noun.form != "one":
+            raise self.unknown(noun, types, what)
+        head = noun.head[0].words
+        if any("UNK" in word.tags for word in noun.head):
+            raise self.unknown(noun, types, what)
+        named = self._named(head, noun.head[0].text, types)
+        if named and not noun.numbers:
+            self._remember_kind(named[0])
+            return replace(made, found=named, exact=True)
+        return self._described(noun, made, types, what)
+
+    def _named(
+        self, words: tuple[str, ...], text: str, types: Sequence[EntityType]
+    ) -> tuple[Entity, ...]:
+        """Those whose whole name it is; a kind that has several members is none."""
+        end, found = self.scene.lexicon.exact(_tokens(words), 0, types)
+        if end != len(words):
+            return ()
+        raw = text.casefold()
+        if len(found) > 1:
+            found = tuple(e for e in found if e.id.casefold() == raw) or found
+        if found and self.scene.lexicon.is_several(words, types):
+            found = tuple(e for e in found if e.id.casefold() == raw)
+        return found
+
+    def _described(
+        self, noun: Noun, made: NounPhrase, types: Sequence[EntityType], what: str
+    ) -> NounPhrase:
+        words = noun.head[0].words
+        tokens = _tokens(words)
+        end, found = self.scene.lexicon.described(tokens, 0, types)
+        # "The kitchen" is the place of that name, and no table that is called by it, too.
+        named_end, named = self.scene.lexicon.exact(tokens, 0, ENTITY_TYPES)
+        other = named and named_end == len(words) and all(e.type == "place" for e in named)
+        if end != len(words) or not found or (other and "place" not in types):
+            raise self.unknown(noun, types, what)
+        plural, generic = False, False
+        kind = self.scene.lexicon.kind(tokens, 0, end, types)
+        if kind is not None and (of_kind := tuple(e for e in found if e in kind[1])):
+            plural, found = kind[0], of_kind
+            category = any(words[0] in (c, f"{c}s") for cs in CATEGORIES.values() for c in cs)
+            generic = len(words) == 1 and len(found) == len(kind[1]) and category
+        if noun.of:
+            found = self._of_what(noun, found, types, what)
+        self._remember_kind(found[0])
+        if noun.form == "one":
+            return replace(made, found=found, plural=noun.head[-1].spoken == "ones")
+        if not noun.numbers:
+            return replace(made, found=found, plural=plural, generic=generic)
+        chosen = tuple(e for number in noun.numbers for e in _numbered(found, number, made.text))
+        quantity = Quantity.ALL if len(noun.numbers) > 1 else noun.quantity
+        return replace(made, found=chosen, quantity=quantity, exact=True)
+
+    def _of_what(
+        self, noun: Noun, found: tuple[Entity, ...], types: Sequence[EntityType], what: str
+    ) -> tuple[Entity, ...]:
+        words = tuple(word for lexeme in noun.of if "NOUN" in lexeme.tags for word in lexeme.words)
+        if any("UNK" in lexeme.tags for lexeme in noun.of):
+            raise self.unknown(noun, types, what)
+        named = self.scene.lexicon.meant(words)
+        narrower = tuple(e for e in found if e in named)
+        if not narrower:
+            raise self.unknown(noun, types, what)
+        return narrower
+
+    def _general(
+        self, noun: Noun, made: NounPhrase, types: Sequence[EntityType], what: str
+    ) -> NounPhrase:
+        tags = noun.head[0].tags
+        entity_type: EntityType = "robot" if "EVERYONE" in tags else "object"
+        quantity = Quantity.ANY if "SOMETHING" in tags else Quantity.ALL
+        found = tuple(e for e in self.scene.lexicon.entities if e.type == entity_type)
+        if entity_type not in types or not found:
+            raise self.unknown(noun, types, what)
+        return replace(made, found=found, quantity=quantity, generic=entity_type == "object")
+
+    def _useful(self, made: NounPhrase, verb: str) -> NounPhrase:
+        known = {use for e in self.scene.lexicon.entities if e.type == "object" for use in e.uses}
+        found = tuple(e for e in made.found if verb in e.uses)
+        if not found:
+            raise NotUnderstood(
+                f"{made.text!r}: nothing of that kind is known to be good for that; say so with "
+                f'the field "uses" of its kind; known uses are {listed(sorted(known))}'
+            )
+        return replace(made, found=found, generic=False)
+
+    def _without(
+        self, made: NounPhrase, but: Nouns, types: Sequence[EntityType], what: str
+    ) -> NounPhrase:
+        gone = {
+            name
+            for subject in self.subjects(but, types, what)
+            for name in self.who.resolve(subject).subjects
+        }
+        names = set(made.names)
+        if stray := sorted(gone - names):
+            raise NotUnderstood(f"{made.text!r}: {one_of(stray)} is none of {one_of(made.names)}")
+        left = made.among(names - gone)
+        if not left.found or made.quantity not in (Quantity.ALL, Quantity.THE):
+            raise NotUnderstood(f"{made.text!r} leaves nothing, or does not say all of what")
+        return replace(left, quantity=Quantity.ALL)
+
+    def _numbered_each(self, made: NounPhrase, ordinals: Sequence[int]) -> NounPhrase:
+        names = [
+            name
+            for ordinal in ordinals
+            for name in replace(made, ordinal=ordinal, count=None, plural=False).resolve().subjects
+        ]
+        by_name = {e.stands_for: e for e in made.found}
+        return replace(
+            made,
+            found=tuple(by_name[name] for name in names),
+            ordinal=None,
+            quantity=Quantity.ALL,
+            exact=True,
+            plural=True,
+        )
+
+    def _others(self, made: NounPhrase, other: str) -> NounPhrase:
+        """Those of the kind that were not spoken of yet.
+
+        After "a cup", which may be any, "the other one" is any too if there are two, and "another
+        cup" always: that they differ follows from where they are wanted.
+        """
+        known = set(made.names)
+        gone = [m for m in self.scene.said.mentioned if known & set(m.subjects)]
+        opened = {m.key for m in gone if m.open}
+        left = made.among(known - {s for m in gone if not m.open for s in m.subjects})
+        spare = len(left.names) - len(opened)
+        many = spare > 1 or made.plural
+        if not gone or spare < 1 or (opened and other != "another" and many):
+            raise NotUnderstood(
+                f"{made.text!r} could be {' or '.join(made.names)}: call it by its name"
+            )
+        return replace(left, quantity=Quantity.ANY) if opened else left
+
+    @property
+    def kind(self) -> tuple[Entity, ...]:
+        """Whom "one" may mean in "the second one"."""
+        return (
+            ()
+            if self.scene.said.kind_of is None
+            else self.scene.lexicon.kin(self.scene.said.kind_of)
+        )
+
+    def _remember_kind(self, entity: Entity) -> None:
+        if entity.type in ("object", "robot"):
+            self.scene.said.kind_of = entity
+
+    def unknown(self, noun: Noun, types: Sequence[EntityType], what: str) -> NotUnderstood:
+        """The phrase names nothing known of these types."""
+        strange = [word for word in noun.head if "UNK" in word.tags]
+        shown = self.scene.said.quote(noun.first, noun.last)
+        names = self.scene.lexicon.names_in(types) | set(ORDINALS)
+        single = [word.text for word in strange] or shown.split()
+        hint = ""
+        for part in (shown, " ".join(words_of(shown)), *single):
+            if part.casefold() not in ORDINALS and not hint:
+                hint = suggestion(part, names)
+        known = nearest(self.scene.lexicon.known(types), " ".join(single))
+        bare = what.removeprefix("a ").removeprefix("an ")
+        return NotUnderstood(f"{shown!r} is not a known {bare}{hint}; known are {known}")
+
+
+def _tokens(words: tuple[str, ...]) -> list[Token]:
+    return [Token(word, word, 0, 0) for word in words]
+
+
+def _numbered(found: tuple[Entity, ...], number: int, text: str) -> tuple[Entity, ...]:
+    chosen = tuple(e for e in found if e.ordinal == number) or tuple(
+        e for e in found if any(str(number) in name for name in e.names)
+    )
+    if not chosen:
+        known = ", ".join(dict.fromkeys(e.stands_for for e in found))
+        raise NotUnderstood(f"{text!r}: there is no number {number}; known are {known}")
+    return chosen
+
+
+def _determined(subject: Subject, before: Subject) -> Subject:
+    """The same, with the determiner of the one before if it has none: "all cups and books"."""
+    if (
+        isinstance(subject, NounPhrase)
+        and isinstance(before, NounPhrase)
+        and subject.plural
+        and subject.quantity is Quantity.BARE
+        and subject.count is None
+        and before.quantity in (Quantity.ALL, Quantity.THE)
+        and before.ordinal is None
+    ):
+        return replace(subject, quantity=before.quantity)
+    return subject

@@ -1,0 +1,134 @@
+"""Questions, as data for those who answer them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from msgspec.structs import replace
+
+from fleet.errors import NotUnderstood
+from fleet.language.resolve.frames import framed
+from fleet.language.resolve.mentions import Mention
+from fleet.language.resolve.nouns import NounResolver
+from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.scene import PLACES, THINGS, Question, Scene
+from fleet.language.resolve.states import of_each
+from fleet.language.resolve.wishes import Wishes
+from fleet.language.tree.nodes import (
+    Clause,
+)
+from keyexpr_schema.facts import (
+    SEARCHED,
+)
+from keyexpr_schema.payloads.goals import Condition
+
+
+class Questions:
+    """Turns questions into data."""
+
+    def __init__(self, scene: Scene, who: Referents, nouns: NounResolver, wishes: Wishes) -> None:
+        self.scene = scene
+        self.who = who
+        self.nouns = nouns
+        self.wishes = wishes
+
+    def _asks(self, clause: Clause) -> None:
+        if self.scene.mode:
+            raise NotUnderstood(
+                f"{self.scene.said.line!r} is a question; a {self.scene.mode} says what "
+                f"{'should hold' if self.scene.mode == 'goal' else 'holds'}"
+            )
+
+    def ask_where(self, clause: Clause) -> None:
+        """`where is the cup?`"""
+        self._asks(clause)
+        assert clause.subject is not None
+        names = tuple(
+            name
+            for s in self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+            for name in (s.names if not isinstance(s, Mention) else s.subjects)
+        )
+        self.scene.question = Question("where", names)
+
+    def on_how_many(self, clause: Clause) -> None:
+        """`how many plates are in the kitchen?`"""
+        self._asks(clause)
+        names = self._asked_of(clause)
+        self.scene.question = Question("how many", names, self._asked(clause, names))
+
+    def on_which(self, clause: Clause) -> None:
+        """`which windows are open?`, `what is in the fridge?`"""
+        self._asks(clause)
+        names = self._asked_of(clause) if clause.subject is not None else ()
+        self.scene.question = Question("which", names, self._asked(clause, names))
+
+    def _asked_of(self, clause: Clause) -> tuple[str, ...]:
+        assert clause.subject is not None
+        types = THINGS if self.nouns.can_be(clause.subject, THINGS) else PLACES
+        found = self.nouns.subjects(clause.subject, types, "an object, robot or place")
+        return tuple(
+            dict.fromkeys(
+                n for s in found for n in (s.names if not isinstance(s, Mention) else s.subjects)
+            )
+        )
+
+    def _asked(self, clause: Clause, names: Sequence[str]) -> tuple[Condition, ...]:
+        """What may be so of each of them, who are then called `?`."""
+        predicate = clause.predicate
+        arguments = predicate.arguments if predicate is not None else clause.arguments
+        words = predicate.words if predicate is not None else ()
+        if predicate is not None and predicate.kind == "done":
+            if words[0].words not in self.scene.stated.states:
+                if words[0].word in self.scene.tagger.book.searched:
+                    return (Condition(relation=SEARCHED, subject="?", value=True),)
+                raise NotUnderstood(
+                    f"{self.scene.said.clause!r} is a question that is not understood"
+                )
+            if predicate.arguments:
+                raise NotUnderstood(
+                    f"{self.scene.said.clause!r} is a question that is not understood"
+                )
+        if words:
+            held = {
+                (relation, value)
+                for relation, _, value in of_each(self.scene.stated, words, names[:1])
+            }
+            return tuple(Condition(relation=r, subject="?", value=v) for r, v in sorted(held))
+        if not arguments:
+            return ()
+        where, _ = self.wishes.whereto(framed(arguments))
+        target = where.target or where.source
+        if target is None:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say where")
+        return (Condition(relation=where.relation, subject="?", value=target),)
+
+    def on_whether(self, clause: Clause) -> None:
+        """`is the door open?`"""
+        self._asks(clause)
+        assert clause.subject is not None
+        types = THINGS if self.nouns.can_be(clause.subject, THINGS) else PLACES
+        mentions = [
+            self.who.resolve(s)
+            for s in self.nouns.subjects(clause.subject, types, "an object or a robot")
+        ]
+        names = [name for mention in mentions for name in mention.subjects]
+        held = self._asked(clause, names)
+        if any(mention.open for mention in mentions):
+            self.scene.question = Question("whether", tuple(names), held)
+            return
+        self.scene.question = Question(
+            "whether",
+            (),
+            tuple(replace(each, subject=name) for name in names for each in held),
+        )
+
+    def on_doing(self, clause: Clause) -> None:
+        """`what is the robot doing?`"""
+        self._asks(clause)
+        names = self._asked_of(clause) if clause.subject else ()
+        self.scene.question = Question("what doing", names)
+
+    def on_who(self, clause: Clause) -> None:
+        """`who has the book?`"""
+        self._asks(clause)
+        self.scene.question = Question("who", self._asked_of(clause))

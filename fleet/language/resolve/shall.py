@@ -1,0 +1,225 @@
+"""What shall be so, stay so or never be so: "the lamp should be off", "keep the door closed"."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from fleet.errors import NotUnderstood
+from fleet.language.resolve.claims import Claims
+from fleet.language.resolve.frames import EXAMPLE, SAY_IT, Frame, framed, frames_of
+from fleet.language.resolve.looking import Looking
+from fleet.language.resolve.mentions import Mention
+from fleet.language.resolve.nouns import NounResolver
+from fleet.language.resolve.places import PlaceResolver
+from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.scene import PLACES, THINGS, Scene
+from fleet.language.resolve.skilled import Skilled
+from fleet.language.resolve.stages import GoalDraft
+from fleet.language.resolve.wishes import Wishes
+from fleet.language.tagging.skill_words import SkillFrame
+from fleet.language.tagging.tagger import Lexeme
+from fleet.language.tree.nodes import (
+    Argument,
+    Clause,
+    Nouns,
+    Predicate,
+)
+from keyexpr_schema.facts import (
+    HELD,
+    LOCATED,
+    SEARCHED,
+)
+from keyexpr_schema.payloads.goals import Condition
+
+_DONE = {"find": LOCATED, "pick": HELD, "search": SEARCHED}
+"""What holds when it has been done: "the book should be found"."""
+_GUESSES = frozenset({"can", "could", "may", "would", "will"})
+
+
+class Shall:
+    """Turns clauses about what shall be so into wishes."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        who: Referents,
+        nouns: NounResolver,
+        places: PlaceResolver,
+        wishes: Wishes,
+        looking: Looking,
+        skilled: Skilled,
+        claims: Claims,
+    ) -> None:
+        self.scene = scene
+        self.who = who
+        self.nouns = nouns
+        self.places = places
+        self.wishes = wishes
+        self.looking = looking
+        self.skilled = skilled
+        self.claims = claims
+
+    def on_shall_be(self, clause: Clause) -> None:
+        modal = next((w.word for w in clause.words if "MODAL" in w.tags), "")
+        if modal in _GUESSES:
+            if modal == "can" and clause.predicate is not None and clause.subject is not None:
+                self.claims.check_mode()
+                return self.claims.placed(clause.subject, clause.predicate.arguments)
+            raise NotUnderstood(f"{modal!r} is uncertain; say what holds, or what should hold")
+        if self.scene.mode == "fact":
+            raise NotUnderstood(f"{self.scene.said.line!r} is a goal and not a fact: {SAY_IT}")
+        return self.to_be(clause.subject, clause.predicate, clause.arguments)
+
+    def to_be(
+        self, subject: Nouns | None, predicate: Predicate | None, arguments: Sequence[Argument]
+    ) -> None:
+        """What follows "should be": a place, a state, or what should have been done."""
+        assert subject is not None
+        self.scene.said.elliptic, self.scene.said.addressees = "be", []
+        places = not self.nouns.can_be(subject, THINGS) and self.nouns.can_be(subject, PLACES)
+        if predicate is not None and predicate.kind == "state":
+            return self._made(subject, predicate.words, places)
+        if predicate is not None and predicate.kind == "done":
+            return self._done_to(subject, predicate, places)
+        if places:
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} is a place, and places stay where they are: {EXAMPLE}"
+            )
+        who = self.nouns.subjects(subject, THINGS, "an object or a robot")
+        frame = framed(predicate.arguments if predicate is not None else arguments)
+        where, home = self.wishes.whereto(frame, each=True)
+        return self.wishes.to_target(who, where, home)
+
+    def _made(
+        self, subject: Nouns, words: Sequence[Lexeme], places: bool, negated: bool = False
+    ) -> None:
+        for word in words:
+            able = self.scene.stated.able(word)
+            if places:
+                mentions = self.places.place_mentions(subject)
+            elif self.nouns.can_be(subject, ("object",)):
+                things = self.nouns.subjects(subject, ("object",), "an object")
+                mentions = self.skilled.those(things, able, word.word)
+                self.scene.said.remember(mentions)
+            else:
+                mentions = [
+                    self.who.resolve(s) for s in self.nouns.subjects(subject, ("robot",), "a robot")
+                ]
+            for mention in mentions:
+                self.skilled.wish(
+                    [mention], self.scene.stated.wants(word, mention.subjects[0], negated)
+                )
+
+    def _done_to(self, subject: Nouns, predicate: Predicate, places: bool) -> None:
+        participle = predicate.words[0]
+        frames = frames_of(self.scene.tagger, participle, predicate.arguments, ("PART",))
+        problems: list[NotUnderstood] = []
+        for frame, phrases in frames:
+            try:
+                return self._passive(subject, frame, phrases, places)
+            except NotUnderstood as problem:
+                problems.append(problem)
+        raise problems[0] if problems else NotUnderstood(f"{self.scene.said.clause!r}: {EXAMPLE}")
+
+    def _passive(
+        self, subject: Nouns, frame: Frame, phrases: Sequence[SkillFrame], places: bool
+    ) -> None:
+        if phrases:
+            return self.skilled.skill(replace(frame, themes=(subject, *frame.themes)), phrases)
+        relation = next((name for sense, name in _DONE.items() if sense in frame.senses), None)
+        if relation is not None and "move" not in frame.senses:
+            self.scene.said.elliptic = ""
+            if frame.places or frame.themes:
+                raise NotUnderstood(f"{self.scene.said.clause!r}: say it as a command")
+            return self._has_been(subject, relation)
+        if places:
+            raise NotUnderstood(f"{self.scene.said.clause!r}: places stay where they are")
+        who = self.nouns.subjects(subject, THINGS, "an object or a robot")
+        where, home = self.wishes.whereto(frame, each=True)
+        return self.wishes.to_target(who, where, home or "tidy" in frame.senses)
+
+    def _has_been(self, subject: Nouns, relation: str) -> None:
+        wanted = PLACES if relation == SEARCHED else ("object",)
+        if relation == SEARCHED and self.nouns.can_be(subject, PLACES):
+            return self.looking.searched(
+                [n for m in self.places.place_mentions(subject) for n in m.subjects]
+            )
+        who = self.nouns.subjects(subject, THINGS, "an object")
+        mentions = [self.who.resolve(self.who.movable(s) if relation == HELD else s) for s in who]
+        for mention in mentions:
+            if mention.type not in wanted:
+                raise NotUnderstood(
+                    f"{self.scene.said.clause!r}: {relation} is said of "
+                    f"{'places' if relation == SEARCHED else 'objects'} only"
+                )
+            self.scene.said.draft.add(relation, mention, True)
+        return self.scene.said.remember(mentions)
+
+    def on_wanted(self, clause: Clause) -> None:
+        assert clause.subject is not None
+        if clause.predicate is not None:
+            return self.to_be(clause.subject, clause.predicate, clause.arguments)
+        self.scene.said.elliptic = "be"
+        things = self.nouns.subjects(clause.subject, ("object",), "an object")
+        speaker = self.scene.vocabulary.speaker
+        if speaker is None:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say where to: name a place")
+        from_speaker = Mention((speaker,), "object", clause.first)
+        where = self.places.where([])
+        return self.wishes.to_target(
+            things, replace(where, target=from_speaker.subjects[0], target_type="object"), False
+        )
+
+    def on_belongs(self, clause: Clause) -> None:
+        assert clause.subject is not None
+        self.scene.said.elliptic = "be"
+        if not self.nouns.can_be(clause.subject, THINGS) and self.nouns.can_be(
+            clause.subject, PLACES
+        ):
+            raise NotUnderstood(f"{self.scene.said.clause!r}: places stay where they are")
+        who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+        where, home = self.wishes.whereto(framed(clause.arguments))
+        if where.target_type == "robot" or where.source is not None:
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} does not say in which place it belongs: {EXAMPLE}"
+            )
+        return self.wishes.to_target(who, where, home)
+
+    def on_being(self, clause: Clause) -> None:
+        assert clause.subject is not None
+        if self.scene.said.elliptic == "be":
+            self.to_be(clause.subject, clause.predicate, clause.arguments)
+            return
+        self.claims.check_mode()
+        predicate = clause.predicate
+        if predicate is None:
+            raise NotUnderstood(f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}")
+        if predicate.kind == "placed":
+            self.claims.placed(clause.subject, predicate.arguments)
+        elif predicate.kind == "state":
+            self.claims.are(clause.subject, predicate.words, False)
+        else:
+            self.claims.were(clause, True)
+
+    def on_there(self, clause: Clause) -> None:
+        assert clause.subject is not None
+        if self.scene.said.elliptic == "be":
+            return self.to_be(clause.subject, None, clause.arguments)
+        self.claims.check_mode()
+        return self.claims.placed(clause.subject, clause.arguments)
+
+    def on_kept(self, clause: Clause) -> None:
+        self.scene.said.always.extend(self._aside(clause.subject, clause.predicate))
+
+    def on_never_be(self, clause: Clause) -> None:
+        self.scene.said.never.extend(self._aside(clause.subject, clause.predicate))
+
+    def _aside(self, subject: Nouns | None, predicate: Predicate | None) -> list[Condition]:
+        """The conditions that a clause asks for, beside the stages."""
+        draft, self.scene.said.draft = self.scene.said.draft, GoalDraft(self.scene.vocabulary.is_at)
+        try:
+            self.to_be(subject, predicate, ())
+            return [c for stage in self.scene.said.draft.conditions() for c in stage]
+        finally:
+            self.scene.said.draft, self.scene.said.elliptic = draft, ""

@@ -1,0 +1,276 @@
+"""From wishes, in the order in which a sentence has them, to stages of conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field, replace
+
+from fleet.errors import NotUnderstood
+from fleet.language.refusals import one_of
+from fleet.language.resolve.mentions import Mention
+from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, SEARCHED, Value
+from keyexpr_schema.payloads.goals import Condition
+
+PLACED = frozenset({AT, ON, IN})
+"""Relations that say where a thing is: all of one variable."""
+_THEN = 'if one is to come after the other, say "then"'
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What one clause wants. `subjects` is one, or with `open` those of whom any will do.
+
+    `means`: somebody goes somewhere in order to do what the sentence says next.
+    `whereto`: it was fetched, and the sentence still has to say where to.
+    """
+
+    relation: str
+    subjects: tuple[str, ...]
+    value: Value
+    key: int
+    open: bool = False
+    on_robot: bool = False
+    means: bool = False
+    whereto: bool = False
+
+    def condition(self) -> Condition:
+        """The condition that makes it true."""
+        return Condition(
+            relation=self.relation,
+            subject=self.subjects[0],
+            value=self.value,
+            any_of=self.subjects if self.open else (),
+        )
+
+
+@dataclass
+class GoalDraft:
+    """The stages of a goal while its sentence is read.
+
+    `is_at` says whether a thing is in a place, or on or in another thing.
+    """
+
+    is_at: Callable[[str, str], bool] = lambda name, where: False
+    stages: list[list[Wish]] = field(default_factory=lambda: [[]])
+
+    @property
+    def empty(self) -> bool:
+        """Whether the stage that is being filled has nothing yet."""
+        return not self.stages[-1]
+
+    def copy(self) -> GoalDraft:
+        """The same, to go on from."""
+        return GoalDraft(self.is_at, [list(stage) for stage in self.stages])
+
+    def next_stage(self) -> None:
+        """What comes now is wanted after all that came."""
+        if not self.empty:
+            self.stages.append([])
+
+    def add(
+        self,
+        relation: str,
+        mention: Mention,
+        value: Value,
+        *,
+        on_robot: bool = False,
+        means: bool = False,
+        whereto: bool = False,
+    ) -> None:
+        """One more wish, for each of those meant, or for any of them."""
+        each = (mention.subjects,) if mention.open else tuple((s,) for s in mention.subjects)
+        self.stages[-1].extend(
+            Wish(relation, subjects, value, mention.key, mention.open, on_robot, means, whereto)
+            for subjects in each
+        )
+
+    def narrow(self, mention: Mention, subjects: Collection[str]) -> Mention:
+        """Of those whom an open mention may mean, only these will do."""
+        left = tuple(s for s in mention.subjects if s in subjects)
+        meant = replace(mention, subjects=left, open=len(left) > 1)
+        for stage in self.stages:
+            stage[:] = [
+                replace(wish, subjects=left, open=meant.open) if wish.key == mention.key else wish
+                for wish in stage
+            ]
+        return meant
+
+    def conditions(self) -> tuple[tuple[Condition, ...], ...]:
+        """The stages, each free of contradictions and of what another wish implies.
+
+        Raises:
+            NotUnderstood: two wishes of one stage cannot both come true.
+        """
+        _check_carried([wish for stage in self.stages for wish in stage])
+        stages = [
+            part for stage in self.stages for part in _sequenced(_without_implied_travel(stage))
+        ]
+        return tuple(
+            tuple(dict.fromkeys(wish.condition() for wish in _consistent(stage, self.is_at)))
+            for stage in stages
+            if stage
+        )
+
+
+def _same(one: Wish, other: Wish) -> bool:
+    return one.key == other.key or (one.subjects == other.subjects and one.open == other.open)
+
+
+def _check_carried(wishes: Sequence[Wish]) -> None:
+    """What was fetched must be brought somewhere, and nobody may go off with a thing in hand.
+
+    "Pick up the cup and go to the kitchen" would be reached by two robots: one holds, one goes.
+    """
+    for i, wish in enumerate(wishes):
+        if wish.relation != HELD:
+            continue
+        brought = [j for j in range(i + 1, len(wishes)) if _brings(wishes[j], wish)]
+        if wish.whereto and not brought:
+            raise NotUnderstood(
+                f"it does not say where to bring {one_of(wish.subjects)}: name a place, "
+                'or say "pick up"'
+            )
+        if not brought and any(later.means for later in wishes[i + 1 :]):
+            raise NotUnderstood(
+                f"it does not say whether {one_of(wish.subjects)} goes along: "
+                'say "bring … to …" to take it somewhere'
+            )
+
+
+def _brings(wish: Wish, held: Wish) -> bool:
+    return wish.relation in PLACED and _same(wish, held)
+
+
+def _without_implied_travel(stage: Sequence[Wish]) -> list[Wish]:
+    """Without going somewhere with what is in hand and put down there later in the stage."""
+    kept = []
+    for i, wish in enumerate(stage):
+        held = [h for h in stage[:i] if h.relation == HELD]
+        if wish.means and any(
+            _brings(later, h) and later.value == wish.value
+            for later in stage[i + 1 :]
+            for h in held
+        ):
+            continue
+        kept.append(wish)
+    return kept
+
+
+def _sequenced(stage: Sequence[Wish]) -> list[list[Wish]]:
+    """ "Go to the kitchen and pick up the cup" means one after the other."""
+    split: list[list[Wish]] = [[]]
+    for wish in stage:
+        last = split[-1][-1] if split[-1] else None
+        if last is not None and last.means and not wish.means:
+            if wish.relation == SEARCHED and wish.subjects == (last.value,):
+                split[-1].pop()
+            else:
+                split.append([])
+        split[-1].append(wish)
+    return split
+
+
+def _consistent(stage: Sequence[Wish], is_at: Callable[[str, str], bool]) -> list[Wish]:
+    stage = _finest(stage, is_at)
+    kept = [
+        wish
+        for i, wish in enumerate(stage)
+        if not any(_implies(other, wish, later=j > i) for j, other in enumerate(stage) if i != j)
+    ]
+    kept = [_narrowed(wish, kept) for wish in kept]
+    fixed: dict[tuple[str, str], Wish] = {}
+    for wish in kept:
+        if not wish.open:
+            relation = AT if wish.relation in PLACED else wish.relation
+            before = fixed.setdefault((relation, wish.subjects[0]), wish)
+            if before.value != wish.value:
+                raise NotUnderstood(
+                    f"it wants {wish.subjects[0]} in two places: {before.value} and "
+                    f"{wish.value}; {_THEN}"
+                )
+    for wish in kept:
+        put_down = [w for w in kept if w.relation in PLACED and not w.on_robot]
+        if wish.relation == HELD and any(
+            w.key == wish.key or (not w.open and w.subjects == wish.subjects) for w in put_down
+        ):
+            raise NotUnderstood(f"it wants {one_of(wish.subjects)} both held and put down; {_THEN}")
+    _check_open(kept, fixed)
+    return kept
+
+
+def _finest(stage: Sequence[Wish], is_at: Callable[[str, str], bool]) -> list[Wish]:
+    """Without those that say less finely what others say: in the kitchen, and on a table there."""
+    placed = [wish for wish in stage if wish.relation in PLACED]
+    return [
+        wish
+        for wish in stage
+        if wish not in placed
+        or not any(
+            _same(wish, other)
+            and other.value != wish.value
+            and is_at(str(other.value), str(wish.value))
+            for other in placed
+        )
+    ]
+
+
+def _implies(wish: Wish, other: Wish, later: bool) -> bool:
+    """Whether `other` need not be said beside `wish`."""
+    same = wish.subjects == other.subjects or wish.key == other.key
+    if other.relation == LOCATED:
+        return same and wish.relation in {*PLACED, HELD}
+    return same and other.relation == HELD and wish.relation in PLACED and later
+
+
+def _narrowed(wish: Wish, others: Sequence[Wish]) -> Wish:
+    """An open wish without those that another one names: "the first cup and another cup"."""
+    if not wish.open or wish.relation not in PLACED:
+        return wish
+    named = {w.subjects[0] for w in others if w.relation in PLACED and not w.open}
+    left = tuple(s for s in wish.subjects if s not in named)
+    if not left:
+        raise NotUnderstood(f"it wants more of {one_of(wish.subjects)} than there are; {_THEN}")
+    return replace(wish, subjects=left, open=len(left) > 1)
+
+
+def _check_open(kept: Sequence[Wish], fixed: dict[tuple[str, str], Wish]) -> None:
+    """Whether somebody is left for every open wish: each is in one place only.
+
+    Wishes are matched with subjects by augmenting paths (Kuhn 1955).
+    """
+    at = [wish for wish in kept if wish.open and wish.relation in PLACED]
+    for wish in at:
+        for other in at:
+            if wish.key == other.key and wish.value != other.value:
+                raise NotUnderstood(
+                    f"it wants one of {one_of(wish.subjects)} in two places: {wish.value} and "
+                    f"{other.value}; {_THEN}"
+                )
+            same = (wish.subjects, wish.value) == (other.subjects, other.value)
+            if wish.key != other.key and same:
+                raise NotUnderstood(
+                    f"it wants one of {one_of(wish.subjects)} in {wish.value} more than once: "
+                    "say how many, or which ones"
+                )
+    taken = {name: wish for (relation, name), wish in fixed.items() if relation == AT}
+    open_wishes = list(dict.fromkeys(replace(wish, key=0) for wish in at))
+    open_wishes = [
+        w
+        for w in open_wishes
+        if not any(taken[s].value == w.value for s in w.subjects if s in taken)
+    ]
+    holder: dict[str, Wish] = {}
+
+    def assign(wish: Wish, tried: set[str]) -> bool:
+        for name in wish.subjects:
+            if name in taken or name in tried:
+                continue
+            tried.add(name)
+            if name not in holder or assign(holder[name], tried):
+                holder[name] = wish
+                return True
+        return False
+
+    for wish in open_wishes:
+        if not assign(wish, set()):
+            raise NotUnderstood(f"it wants more of {one_of(wish.subjects)} than there are; {_THEN}")

@@ -1,0 +1,272 @@
+"""Clauses about where things and robots shall be: bringing, giving, putting back, going."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from fleet.errors import NotUnderstood
+from fleet.language.refusals import listed, one_of, reason_for
+from fleet.language.resolve.frames import EXAMPLE, HOME_HINT, Frame
+from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
+from fleet.language.resolve.nouns import NounResolver
+from fleet.language.resolve.places import WHERE, Locative, PlaceResolver, Where
+from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.scene import THINGS, Scene
+from fleet.language.tagging.lexicon import EntityType
+from fleet.language.tree.nodes import (
+    Nouns,
+)
+from keyexpr_schema.facts import (
+    AT,
+    HELD,
+    IN,
+    ON,
+)
+from keyexpr_schema.payloads.world import Feature
+
+_LOOSE = frozenset({"back", "away", "up", "over", "down", "off", "out"})
+
+
+class Wishes:
+    """Turns clauses about where things and robots shall be into wishes."""
+
+    def __init__(
+        self, scene: Scene, who: Referents, nouns: NounResolver, places: PlaceResolver
+    ) -> None:
+        self.scene = scene
+        self.who = who
+        self.nouns = nouns
+        self.places = places
+
+    def move(self, frame: Frame) -> None:
+        """`bring NP to PLACE`, `give NP to ROBOT`, `give ROBOT NP`, `put NP back`.
+
+        A verb of the sense `fetch` may leave where to go to a later clause.
+        """
+        give = "give" in frame.senses and "move" not in frame.senses
+        fetch, tidy = "fetch" in frame.senses, "tidy" in frame.senses
+        if not frame.themes:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say what to {frame.verb}")
+        moved_nouns, receiver = frame.themes[-1], None
+        to_speaker = False
+        if len(frame.themes) == 2:
+            if frame.themes[0].items[0].form == "me":
+                to_speaker = True
+            else:
+                receiver = self._receiver(frame)
+        moved_nouns = self._excepting(moved_nouns, frame)
+        moved = self.nouns.subjects(moved_nouns, THINGS, "an object")
+        if receiver is not None:
+            return self.to_target(moved, Where(None, *receiver), False)
+        fetching = frame.verb.split()[0] in self.scene.tagger.book.fetching
+        where, home = self.whereto(frame, each=not give, fetching=fetching)
+        if to_speaker and where.target is None and not where.each and not home:
+            where = replace(where, target=self.scene.vocabulary.speaker, target_type="object")
+        if give and where.target is not None and not self.receives(where):
+            people = sorted(filter(self.scene.vocabulary.is_person, self.scene.vocabulary.objects))
+            known = listed([*self.scene.lexicon.known(("robot",)), *people])
+            raise NotUnderstood(
+                f"{where.target!r} is no {'robot or person' if people else 'robot'} that something "
+                f"could be given to; known are {known}"
+            )
+        whereto = where.target is not None or bool(where.each) or home
+        if fetch and not whereto:
+            return self._fetched(moved, where)
+        return self.to_target(moved, where, home or (tidy and where.target is None))
+
+    def _excepting(self, nouns: Nouns, frame: Frame) -> Nouns:
+        """The same, without what is excepted behind the places."""
+        for left_out in frame.but:
+            nouns = replace(
+                nouns, items=(*nouns.items[:-1], replace(nouns.items[-1], but=left_out.nouns))
+            )
+        return nouns
+
+    def receives(self, where: Where) -> bool:
+        return where.target_type == "robot" or self.scene.vocabulary.is_person(where.target or "")
+
+    def _receiver(self, frame: Frame) -> tuple[str, EntityType]:
+        if frame.verb.split()[0] not in self.scene.tagger.book.offering:
+            raise NotUnderstood(f"{self.scene.said.clause!r} names two things side by side")
+        subject = self.nouns.subject(frame.themes[0].items[0], THINGS, "a robot")
+        mention = subject if isinstance(subject, Mention) else subject.resolve()
+        name = mention.subjects[0]
+        if mention.open or len(mention.subjects) != 1:
+            text = subject.text if isinstance(subject, NounPhrase) else self.scene.said.clause
+            raise NotUnderstood(f"{text!r} does not say which {mention.type}: name it")
+        if mention.type != "robot" and not self.scene.vocabulary.is_person(name):
+            raise NotUnderstood(f"{name} is no robot or person that something could be given to")
+        return name, mention.type
+
+    def _fetched(self, moved: Sequence[Subject], where: Where) -> None:
+        if any(subject.type == "robot" for subject in moved):
+            raise self._no_target()
+        mentions = [self.from_where(self.who.movable(s), where) for s in moved]
+        for mention in mentions:
+            self.scene.said.draft.add(HELD, mention, True, whereto=True)
+        self.scene.said.remember(mentions)
+
+    def from_where(self, subject: Subject, where: Where) -> Mention:
+        """Who is meant, told apart by where they are."""
+        return self.who.resolve(subject, where.source, where.source_surface)
+
+    def locatives(self, frame: Frame) -> tuple[list[Locative], bool]:
+        """The phrases of place; whether they say "home".
+
+        Raises:
+            NotUnderstood: a phrase or particle means nothing here.
+        """
+        particles = frame.particle_words
+        if stray := sorted(particles - _LOOSE):
+            raise NotUnderstood(
+                f"{stray[0]!r} is not understood after {frame.verb or 'it'!r}: {EXAMPLE}"
+            )
+        locatives = [
+            self.places.locative(place)
+            for place in frame.places
+            if place.special not in ("home", "anywhere")
+        ]
+        placed = any(locative.role != "from" for locative in locatives)
+        home = frame.home or bool(particles & {"back", "away"})
+        if placed and frame.home:
+            raise NotUnderstood(
+                f'{self.scene.said.clause!r} names a place and says "home": say one'
+            )
+        return locatives, home and not placed
+
+    def whereto(
+        self, frame: Frame, each: bool = False, fetching: bool = False
+    ) -> tuple[Where, bool]:
+        """Source and target, which is what "there" means next; whether it says "home".
+
+        Raises:
+            NotUnderstood: the phrases say "every room", and not `each` of several can be meant.
+        """
+        locatives, home = self.locatives(frame)
+        where = self.places.where(locatives, fetching)
+        if where.each and not each:
+            raise self._which_of(where)
+        if where.target is not None and where.target_type != "robot":
+            self.scene.said.last_place = where.target
+        elif where.source in self.scene.vocabulary.places:
+            self.scene.said.last_place = where.source
+        return where, home
+
+    @staticmethod
+    def _which_of(where: Where) -> NotUnderstood:
+        return NotUnderstood(f"{where.text!r} could be {one_of(where.each)}: say which")
+
+    def _to_each(self, moved: Sequence[Subject], where: Where) -> None:
+        """Wish that another one is in each of several places: "a cup in every room".
+
+        Raises:
+            NotUnderstood: there are fewer than places, or it does not leave open which ones.
+        """
+        mentions = [self.from_where(self.who.drivers(self.who.movable(s)), where) for s in moved]
+        if len(mentions) != 1 or not mentions[0].open:
+            raise self._which_of(where)
+        if len(where.each) > len(mentions[0].subjects):
+            raise NotUnderstood(
+                f"{where.text!r} are {len(where.each)}, and there are only "
+                f"{len(mentions[0].subjects)} for them: {one_of(mentions[0].subjects)}"
+            )
+        for number, place in enumerate(where.each, 1):
+            # Each is one of its own: negative keys are those of no word.
+            one = replace(mentions[0], key=-(1000 * (mentions[0].key + 1) + number))
+            if one.type == "robot":
+                self.scene.said.draft.add(AT, one, self.places.place_of(place))
+            else:
+                self.to_spot(one, place)
+        self.scene.said.moved = []
+        self.scene.said.remember([])
+
+    def to_target(self, moved: Sequence[Subject], where: Where, home: bool) -> None:
+        """Wish that these are at the target, or at home."""
+        if where.each:
+            return self._to_each(moved, where)
+        self.scene.said.moved = list(moved)
+        able = [self.who.drivers(self.who.movable(subject)) for subject in moved]
+        mentions = [self.from_where(subject, where) for subject in able]
+        for mention in mentions:
+            if home:
+                self.home(mention)
+            elif where.target is None:
+                raise self._no_target()
+            elif where.target_type == "robot" and mention.type == "robot":
+                raise NotUnderstood("a robot goes to a place, not to a robot: name the place")
+            else:
+                self._put(mention, where, where.target)
+        self.scene.said.remember(mentions)
+        if where.target is not None and where.target_type == "robot":
+            receiver = Mention((where.target,), "robot", self.scene.said.ended)
+            self.scene.said.recent = [*self.scene.said.recent, receiver]
+        return None
+
+    def _put(self, mention: Mention, where: Where, target: str) -> None:
+        if mention.type == "robot":
+            return self.scene.said.draft.add(AT, mention, self.places.place_of(target))
+        kept = tuple(name for name in mention.subjects if name != target)
+        if not kept:
+            raise NotUnderstood(f"{self.scene.said.clause!r}: nothing can be on or in itself")
+        others = replace(mention, subjects=kept, open=mention.open and len(kept) > 1)
+        handed = where.target_type == "robot" or self.scene.vocabulary.is_person(target)
+        return self.scene.said.draft.add(where.relation, others, target, on_robot=handed)
+
+    def _no_target(self) -> NotUnderstood:
+        return NotUnderstood(
+            f"{self.scene.said.clause!r} does not say where to: name a place; known are "
+            f"{listed(self.scene.lexicon.known(('place',)))}"
+        )
+
+    def home(self, mention: Mention) -> None:
+        """Wish that each is where it belongs.
+
+        Raises:
+            NotUnderstood: it belongs nowhere in particular.
+        """
+        homes = {
+            n: self.scene.vocabulary.objects[n].home
+            for n in mention.subjects
+            if n in self.scene.vocabulary.objects
+        }
+        homeless = [n for n in mention.subjects if not self.is_spot(homes.get(n))]
+        if homeless or (mention.open and len(set(homes.values())) > 1):
+            name = homeless[0] if homeless else mention.subjects[0]
+            raise NotUnderstood(f"it is not known where {name} belongs: {HOME_HINT}")
+        if mention.open:
+            self.to_spot(mention, homes[mention.subjects[0]])
+            return
+        for name in mention.subjects:
+            self.to_spot(Mention((name,), "object", mention.key), homes[name])
+
+    def is_spot(self, name: str | None) -> bool:
+        """Whether things can belong there: in a place, or on or in a thing."""
+        return name in self.scene.vocabulary.places or name in self.scene.vocabulary.good_for
+
+    def to_spot(self, mention: Mention, spot: str | None) -> None:
+        """Wish that it is in that place, or on or in that thing."""
+        good_for = self.scene.vocabulary.good_for.get(spot or "", ())
+        on = Feature.SUPPORTS in good_for
+        within = Feature.CONTAINS in good_for
+        self.scene.said.draft.add(AT if on == within else ON if on else IN, mention, spot)
+
+    def go(self, frame: Frame, who: Sequence[Subject] | None) -> None:
+        """`go to PLACE`; any robot goes if nobody is named."""
+        if frame.home or (frame.particle_words & {"back"} and not frame.places):
+            raise NotUnderstood("a robot has no home: name the place where it shall go")
+        if other := [p for p in frame.places if p.role not in WHERE]:
+            shown = [(word, word) for word in other[0].preposition.split()]
+            text = self.scene.said.quote(other[0].first, other[0].last)
+            raise NotUnderstood(reason_for(shown) or f"{text!r} is not understood")
+        where, _ = self.whereto(frame)
+        if where.target is None or where.target_type == "robot":
+            known = listed(self.scene.lexicon.known(("place",)))
+            raise NotUnderstood(
+                f"{self.scene.said.clause!r} ends where a place is missing; known are {known}"
+            )
+        if who is not None:
+            return self.to_target(who, where, False)
+        self.scene.said.moved = [robot := self.who.some_robot()]
+        self.scene.said.draft.add(AT, robot, self.places.place_of(where.target), means=True)
+        return None

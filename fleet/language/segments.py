@@ -1,0 +1,164 @@
+"""A text cut into sentences, and these into parts that are parsed by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fleet.language.tagging.tagger import Lexeme
+from fleet.language.words.times import TimePhrase
+
+_OPENING = frozenset({"KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID", "ASKWHERE"})
+_CLAUSAL = _OPENING | {"VERB", "FIN", "GER", "BE", "MODAL", "HAVE", "PREP", "CAUSE", "BELONG"}
+_CONDITIONS = {"IF": "when", "WHEN": "when", "UNLESS": "unless"}
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Words that are parsed together.
+
+    `joint` is what stands before them: "", "and" or "then". `role`: `when` or `unless` for a
+    condition, else "". `dangling`: an "and" or "then" that nothing follows stands behind them.
+    """
+
+    words: tuple[Lexeme, ...]
+    joint: str = ""
+    role: str = ""
+    always: bool = False
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """One sentence: its parts, and what was said of time and haste anywhere in it."""
+
+    words: tuple[Lexeme, ...]
+    segments: tuple[Segment, ...]
+    times: tuple[TimePhrase, ...] = ()
+    urgent: bool = False
+    dangling: bool = False
+
+
+def sentences_of(lexemes: Sequence[Lexeme]) -> list[tuple[Lexeme, ...]]:
+    """The words of each sentence; "no. 2" does not end one."""
+    found: list[tuple[Lexeme, ...]] = []
+    begun: list[Lexeme] = []
+    for i, word in enumerate(lexemes):
+        if "END" not in word.tags:
+            begun.append(word)
+            continue
+        numbered = (
+            word.word == "."
+            and begun
+            and "NUMBERSIGN" in begun[-1].tags
+            and i + 1 < len(lexemes)
+            and "NUM" in lexemes[i + 1].tags
+        )
+        if not numbered and begun:
+            found.append(tuple(begun))
+            begun = []
+    return [*found, tuple(begun)] if begun else found
+
+
+def cut(words: Sequence[Lexeme]) -> Sentence:
+    """A sentence cut where that is clear: at "then", and before verbs that begin a clause."""
+    times: list[TimePhrase] = []
+    urgent = False
+    kept: list[Lexeme] = []
+    for word in words:
+        if "TIME" in word.tags and word.time is not None:
+            times.append(word.time)
+        elif "URGENT" in word.tags:
+            urgent = True
+        elif "POLITE" not in word.tags or word.tags & {"NOUN"}:
+            kept.append(word)
+    segments: list[Segment] = []
+    for role, part in _roles(_commas(kept)):
+        joint, begun = "", list[Lexeme]()
+        for i, word in enumerate(part):
+            rest = part[i + 1 :]
+            if "THEN" in word.tags and "NOUN" not in word.tags:
+                segments += _segment(begun, joint, role)
+                joint, begun = "then", []
+            elif word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest):
+                segments += _segment(begun, joint, role)
+                joint, begun = "and", []
+            elif "WITHOUT" in word.tags and begun:
+                segments += _segment(begun, joint, role)
+                joint, begun = "and", [word]
+            elif word.tags & {"AND", "COMMA"} and not begun:
+                joint = joint or ("and" if "AND" in word.tags else "")
+            else:
+                begun.append(word)
+        segments += _segment(begun, joint, role)
+        dangling = not _content(begun) and joint in ("then", "and")
+        dangling = dangling or bool(begun and "AND" in begun[-1].tags)
+    return Sentence(tuple(words), tuple(segments), tuple(times), urgent, dangling)
+
+
+def _content(words: Sequence[Lexeme]) -> list[Lexeme]:
+    return [word for word in words if not word.tags & {"COMMA", "AND"}]
+
+
+def _commas(words: Sequence[Lexeme]) -> list[Lexeme]:
+    """Without commas at the ends, and of several in a row one."""
+    kept: list[Lexeme] = []
+    for word in words:
+        if "COMMA" not in word.tags or (kept and "COMMA" not in kept[-1].tags):
+            kept.append(word)
+    while kept and "COMMA" in kept[-1].tags:
+        kept.pop()
+    return kept
+
+
+def _clausal(words: Sequence[Lexeme]) -> bool:
+    """Whether it is more than a name that somebody is called by, or "first"."""
+    return any(w.tags & _CLAUSAL and not w.tags & {"NOUN"} for w in words)
+
+
+def _opens(rest: Sequence[Lexeme]) -> bool:
+    """Whether what follows begins a clause, and cannot go on with a list."""
+    rest = list(rest[:2])
+    if rest and rest[0].tags & {"AND", "COMMA"}:
+        rest = rest[1:]
+    if not rest:
+        return False
+    tags = rest[0].tags
+    if tags & _OPENING:
+        return True
+    return "VERB" in tags and not tags & {"NOUN", "ADJ", "ORD"}
+
+
+def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
+    """A sentence with "if", "when" or "unless" cut into condition and the rest."""
+    for i, word in enumerate(words):
+        role = next((_CONDITIONS[tag] for tag in sorted(word.tags) if tag in _CONDITIONS), None)
+        if role is None:
+            continue
+        if i:
+            return [(role, list(words[i + 1 :])), ("", list(words[:i]))]
+        end = next(
+            (j for j in range(1, len(words)) if words[j].tags & {"COMMA", "THEN"}),
+            None,
+        )
+        if end is not None:
+            rest = list(words[end + 1 :])
+            if rest and "THEN" in rest[0].tags:
+                rest = rest[1:]
+            return [(role, list(words[1:end])), ("", rest)]
+    return [("", list(words))]
+
+
+def _segment(words: Sequence[Lexeme], joint: str, role: str) -> list[Segment]:
+    words = _commas(words)
+    if len(words) > 1 and words[0].words == ("1st",) and "COMMA" in words[1].tags:
+        words = words[2:]
+    while words and words[-1].tags & {"AND"}:
+        words = words[:-1]
+    if words and words[0].words == ("1st",) and "NOUN" not in words[0].tags:
+        following = words[1].tags if len(words) > 1 else frozenset()
+        verbal = "VERB" in following and "NOUN" not in following
+        if following & ({"COMMA", "GER"} | _OPENING) or verbal:
+            words = _commas(words[1:])
+    always = any("ALWAYS" in word.tags for word in words)
+    words = [word for word in words if "ALWAYS" not in word.tags]
+    return [Segment(tuple(words), joint, role, always)] if words else []

@@ -1,1 +1,0 @@
-"""Statements: sentences that say what holds, to facts."""

@@ -1,0 +1,1 @@
+"""What words can stand for: tags over words and names, by the language and the world."""

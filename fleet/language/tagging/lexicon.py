@@ -1,0 +1,253 @@
+"""What words can stand for: exact names, kinds, and words that occur in names."""
+
+from __future__ import annotations
+
+from collections import defaultdict, deque
+from collections.abc import Iterable, Iterator, MutableMapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from fleet.language.vocabulary import Vocabulary
+from fleet.language.words.morphology import plurals
+from fleet.language.words.tokens import Phrase, Token, number_of, words_of
+
+EntityType = Literal["object", "place", "robot", "surface"]
+ENTITY_TYPES: tuple[EntityType, ...] = ("object", "place", "robot", "surface")
+CATEGORIES: dict[EntityType, tuple[str, ...]] = {
+    "object": ("object", "thing", "item"),
+    "robot": ("robot",),
+    "place": ("room", "place", "area", "location"),
+    "surface": ("surface",),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Entity:
+    """Something that has a name. A surface stands for the place that it belongs to, where it is no
+    thing of its own. A thing that others can be on or in, and a person, is a surface as well as an
+    object, and stands for itself."""
+
+    id: str
+    type: EntityType
+    stands_for: str
+    names: frozenset[Phrase]
+    kinds: frozenset[Phrase]
+    ordinal: int | None = None
+    kin: frozenset[Phrase] = frozenset()
+    """The kinds that tell who else "the other one" may be; `kinds` has wider ones, too."""
+    uses: frozenset[str] = frozenset()
+    person: bool = False
+
+    @property
+    def rank(self) -> tuple[int, str]:
+        """By ordinal, then by id."""
+        return (self.ordinal or 0, self.id)
+
+
+class Lexicon:
+    """Looks words up among the names of a vocabulary."""
+
+    def __init__(self, vocabulary: Vocabulary) -> None:
+        language = vocabulary.wordbook
+        self._grammar, self._rooms = language.grammar, language.rooms
+        self.entities = tuple(_entities(vocabulary))
+        self._meant: dict[Phrase, tuple[Entity, ...]] = {}
+        self._exact: dict[Phrase, list[Entity]] = defaultdict(list)
+        self._kinds: dict[Phrase, tuple[bool, list[Entity]]] = {}
+        self._by_word: dict[str, set[Entity]] = defaultdict(set)
+        self._by_kin: dict[tuple[EntityType, Phrase], list[Entity]] = defaultdict(list)
+        for entity in self.entities:
+            for name in entity.names:
+                self._exact[name].append(entity)
+            for kind in entity.kin:
+                self._by_kin[entity.type, kind].append(entity)
+            for kind in entity.kinds:
+                self._kinds.setdefault(kind, (False, []))[1].append(entity)
+                for word in kind:
+                    self._by_word[word].add(entity)
+            for name in entity.names:
+                for word in name:
+                    self._by_word[word].add(entity)
+        for kind, (_, members) in list(self._kinds.items()):
+            for ending in plurals(kind[-1]):
+                plural = (*kind[:-1], ending)
+                if plural not in self._kinds:
+                    self._kinds[plural] = (True, list(members))
+                elif self._kinds[plural][0]:
+                    self._kinds[plural][1].extend(members)
+                self._by_word[ending].update(members)
+        self._add_synonyms()
+        self._longest = max(map(len, self._exact), default=0)
+
+    def known(self, types: Iterable[EntityType]) -> list[str]:
+        """The ids of those types, as a person should see them."""
+        return [
+            name
+            for entity_type in types
+            if entity_type != "surface"
+            for name in sorted(e.id for e in self.entities if e.type == entity_type)
+        ]
+
+    def names_in(self, types: Sequence[EntityType]) -> set[str]:
+        """Words of all names and kinds of those types, for those who mistyped one."""
+        return {
+            " ".join(words)
+            for e in self.entities
+            if e.type in types
+            for words in (*e.names, *e.kinds)
+        } | {
+            word
+            for e in self.entities
+            if e.type in types
+            for name in e.names
+            for word in name
+            if len(word) > 3
+        }
+
+    def exact(
+        self, tokens: Sequence[Token], at: int, types: Sequence[EntityType]
+    ) -> tuple[int, tuple[Entity, ...]]:
+        """The longest name that starts at a token: where it ends, and who has it."""
+        for length in range(min(self._longest, len(tokens) - at), 0, -1):
+            name = tuple(token.word for token in tokens[at : at + length])
+            found = [e for e in self._exact.get(name, ()) if e.type in types]
+            if found:
+                return at + length, tuple(sorted(set(found), key=lambda e: e.rank))
+        return at, ()
+
+    def described(
+        self, tokens: Sequence[Token], at: int, types: Sequence[EntityType]
+    ) -> tuple[int, tuple[Entity, ...]]:
+        """The longest run of words that all occur in names or kinds of the same entities."""
+        end, found = at, set[Entity]()
+        while end < len(tokens) and (word := tokens[end].word) not in self._grammar:
+            named = self._by_word.get(word, set())
+            narrower = found & named if end > at else {e for e in named if e.type in types}
+            if not narrower or number_of(word) is not None:
+                break
+            end, found = end + 1, narrower
+        return (end, tuple(sorted(found, key=lambda e: e.rank))) if end > at else (at, ())
+
+    def meant(self, words: Phrase) -> tuple[Entity, ...]:
+        """Everybody whom these words can mean, by name or by the words in names and kinds."""
+        if (known := self._meant.get(words)) is None:
+            tokens = [Token(word, word, 0, 0) for word in words]
+            end, named = self.exact(tokens, 0, ENTITY_TYPES)
+            known = named if end == len(words) else ()
+            end, found = self.described(tokens, 0, ENTITY_TYPES)
+            known = (*known, *(e for e in found if end == len(words) and e not in known))
+            self._meant[words] = known
+        return known
+
+    def kind(
+        self, tokens: Sequence[Token], at: int, end: int, types: Sequence[EntityType]
+    ) -> tuple[bool, frozenset[Entity]] | None:
+        """Whether a run of words ends in a kind: whether that is plural, and who is of it.
+
+        The longest kind counts: of "coffee cup" rather `coffee cup` than `cup`.
+        """
+        for start in range(at, end):
+            entry = self._kinds.get(tuple(token.word for token in tokens[start:end]))
+            if entry is not None and (of := frozenset(e for e in entry[1] if e.type in types)):
+                return entry[0], of
+        return None
+
+    def is_several(self, name: Phrase, types: Sequence[EntityType]) -> bool:
+        """Whether the words are a kind with more than one member."""
+        _, members = self._kinds.get(name, (False, []))
+        return len({e for e in members if e.type in types}) > 1
+
+    def kin(self, entity: Entity) -> tuple[Entity, ...]:
+        """All of the same kind; the entity too."""
+        kin = {e for kind in entity.kin for e in self._by_kin[entity.type, kind]}
+        return tuple(sorted({entity, *kin}, key=lambda e: e.rank))
+
+    def starts_name(self, tokens: Sequence[Token], at: int) -> bool:
+        """Whether a known name or kind starts at this token."""
+        return bool(
+            self.exact(tokens, at, ENTITY_TYPES)[1] or self.described(tokens, at, ENTITY_TYPES)[1]
+        )
+
+    def _add_synonyms(self) -> None:
+        """Common words for rooms, where just one place can be meant and nothing is called so."""
+        for names in self._rooms:
+            meant = {
+                e
+                for e in self.entities
+                if e.type == "place" and any(name in e.names for name in names)
+            }
+            if len(meant) == 1:
+                for name in names:
+                    if name not in self._exact:
+                        self._exact[name] = list(meant)
+
+
+_KEPT: deque[tuple[Vocabulary, Lexicon]] = deque(maxlen=4)
+
+
+def lexicon_of(vocabulary: Vocabulary) -> Lexicon:
+    """The lexicon of a vocabulary: made once for the very same places, objects and robots, where
+    those mappings cannot change."""
+    for known, lexicon in _KEPT:
+        if (
+            known.places is vocabulary.places
+            and known.objects is vocabulary.objects
+            and known.robots is vocabulary.robots
+        ):
+            return lexicon
+    lexicon = Lexicon(vocabulary)
+    mappings = (vocabulary.places, vocabulary.objects, vocabulary.robots)
+    if not any(isinstance(names, MutableMapping) for names in mappings):
+        _KEPT.append((vocabulary, lexicon))
+    return lexicon
+
+
+def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
+    for thing in vocabulary.objects.values():
+        names = _names(thing.object, thing.label, *thing.aliases)
+        kin = _names(thing.kind)
+        yield Entity(
+            thing.object,
+            "object",
+            thing.object,
+            names,
+            _kinds("object", thing.kind, *thing.categories),
+            thing.ordinal,
+            kin,
+            frozenset(thing.uses),
+            vocabulary.is_person(thing.object),
+        )
+        if thing.object in vocabulary.good_for:
+            kinds = _names(thing.kind, *thing.categories)
+            yield Entity(thing.object, "surface", thing.object, names, kinds, thing.ordinal, kin)
+    for spec in vocabulary.robots.values():
+        yield Entity(
+            spec.robot,
+            "robot",
+            spec.robot,
+            _names(spec.robot, spec.label),
+            _kinds("robot", spec.model),
+            kin=_names(spec.model),
+        )
+    for place in vocabulary.places.values():
+        yield Entity(
+            place.place,
+            "place",
+            place.place,
+            _names(place.place, place.label, *place.aliases),
+            _kinds("place"),
+        )
+        for surface in place.surfaces:
+            if surface.surface in vocabulary.objects:
+                continue
+            yield Entity(
+                surface.surface, "surface", place.place, _names(surface.surface), frozenset()
+            )
+
+
+def _names(*names: str) -> frozenset[Phrase]:
+    return frozenset(words for name in names if (words := words_of(name)))
+
+
+def _kinds(entity_type: EntityType, *kinds: str) -> frozenset[Phrase]:
+    return frozenset({(word,) for word in CATEGORIES[entity_type]} | _names(*kinds))

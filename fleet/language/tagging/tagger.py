@@ -1,0 +1,141 @@
+"""From words to tagged words: what each, or each phrase, can be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fleet.language.tagging.lexicon import ENTITY_TYPES, Entity, Lexicon, lexicon_of
+from fleet.language.tagging.skill_words import SkillWords
+from fleet.language.vocabulary import Vocabulary
+from fleet.language.words.times import TimePhrase, time_at
+from fleet.language.words.tokens import Phrase, Token, number_of, ordinal_of
+
+_VERBAL = frozenset({"VERB", "FIN", "PART", "GER", "ADJ"})
+
+
+@dataclass(frozen=True)
+class Lexeme:
+    """A word, or words that stand together as one, with all that it can be.
+
+    `first` and `last` count the tokens of the text, `last` excluded; `text` is as it was written.
+    """
+
+    words: Phrase
+    tags: frozenset[str]
+    first: int
+    last: int
+    text: str
+    spoken: str = ""
+    time: TimePhrase | None = None
+
+    @property
+    def word(self) -> str:
+        """The words with spaces."""
+        return " ".join(self.words)
+
+    @property
+    def number(self) -> int | None:
+        """The number that it is."""
+        return number_of(self.words[0]) if "NUM" in self.tags else None
+
+
+class Tagger:
+    """Tags the words of texts, in one world."""
+
+    def __init__(self, vocabulary: Vocabulary) -> None:
+        self.book = vocabulary.wordbook
+        self.lexicon: Lexicon = lexicon_of(vocabulary)
+        self.verbs = SkillWords(vocabulary)
+        self.phrases: dict[Phrase, frozenset[str]] = dict(self.book.phrases)
+        more: dict[Phrase, set[str]] = {}
+        for form, senses in self.verbs.forms.items():
+            more.setdefault(form, set()).update(tag for tag, _ in senses)
+        for literal in self.verbs.literals:
+            more.setdefault(literal, set()).add("PARTICLE")
+        for state in self.verbs.states:
+            more.setdefault(state, set()).add("ADJ")
+        for entity in self.lexicon.entities:
+            for use in entity.uses:
+                more.setdefault((use,), set()).add("USE")
+        for form, tags in more.items():
+            self.phrases[form] = self.phrases.get(form, frozenset()) | tags
+        self._longest: dict[str, int] = {}
+        for phrase in self.phrases:
+            self._longest[phrase[0]] = max(len(phrase), self._longest.get(phrase[0], 0))
+
+    def entities(self, words: Phrase) -> tuple[Entity, ...]:
+        """Everybody whom these words can mean."""
+        return self.lexicon.meant(words)
+
+    def tagged(self, tokens: Sequence[Token], text: str) -> list[Lexeme]:
+        """The words of one text, left to right."""
+        found: list[Lexeme] = []
+        at = 0
+        while at < len(tokens):
+            lexeme = self._next(tokens, at, text)
+            found.append(lexeme)
+            at = lexeme.last
+        return found
+
+    def _next(self, tokens: Sequence[Token], at: int, text: str) -> Lexeme:
+        def lexeme(end: int, tags: frozenset[str], time: TimePhrase | None = None) -> Lexeme:
+            shown = " ".join(text[tokens[at].start : tokens[end - 1].end].split())
+            words = tuple(token.word for token in tokens[at:end])
+            return Lexeme(words, tags, at, end, shown, tokens[at].spoken, time)
+
+        named = self._name(tokens, at)
+        phrase, tags = self._phrase(tokens, at)
+        if named <= at + 1 and (timed := time_at(tokens, at)) is not None and timed[0] > phrase:
+            return lexeme(timed[0], frozenset({"TIME"}), timed[1])
+        if named > at and named >= phrase:
+            single = tags & _VERBAL if named == phrase == at + 1 else frozenset()
+            return lexeme(named, single | {"NOUN"})
+        if phrase > at + 1:
+            return lexeme(phrase, tags)
+        word = tokens[at].word
+        if number_of(word) is not None:
+            one = frozenset({"ONE"}) if tokens[at].spoken == "one" else frozenset()
+            return lexeme(at + 1, tags | one | {"NUM"})
+        if ordinal_of(word) is not None:
+            return lexeme(at + 1, tags | {"ORD"})
+        described, _ = self.lexicon.described(tokens, at, ENTITY_TYPES)
+        if described > at:
+            return lexeme(described, (tags if described == at + 1 else frozenset()) | {"NOUN"})
+        if tokens[at].spoken == "ones":
+            return lexeme(at + 1, frozenset({"ONE"}))
+        if word == ",":
+            return lexeme(at + 1, frozenset({"COMMA"}))
+        if word in ".!?;":
+            return lexeme(at + 1, frozenset({"END"}))
+        return lexeme(at + 1, tags or frozenset({"UNK"}))
+
+    def _name(self, tokens: Sequence[Token], at: int) -> int:
+        """Where the longest name ends that starts here.
+
+        A name that only counts within a kind, "first cup", is left to the grammar.
+        """
+        lexicon = self.lexicon
+        end, found = lexicon.exact(tokens, at, ENTITY_TYPES)
+        if end == at:
+            return at
+        ordinal = ordinal_of(tokens[at].word)
+        number = number_of(tokens[end - 1].word)
+        if ordinal is not None and end > at + 1:
+            kind = lexicon.kind(tokens, at + 1, end, ENTITY_TYPES)
+            if kind is not None and all(e.ordinal == ordinal and e in kind[1] for e in found):
+                return at
+        if number is not None and end > at + 1:
+            kind = lexicon.kind(tokens, at, end - 1, ENTITY_TYPES)
+            if kind is not None and all(e.ordinal == number and e in kind[1] for e in found):
+                return at
+        return end
+
+    def _phrase(self, tokens: Sequence[Token], at: int) -> tuple[int, frozenset[str]]:
+        """The longest phrase of the language or of a skill that starts here."""
+        longest = self._longest.get(tokens[at].word, 0)
+        for length in range(min(longest, len(tokens) - at), 0, -1):
+            tags = self.phrases.get(tuple(token.word for token in tokens[at : at + length]))
+            if tags is not None:
+                return at + length, tags
+        return at, frozenset()

@@ -63,7 +63,7 @@ else:
             "payloads.plans": (
                 "ENDED_PLANS Making Plan PlanAddress PlanChange PlanState PlanStatus Task Violation"
             ),
-            "payloads.programs": "DO Program ProgramCall ProgramEnd ProgramTrace",
+            "payloads.programs": "DO Program ProgramCall ProgramEnd ProgramStep ProgramTrace",
             "payloads.requests": (
                 "Answer Control ControlRequest PlanRequest ReplanRequest RequestAddress"
             ),

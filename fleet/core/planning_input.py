@@ -12,6 +12,7 @@ from dataclasses import replace as changed
 import msgspec
 from msgspec.structs import replace
 
+from fleet.core.model.preconditions import action_of
 from fleet.core.model.skills import SkillModel, Skills
 from fleet.core.model.world import Hopeless, WorldModel
 from fleet.core.plan_entry import PlanningJob
@@ -164,8 +165,9 @@ def _searched(records: Iterable[TaskRecord], skills: Skills) -> tuple[str, ...]:
         dict.fromkeys(
             literal.variable.subject
             for record in records
-            if record.state is TaskState.SUCCEEDED and record.skill in skills
-            for literal in skills[record.skill].ground(record.args).after
+            if record.state is TaskState.SUCCEEDED
+            and (action := action_of(record, skills)) is not None
+            for literal in action.after
             if literal.variable.relation == SEARCHED
         )
     )

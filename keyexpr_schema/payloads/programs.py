@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import Enum
 
 from keyexpr_schema.facts import Value
+from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Payload
 from keyexpr_schema.payloads.goals import Condition
 
@@ -12,22 +13,30 @@ DO = "do"
 """The skill of a task that is a sentence for a robot: it is carried out as a program."""
 
 
+class ProgramStep(Payload, frozen=True, kw_only=True):
+    """One skill call that a program comes to. In `args`, `robot` is the robot that runs it."""
+
+    skill: Id
+    args: dict[str, str]
+
+
 class Program(Payload, frozen=True, kw_only=True):
     """A sentence for a robot, and the program over its skills that carries it out.
 
-    `wants` are the facts that shall hold once it has run. `before` and `after` are what all of it
-    needs at its start and makes true by its end, as of one skill. `code` is empty until somebody
-    has written it; `made_by` names who did.
+    `stages` are the facts that shall hold, one stage after the other. `code` is empty until
+    somebody has written it; `made_by` names who did. What the whole of it needs and makes true
+    follows from its `steps`, if it is a sequence of calls; of another one, `after` says what it
+    makes true. In both, `robot` stands for the robot that runs it.
     """
 
     text: str
-    wants: tuple[Condition, ...] = ()
+    stages: tuple[tuple[Condition, ...], ...] = ()
     code: str = ""
     made_by: str = ""
-    before: tuple[Condition, ...] = ()
+    steps: tuple[ProgramStep, ...] = ()
     after: tuple[Condition, ...] = ()
     duration_s: float = 0.0
-    """Predicted, ways included."""
+    """Predicted, ways included; 0: not said."""
 
 
 class ProgramEnd(str, Enum):

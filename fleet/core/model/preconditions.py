@@ -10,6 +10,7 @@ from fleet.core.model.formulas.effects import Guarded, carried_out, instances
 from fleet.core.model.formulas.evaluation import conjuncts, evaluate, expanded
 from fleet.core.model.formulas.nodes import Formula, Holds, Variable, atoms
 from fleet.core.model.formulas.text import formula_text
+from fleet.core.model.programs import program_action
 from fleet.core.model.skills import Action, Skills
 from fleet.core.model.world import WorldModel, condition_holds, known_value, room_left
 from keyexpr_schema.facts import FactKey, Literal, Value, render_value
@@ -22,6 +23,8 @@ ANY = "$"
 
 def action_of(record: TaskRecord, skills: Skills) -> Action | None:
     """The task as a ground action; `None` if the planner was started without that skill."""
+    if record.program is not None:
+        return program_action(record.program, record.args, skills)
     skill = skills.get(record.skill)
     if skill is None or set(skill.parameters) != set(record.args):
         return None

@@ -21,6 +21,7 @@ from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.contradictions import contradictions, reasons_of
 from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
 from fleet.planners.plan_repair import repair_plan
+from fleet.planners.programs.writer import with_programs
 from fleet.service.composition import Composition
 from fleet.service.planning.job_context import context_of, robots_under_way
 from keyexpr_schema.payloads.goals import Condition
@@ -225,7 +226,11 @@ class _Run:
     def _plan(self) -> PartialPlan | NoPlan:
         job = self.given.job
         if job.proposal is not None:
-            checked = check_plan(self._with_goal_conditions(job.proposal), self.world)
+            proposed = self._with_goal_conditions(job.proposal)
+            written = with_programs(proposed, self.world, self.feasibility, self.budget)
+            if isinstance(written, NoPlan):
+                return written
+            checked = check_plan(written, self.world)
             if isinstance(checked, InvalidPlan):
                 violations = (*tasks_nobody_can_do(checked), *checked.violations)
                 return NoPlan(violations[0].sentence, violations)

@@ -267,6 +267,7 @@ def _plan(problem: PlanningProblem, choice: Choice, explored: Exploration | None
         problem.first_task,
         one_actor_each=problem.strategy == MONOLITHIC,
         world=problem.world,
+        in_order=problem.sometime_before,
     )
     seeks = frozenset(explored.seeks if explored else ())
     served = frozenset[str]().union(*(sequence.goals for sequence in choice))
@@ -290,4 +291,5 @@ def _plan(problem: PlanningProblem, choice: Choice, explored: Exploration | None
         seeks=tuple(explored.seeks) if explored else (),
         always=problem.always,
         never=problem.never,
+        sometime_before=problem.sometime_before,
     )

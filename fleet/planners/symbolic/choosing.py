@@ -19,7 +19,7 @@ from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, PlanningProblem
 from fleet.planners.deordering import ActionSequence, deordered
 from fleet.planners.symbolic.action_sequences import UNLOADING_S, Exploration
-from fleet.planners.symbolic.flat_list import Team
+from fleet.planners.symbolic.flat_list import Team, in_one_list
 from fleet.planners.symbolic.joint_trips import Pair, Trips
 from fleet.planners.symbolic.roles import Roles
 from fleet.planners.symbolic.workloads import Balance, Workloads, balanced
@@ -148,6 +148,8 @@ class _Choosing:
         """The plan that the problem's strategy leads to."""
         if self.problem.strategy == MONOLITHIC:
             best = self._best([alternatives[:1] for alternatives in options])
+            if isinstance(best, NoPlan) and not self.problem.budget.over:
+                best = self._best(options)
         elif self.problem.strategy == PER_GOAL:
             # What is best for each goal alone may not fit together: two may want one helper.
             best = self._each_alone(options) or self._best(options)
@@ -180,7 +182,7 @@ class _Choosing:
             mine = [alternatives for alternatives in options if alternatives[0].goal == goal]
             few = prod(map(len, mine)) <= FEW
             choices: Iterator[Choice] = product(*(mine if few else (row[:1] for row in mine)))
-            choice += min(choices, key=lambda choice: self._alone_s(choice))
+            choice += min(choices, key=lambda row: self._alone_s(tuple(row)))
         if Balance(self.workloads, [choice], choice).estimate.crowded:
             return None
         together = self._candidate(choice)
@@ -300,12 +302,49 @@ class _Choosing:
         return None if chosen is None or best.found is None else (chosen, best.found)
 
     def _candidate(self, choice: Choice) -> _Candidate | NoPlan:
-        plan = _plan(self.problem, choice, self.explored)
+        plan = self._plan(choice)
         checked = check_plan(plan, self.problem.world)
         if isinstance(checked, InvalidPlan):
             return NoPlan(checked.violations[0].sentence, checked.violations)
         made = _allocated(choice, checked, quick_allocation(checked))
         return made or NoPlan("there are fewer robots than the plan needs at the same time")
+
+    def _plan(self, choice: Choice) -> Plan:
+        """The plan of these sequences; it promises the conditions of goals that have one."""
+        problem, explored = self.problem, self.explored
+        sequences = [*choice, *(explored.sequences if explored else ())]
+        if problem.strategy == MONOLITHIC:
+            things = {s for goal in problem.goals for c in goal.conditions for s in c.subjects}
+            sequences = in_one_list(sequences, problem.world, self.roles, things)
+        tasks, pins = deordered(
+            sequences,
+            problem.first_task,
+            one_actor_each=problem.strategy == MONOLITHIC,
+            world=problem.world,
+        )
+        seeks = frozenset(explored.seeks if explored else ())
+        served = frozenset[str]().union(*(sequence.goals for sequence in choice))
+        conditions = tuple(
+            condition
+            for goal in problem.goals
+            for condition in goal.conditions
+            if seeks.isdisjoint(condition.subjects)
+            and (goal.goal in served or problem.world.holds(condition))
+        )
+        return Plan(
+            plan=problem.plan,
+            revision=problem.revision,
+            goals=tuple(goal.goal for goal in problem.goals),
+            conditions=(*conditions, *(explored.conditions if explored else ())),
+            tasks=tasks,
+            pins=pins,
+            strategy=problem.strategy,
+            made_by="symbolic",
+            allocator=problem.allocator,
+            seeks=tuple(explored.seeks) if explored else (),
+            always=problem.always,
+            never=problem.never,
+        )
 
 
 def _changes(balance: Balance, options: Sequence[Choice]) -> Iterator[tuple[int, ActionSequence]]:
@@ -318,37 +357,3 @@ def _changes(balance: Balance, options: Sequence[Choice]) -> Iterator[tuple[int,
     ]
     for _, number, place in sorted(rows):
         yield number, options[number][place]
-
-
-def _plan(problem: PlanningProblem, choice: Choice, explored: Exploration | None) -> Plan:
-    """The plan of these sequences; it promises the conditions of goals that have one."""
-    sequences = [*choice, *(explored.sequences if explored else ())]
-    tasks, pins = deordered(
-        sequences,
-        problem.first_task,
-        one_actor_each=problem.strategy == MONOLITHIC,
-        world=problem.world,
-    )
-    seeks = frozenset(explored.seeks if explored else ())
-    served = frozenset[str]().union(*(sequence.goals for sequence in choice))
-    conditions = tuple(
-        condition
-        for goal in problem.goals
-        for condition in goal.conditions
-        if seeks.isdisjoint(condition.subjects)
-        and (goal.goal in served or problem.world.holds(condition))
-    )
-    return Plan(
-        plan=problem.plan,
-        revision=problem.revision,
-        goals=tuple(goal.goal for goal in problem.goals),
-        conditions=(*conditions, *(explored.conditions if explored else ())),
-        tasks=tasks,
-        pins=pins,
-        strategy=problem.strategy,
-        made_by="symbolic",
-        allocator=problem.allocator,
-        seeks=tuple(explored.seeks) if explored else (),
-        always=problem.always,
-        never=problem.never,
-    )

@@ -83,8 +83,8 @@ def _cost(schedule: PlanSchedule, checked: CheckedPlan) -> Cost:
     return round(schedule.makespan_s + unloading_s, 3), sum(schedule.durations_s.values())
 
 
-def _promise(found: _Candidate | NoPlan) -> Cost:
-    return (-inf, -inf) if isinstance(found, NoPlan) else found.cost
+def _by_cost(candidate: _Candidate) -> Cost:
+    return candidate.cost
 
 
 class _Best:
@@ -181,19 +181,25 @@ class _Choosing:
         return best.result
 
     def _ranked(self, choices: Iterator[Choice], most_refined: int) -> list[_Candidate | NoPlan]:
-        """All of them, the cheapest first; so many of the cheapest with better allocations."""
-        candidates: list[_Candidate | NoPlan] = []
+        """All that are valid, the cheapest first; so many of the cheapest with better allocations.
+        Before them why another is not valid, if one is not.
+        """
+        candidates: list[_Candidate] = []
+        failures: list[NoPlan] = []
         for choice in choices:
-            candidates.append(self._candidate(choice))
-            if self.problem.budget.over:
-                break
-        candidates.sort(key=_promise)
-        for number, found in enumerate(candidates[:most_refined]):
-            if self.problem.budget.over:
-                break
+            found = self._candidate(choice)
             if isinstance(found, _Candidate):
-                candidates[number] = found.refined()
-        return sorted(candidates, key=_promise)
+                candidates.append(found)
+            else:
+                failures.append(found)
+            if self.problem.budget.over:
+                break
+        candidates.sort(key=_by_cost)
+        for number, candidate in enumerate(candidates[:most_refined]):
+            if self.problem.budget.over:
+                break
+            candidates[number] = candidate.refined()
+        return [*failures[:1], *sorted(candidates, key=_by_cost)]
 
     def _with_joint_trips(self, begin: _Candidate, options: Sequence[Choice]) -> _Candidate:
         """Sequences for two goals joined into one with one carrier, for as long as that helps."""

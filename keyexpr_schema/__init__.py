@@ -40,8 +40,8 @@ else:
                 "UndecodablePayload Unreachable"
             ),
             "facts": (
-                "AT HELD HOLDING IN IS_OPEN LOCATED NOTHING ON REACHABLE SEARCHED FactKey Literal "
-                "Value parse_literal parse_value render_value"
+                "AT BLOCKED_BY HELD HOLDING IN IS_OPEN LOCATED NOTHING ON REACHABLE SEARCHED "
+                "FactKey Literal Value parse_literal parse_value render_value"
             ),
             "ids": "Id actor_arg check_id slug",
             "key": "Address Component Delivery Key Payload",

@@ -28,6 +28,9 @@ LINGER_S = 10.0
 SAME_STANCE_M = 0.01
 """Stances nearer to each other are one: what is in reach from the one is from the other, too."""
 
+OTHER_STANCE_M = 0.06
+"""One from which an arm may get where it does not from another is so far from that."""
+
 LOOKAHEAD_NODES = 3
 """Promised ahead of a robot: 1.2 m to 1.8 m, more than three times its braking distance."""
 
@@ -133,9 +136,12 @@ class Navigator:
         point_m: tuple[float, float, float],
         reach_m: tuple[float, float],
         heading_rad: float | None = None,
+        in_vain: Sequence[tuple[float, float]] = (),
     ) -> None:
         """Let `robot` stand facing `point_m`, its centre between `reach_m` (min, max) away from it,
         and itself turned to `heading_rad` if that is given.
+
+        It stands elsewhere than it has been `in_vain`, if there is a stance.
 
         If all such stances are taken, it waits for one for `PATIENCE_S`, then its leg has failed.
 
@@ -146,15 +152,26 @@ class Navigator:
         self.cancel(robot)
         traveller = self._robots[robot]
         what = f"({point_m[0]:.2f}, {point_m[1]:.2f})"
-        docks = self._spots.stances(point_m, traveller.radius_m, reach_m, heading_rad)
-        if not docks:
-            why = self._spots.why_not(point_m, traveller.radius_m, reach_m)
-            raise NoStance(f"{robot} does not get to {what}: {why}")
+        found = self._spots.stances(point_m, traveller.radius_m, reach_m, heading_rad)
         part = self._lattice.parts[traveller.frontier]
-        docks = [dock for dock in docks if self._lattice.parts[dock.node] == part]
-        if not docks:
+        docks = [dock for dock in found if self._lattice.parts[dock.node] == part]
+        if docks:
+            others = [
+                dock
+                for dock in docks
+                if all(math.dist(dock.point_m, at) > OTHER_STANCE_M for at in in_vain)
+            ]
+            self._tasks[robot] = _Task(what, docks=tuple(others or docks))
+            return
+        blocker = self._spots.blocker(point_m, traveller.radius_m, reach_m, heading_rad, part)
+        if blocker is not None:
+            raise NoStance(
+                f"{robot} does not get to {what}: {blocker}, which is open, is in the way", blocker
+            )
+        if found:
             raise NoPath(f"there is no way to {what} from where {robot} stands")
-        self._tasks[robot] = _Task(what, docks=tuple(docks))
+        why = self._spots.why_not(point_m, traveller.radius_m, reach_m)
+        raise NoStance(f"{robot} does not get to {what}: {why}")
 
     def reaches(
         self, robot: str, point_m: tuple[float, float, float], reach_m: tuple[float, float]

@@ -138,9 +138,11 @@ class Spots:
         ordered = near[clear][np.argsort(gaps[near[clear]], kind="stable")]
         return [int(node) for node in ordered]
 
-    def ways_out(self, point_m: tuple[float, float], radius_m: float) -> list[int]:
-        """As `ways_in`, and clear of what stands there for the time being."""
-        opened = self.obstacles()
+    def ways_out(
+        self, point_m: tuple[float, float], radius_m: float, opened: Sequence[Solid] | None = None
+    ) -> list[int]:
+        """As `ways_in`, and clear of what stands `opened`; if not given, for the time being."""
+        opened = self.obstacles() if opened is None else opened
         return [
             node
             for node in self.ways_in(point_m, radius_m)
@@ -153,13 +155,16 @@ class Spots:
         radius_m: float,
         reach_m: tuple[float, float],
         heading_rad: float | None = None,
+        opened: Sequence[Solid] | None = None,
     ) -> list[Dock]:
         """Where a robot can stand facing a point with it within reach, ahead of any traffic.
 
         The reach counts from the robot's centre. There is no wall between stance and point.
         `heading_rad`: it has to face that way; in furniture that is open at its front only, it
-        faces the back.
+        faces the back. `opened` is what stands there for the time being, if not as it does now.
+        A stance is found once for each part of the lattice that it can be entered from.
         """
+        opened = self.obstacles() if opened is None else opened
         low, high = reach_m
         x, y, z = point_m
         middle = (low + high) / 2
@@ -179,16 +184,40 @@ class Spots:
         found: list[Dock] = []
         for k in np.flatnonzero(good):
             stance = (float(points[k, 0]), float(points[k, 1]))
-            ways = self.ways_out(stance, radius_m + 0.03)
-            if ways:
-                dock = self.dock(
-                    stance, ways[0], radius_m, math.atan2(y - stance[1], x - stance[0])
-                )
+            parts: set[int] = set()
+            for way in self.ways_out(stance, radius_m + 0.03, opened):
+                if self.lattice.parts[way] in parts:
+                    continue
+                parts.add(self.lattice.parts[way])
+                dock = self.dock(stance, way, radius_m, math.atan2(y - stance[1], x - stance[0]))
                 off = 2.0 * abs(float(d[k]) - middle) + 0.2 * len(dock.owned)
                 if front is not None:
                     off += ASKEW_M * abs(math.remainder(dock.yaw_rad - front, math.tau))
                 found.append(Dock(dock.node, stance, dock.yaw_rad, dock.owned, dock.cost_m + off))
         return found
+
+    def blocker(
+        self,
+        point_m: tuple[float, float, float],
+        radius_m: float,
+        reach_m: tuple[float, float],
+        heading_rad: float | None,
+        part: int,
+    ) -> str | None:
+        """The open thing but for which there would be a stance in a part of the lattice; of several
+        that are all in the way, the first; `None` if there is none even so."""
+
+        def some(opened: Sequence[Solid]) -> bool:
+            docks = self.stances(point_m, radius_m, reach_m, heading_rad, opened)
+            return any(self.lattice.parts[dock.node] == part for dock in docks)
+
+        standing = self.obstacles()
+        for name in dict.fromkeys(solid.name for solid in standing):
+            if some([solid for solid in standing if solid.name != name]):
+                return name
+        near = [solid for solid in standing if solid.distance_m(*point_m[:2]) < DOCK_M]
+        near.sort(key=lambda solid: solid.distance_m(*point_m[:2]))
+        return near[0].name if near and some(()) else None
 
     def _heading_into(self, point_m: tuple[float, float, float]) -> float | None:
         """How to face a point in furniture under whose roof one gets from the front only."""

@@ -28,7 +28,7 @@ async def pick(ctx: SkillContext, object: str, place: str) -> None:
         )
     await ctx.be_in(place)
     seen = await _find(ctx, object, place)
-    await ctx.do(MotionKind.APPROACH, point_m=seen.point_m)
+    await ctx.do(MotionKind.APPROACH, object=object, point_m=seen.point_m)
     # From close by the point is known better than from across the room.
     near = next((d for d in await ctx.look() if d.object == object), seen)
     await ctx.do(MotionKind.GRASP, object=object, point_m=near.point_m)

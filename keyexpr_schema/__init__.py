@@ -51,8 +51,8 @@ else:
                 "PLAN_STATUS TASK_RECORD PLAN_REQUEST REPLAN_REQUEST CONTROL_REQUEST ANSWER "
                 "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE DIAGNOSTIC STORE_JOURNAL STORE_STAMPS "
                 "STORE_REPLACE STORE_CHANGES "
-                "SIM_MOTION SIM_SENSES SIM_CLOCK SIM_FRAMES SIM_SCENE SIM_TRUTH SIM_CONTACTS "
-                "KEYSPACE key_of"
+                "SIM_MOTION SIM_SENSES SIM_ALIVE SIM_CLOCK SIM_FRAMES SIM_SCENE SIM_TRUTH "
+                "SIM_CONTACTS KEYSPACE key_of"
             ),
             "payloads.durations": "Durations DurationsAddress Estimate",
             "payloads.goals": "Condition ENDED_GOALS Goal GoalAddress GoalState GoalStatus",

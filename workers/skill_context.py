@@ -151,6 +151,32 @@ class SkillContext:
                 self.observe(ON, held, None)
         return held
 
+    async def has_hand_for(self, object: str) -> bool:
+        """Whether the hand is empty; not if it holds `object` already, from an earlier try.
+
+        Raises:
+            SkillFailed: it holds something else.
+        """
+        held = await self.holding()
+        if held not in (None, object):
+            raise SkillFailed(
+                f"{self.robot} holds {held} already, one hand cannot take {object} too",
+                retryable=False,
+            )
+        return held is None
+
+    def observe_taken(self, object: str, held: str | None, where: str) -> None:
+        """Note what came of a grasp, after which the hand holds `held`.
+
+        Raises:
+            SkillFailed: it is not the object.
+        """
+        if held != object:
+            self.observe(AT, object, None)
+            raise SkillFailed(f"{object} was grasped {where} but slipped out of the hand")
+        self.observe(HOLDING, self.robot, object)
+        self.observe(AT, object, self.robot)
+
     async def be_in(self, place: str) -> Senses:
         """Make sure that the robot stands in `place`; drives there if it does not.
 

@@ -28,9 +28,6 @@ LINGER_S = 10.0
 SAME_STANCE_M = 0.01
 """Stances nearer to each other are one: what is in reach from the one is from the other, too."""
 
-OTHER_STANCE_M = 0.06
-"""One from which an arm may get where it does not from another is so far from that."""
-
 LOOKAHEAD_NODES = 3
 """Promised ahead of a robot: 1.2 m to 1.8 m, more than three times its braking distance."""
 
@@ -152,26 +149,11 @@ class Navigator:
         self.cancel(robot)
         traveller = self._robots[robot]
         what = f"({point_m[0]:.2f}, {point_m[1]:.2f})"
-        found = self._spots.stances(point_m, traveller.radius_m, reach_m, heading_rad)
         part = self._lattice.parts[traveller.frontier]
-        docks = [dock for dock in found if self._lattice.parts[dock.node] == part]
-        if docks:
-            others = [
-                dock
-                for dock in docks
-                if all(math.dist(dock.point_m, at) > OTHER_STANCE_M for at in in_vain)
-            ]
-            self._tasks[robot] = _Task(what, docks=tuple(others or docks))
-            return
-        blocker = self._spots.blocker(point_m, traveller.radius_m, reach_m, heading_rad, part)
-        if blocker is not None:
-            raise NoStance(
-                f"{robot} does not get to {what}: {blocker}, which is open, is in the way", blocker
-            )
-        if found:
-            raise NoPath(f"there is no way to {what} from where {robot} stands")
-        why = self._spots.why_not(point_m, traveller.radius_m, reach_m)
-        raise NoStance(f"{robot} does not get to {what}: {why}")
+        failed = f"{robot} does not get to {what}"
+        reach = (point_m, traveller.radius_m, reach_m, heading_rad)
+        docks = self._spots.docks(*reach, part, in_vain, failed)
+        self._tasks[robot] = _Task(what, docks=docks)
 
     def reaches(
         self, robot: str, point_m: tuple[float, float, float], reach_m: tuple[float, float]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.errors import NoPath, NoStance
 from sim.files.solids import Solid, barriers, reserves, solids
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation.clearance import Clearance
@@ -28,6 +29,9 @@ FAR_M = 3.0
 
 ASKEW_M = 0.6
 """What facing furniture askew counts for, a radian: neighbours' handles are in the arm's way."""
+
+OTHER_STANCE_M = 0.06
+"""One from which an arm may get where it does not from another is so far from that."""
 
 DOCK_M = 1.3
 """Longest straight way from the lattice to a stance."""
@@ -196,28 +200,41 @@ class Spots:
                 found.append(Dock(dock.node, stance, dock.yaw_rad, dock.owned, dock.cost_m + off))
         return found
 
-    def blocker(
+    def docks(
         self,
         point_m: tuple[float, float, float],
         radius_m: float,
         reach_m: tuple[float, float],
         heading_rad: float | None,
         part: int,
-    ) -> str | None:
-        """The open thing but for which there would be a stance in a part of the lattice; of several
-        that are all in the way, the first; `None` if there is none even so."""
+        in_vain: Sequence[tuple[float, float]],
+        failed: str,
+    ) -> tuple[Dock, ...]:
+        """The stances that can be entered from a part of the lattice; none that it has been
+        `in_vain`, if there are others. What is raised begins with `failed`.
 
-        def some(opened: Sequence[Solid]) -> bool:
+        Raises:
+            NoStance: there is no free floor at that distance, or what is open takes it up.
+            NoPath: there is, and no way to it.
+        """
+
+        def found(opened: Sequence[Solid] | None) -> list[Dock]:
             docks = self.stances(point_m, radius_m, reach_m, heading_rad, opened)
-            return any(self.lattice.parts[dock.node] == part for dock in docks)
+            return [dock for dock in docks if self.lattice.parts[dock.node] == part]
 
-        standing = self.obstacles()
-        for name in dict.fromkeys(solid.name for solid in standing):
-            if some([solid for solid in standing if solid.name != name]):
-                return name
-        near = [solid for solid in standing if solid.distance_m(*point_m[:2]) < DOCK_M]
-        near.sort(key=lambda solid: solid.distance_m(*point_m[:2]))
-        return near[0].name if near and some(()) else None
+        if docks := found(None):
+            gaps = ((min(math.dist(dock.point_m, at) for at in in_vain), dock) for dock in docks)
+            others = [dock for gap, dock in gaps if gap > OTHER_STANCE_M] if in_vain else docks
+            return tuple(others or docks)
+        standing = sorted(self.obstacles(), key=lambda solid: solid.distance_m(*point_m[:2]))
+        if standing and found(()):
+            names = dict.fromkeys(solid.name for solid in standing)
+            alone = (n for n in names if found([solid for solid in standing if solid.name != n]))
+            blocker = next(alone, standing[0].name)
+            raise NoStance(f"{failed}: {blocker}, which is open, is in the way", blocker)
+        if self.stances(point_m, radius_m, reach_m, heading_rad):
+            raise NoPath(f"{failed}: there is no way there from where it stands")
+        raise NoStance(f"{failed}: {self.why_not(point_m, radius_m, reach_m)}")
 
     def _heading_into(self, point_m: tuple[float, float, float]) -> float | None:
         """How to face a point in furniture under whose roof one gets from the front only."""

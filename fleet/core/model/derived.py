@@ -185,10 +185,15 @@ def is_closed(name: str, value_of: ValueOf, world: Inventory) -> bool:
 
 
 def _reachable(subject: str, value_of: ValueOf, world: Inventory) -> bool:
-    around = list(carriers(subject, value_of, world, aboard=True))
-    return not any(is_closed(carrier, value_of, world) for carrier in around) and not any(
-        value_of(FactKey(IS_OPEN, thing)) is True
-        for name in (subject, *around)
+    chain = [subject, *carriers(subject, value_of, world, aboard=True)]
+    if any(is_closed(carrier, value_of, world) for carrier in chain[1:]):
+        return False
+    # What is in the way at a cabinet's top is not at its drawers.
+    wholes = {whole for name in chain if (whole := _part_of(name, world)) is not None}
+    return not any(
+        thing not in chain and value_of(FactKey(IS_OPEN, thing)) is True
+        for name in chain
+        if name not in wholes
         for thing in _in_the_way(name, lambda key: (value_of(key),), world)
     )
 

@@ -87,18 +87,26 @@ def carriers(
 ) -> Iterator[str]:
     """What carries it, the direct carrier first, the outermost place last. It ends at a hand, and
     unless `aboard` at any robot."""
-    seen, here = {subject}, _carrier(subject, value_of, world)
+    seen, here = {subject}, carrier_of(subject, value_of, world)
     while here is not None and here not in seen:
         yield here
+        if not carries_on(here, subject, value_of, world, aboard=aboard):
+            return
         seen.add(here)
-        if is_robot(here, world) and not aboard:
-            return
-        if is_hand(here, subject, value_of, world):
-            return
-        subject, here = here, _carrier(here, value_of, world)
+        subject, here = here, carrier_of(here, value_of, world)
 
 
-def _carrier(name: str, value_of: ValueOf, world: Inventory) -> str | None:
+def carries_on(
+    carrier: str, carried: str, value_of: ValueOf, world: Inventory, *, aboard: bool
+) -> bool:
+    """Whether what carries the direct `carrier` of something carries that, too: see `carriers`."""
+    if is_robot(carrier, world) and not aboard:
+        return False
+    return not is_hand(carrier, carried, value_of, world)
+
+
+def carrier_of(name: str, value_of: ValueOf, world: Inventory) -> str | None:
+    """What carries it directly, as far as it is known."""
     if (whole := _part_of(name, world)) is not None:
         return whole
     if name in world.places:
@@ -155,7 +163,7 @@ def holds(literal: Literal, value_of: ValueOf, world: Inventory, *, aboard: bool
 
 def is_located(subject: str, value_of: ValueOf, world: Inventory) -> bool:
     """Whether it is known what carries it."""
-    return _carrier(subject, value_of, world) is not None
+    return carrier_of(subject, value_of, world) is not None
 
 
 def _holder(subject: str, value_of: ValueOf, world: Inventory) -> str | None:

@@ -20,11 +20,11 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from fleet.core.checker.plan_checker import CheckedPlan
-from fleet.core.model.derived import is_located
 from fleet.core.model.world import WorldModel, condition_holds
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, Planner, PlanningProblem
 from fleet.planners.symbolic.action_sequences import (
+    Exploration,
     GaveUp,
     Impossible,
     Subgoal,
@@ -35,7 +35,7 @@ from fleet.planners.symbolic.action_sequences import (
 from fleet.planners.symbolic.choosing import Choice, choose
 from fleet.planners.symbolic.engine.finite_domain import Trajectory
 from fleet.planners.symbolic.engine.instantiation import Facts
-from keyexpr_schema.facts import AT, HELD, HOLDING, IN, ON, FactKey
+from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.payloads.goals import Condition
 
 MAX_RESTORATIONS = 2
@@ -51,36 +51,29 @@ class SymbolicPlanner(Planner):
     name = "symbolic"
     strategies = (BIG_DAG, PER_GOAL, MONOLITHIC)
 
-    def _solve(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
-        return self._one_by_one(problem, ())
-
-    def _one_by_one(
-        self, problem: PlanningProblem, first: tuple[Subgoal, ...]
+    def _solve(
+        self, problem: PlanningProblem, first: tuple[Subgoal, ...] = ()
     ) -> CheckedPlan | NoPlan:
         """A search for one condition after the other, beginning with some."""
         world = problem.world
         searching = problem.budget.until(SEARCH_SHARE)
         reached = _Reached(problem, dict(world.facts), searching)
-        unlocated: list[Subgoal] = []
+        lost: dict[Subgoal, tuple[str, ...]] = {}
         late: set[str] = set()
         subgoals = subgoals_in_order(problem, world.facts)
         subgoals.sort(key=lambda subgoal: subgoal not in first)
         for subgoal in subgoals:
-            if _is_of_lost_things(subgoal, reached.facts, world):
-                # Nobody takes anywhere what is nobody knows where: no need to search for a way.
-                unlocated.append(subgoal)
-                continue
             # One that is hard leaves half of the time to those after it.
             share = 1.0 if subgoal is subgoals[-1] else 0.5
             if not searching.over and reached.add(subgoal, share):
                 continue
             if searching.over or isinstance(reached.failure, GaveUp):
                 late.add(subgoal.goal)
-            elif _needs_locating(subgoal, reached.facts, world):
-                unlocated.append(subgoal)
+            elif reached.failure.unlocated:
+                lost[subgoal] = reached.failure.unlocated
             elif reached.options and subgoal not in first:
                 # What was done for others before may be what makes it impossible.
-                return self._one_by_one(problem, (subgoal, *first))
+                return self._solve(problem, (subgoal, *first))
             else:
                 refused = NoPlan(_no_way(subgoal, reached.failure, problem))
                 alone = not any(g.goal == subgoal.goal and g.conditions[1:] for g in problem.goals)
@@ -88,17 +81,21 @@ class SymbolicPlanner(Planner):
         if late and len(problem.goals) == 1 and isinstance(reached.failure, GaveUp):
             return NoPlan(reached.failure.reason, postponed=True)
         if late:
-            return _in_time(problem, reached.options, unlocated, late)
-        explored = exploration_for(unlocated, problem, searching) if unlocated else None
-        if unlocated and explored is None:
-            if searching.over:
+            return _in_time(problem, reached.options, late | {subgoal.goal for subgoal in lost})
+        explored: Exploration | None = None
+        if lost:
+            seeks = tuple(dict.fromkeys(thing for things in lost.values() for thing in things))
+            first_lost = next(iter(lost))
+            explored = exploration_for(seeks, first_lost.goal, problem, searching)
+            if explored is None and searching.over:
                 return NoPlan(problem.not_in_time, postponed=True)
-            return NoPlan(_not_found(unlocated[0], problem))
+            if explored is None:
+                return NoPlan(_not_found(lost[first_lost], problem))
         made = choose(problem, reached.options, explored)
         for _ in range(MAX_RESTORATIONS):
             if problem.budget.over:
                 break
-            undone = [s for s in subgoals_in_order(problem, reached.facts) if s not in unlocated]
+            undone = [s for s in subgoals_in_order(problem, reached.facts) if s not in lost]
             if isinstance(made, CheckedPlan) or not (undone and all(map(reached.add, undone))):
                 break
             restored = choose(problem, reached.options, explored)
@@ -106,7 +103,7 @@ class SymbolicPlanner(Planner):
         if isinstance(made, NoPlan):
             if problem.budget.over:
                 return replace(made, postponed=True)  # not all choices were looked at
-            if not unlocated and any(goal.conditions[1:] for goal in problem.goals):
+            if not lost and any(goal.conditions[1:] for goal in problem.goals):
                 return self._each_goal_at_once(problem, made)
         return made
 
@@ -210,11 +207,9 @@ def _class(robot: str, world: WorldModel) -> object:
 def _in_time(
     problem: PlanningProblem,
     options: Sequence[Choice],
-    unlocated: Sequence[Subgoal],
     late: Set[str],
 ) -> CheckedPlan | NoPlan:
     """A plan for those goals for which everything was found before the time was over."""
-    late = late | {subgoal.goal for subgoal in unlocated}
     goals = tuple(goal for goal in problem.goals if goal.goal not in late)
     found = [sequences for sequences in options if sequences[0].goal not in late]
     none = NoPlan(problem.not_in_time, postponed=True)
@@ -223,21 +218,6 @@ def _in_time(
     made = choose(replace(problem, goals=goals), found, None)
     # What was found for a goal may need what was found for one that is late.
     return made if isinstance(made, CheckedPlan) else none
-
-
-def _needs_locating(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
-    return any(
-        subject in world.objects and not is_located(subject, facts.get, world)
-        for subject in subgoal.condition.subjects
-    )
-
-
-def _is_of_lost_things(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
-    """Whether it says where things shall be, and of none it is known where it is."""
-    return subgoal.condition.relation in (AT, ON, IN, HELD) and not any(
-        subject not in world.objects or is_located(subject, facts.get, world)
-        for subject in subgoal.condition.subjects
-    )
 
 
 def _no_way(subgoal: Subgoal, why: Impossible | GaveUp, problem: PlanningProblem) -> str:
@@ -252,8 +232,8 @@ def _no_way(subgoal: Subgoal, why: Impossible | GaveUp, problem: PlanningProblem
     )
 
 
-def _not_found(subgoal: Subgoal, problem: PlanningProblem) -> str:
-    things = " or ".join(subgoal.condition.subjects)
+def _not_found(lost: Sequence[str], problem: PlanningProblem) -> str:
+    things = " or ".join(lost)
     if problem.searched:
         places = ", ".join(sorted(problem.searched))
         return f"nobody knows where {things} is; looked for in {places}, and not found"

@@ -13,8 +13,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from fleet.core.model import derived
-from fleet.core.model.formulas.evaluation import evaluate
-from fleet.core.model.formulas.nodes import Formula, Holds, Not
+from fleet.core.model.formulas.evaluation import conjuncts, evaluate
+from fleet.core.model.formulas.nodes import Formula, Holds, Not, Or
 from fleet.core.model.world import WorldModel, known_value
 from fleet.planners.symbolic.engine.instantiation import Facts
 from fleet.planners.symbolic.engine.readings import (
@@ -213,7 +213,34 @@ class Nodes:
             if wanted in (place, *around) and self.travel.action(robot, place) is not None:
                 yield {FactKey(AT, robot): place}, True
 
+    def _one_of(self, formulas: Sequence[Formula]) -> int | bool:
+        """The node for that one of some formulas holds."""
+        rows: dict[tuple[frozenset[int], Stands], None] = {}
+        for formula in formulas:
+            parts = [self.formula(part) for part in conjuncts(formula)]
+            if all(part is True for part in parts):
+                return True
+            if any(part is False for part in parts):
+                continue
+            needs = frozenset(part for part in parts if part is not True)
+            alone = self._alternatives(*needs) if len(needs) == 1 else [(needs, ())]
+            rows |= dict.fromkeys(alone)
+        return self._holding_by(rows)
+
+    def _holding_by(
+        self, rows: Iterable[tuple[frozenset[int], Stands]], node: int | None = None
+    ) -> int | bool:
+        """The node that holds if all the nodes of a row do; false if there are no rows."""
+        if not rows:
+            return False
+        node = self._new(-1, None) if node is None else node
+        self.axioms[node] = [Axiom(tuple(sorted(needs)), stands, node) for needs, stands in rows]
+        return node
+
     def _read_formula(self, formula: Formula) -> int | bool:
+        if isinstance(formula, Or):
+            return self._one_of(formula.of)
+
         def domain(key: FactKey) -> Sequence[Value] | None:
             if key in self._counted:
                 raise TooManyWays
@@ -279,11 +306,9 @@ class Nodes:
                     needs.add(self.fact(self.number[key], value))
             for also, there in self._alternatives(holds):
                 rows[also | needs, tuple(sorted((*stands, *there)))] = None
-        if always or not rows:
-            return always and any_way
-        node = self._new(-1, None) if node is None else node
-        self.axioms[node] = [Axiom(tuple(sorted(needs)), stands, node) for needs, stands in rows]
-        return node
+        if always and any_way:
+            return True
+        return self._holding_by(rows, node)
 
     def _alternatives(self, holds: int | bool) -> Sequence[tuple[frozenset[int], Stands]]:
         """What it takes that a node holds: it, or where robots have to be if that is all."""

@@ -55,12 +55,14 @@ class SymbolicPlanner(Planner):
         return self._one_by_one(problem, ())
 
     def _one_by_one(
-        self, problem: PlanningProblem, first: tuple[Subgoal, ...]
+        self, problem: PlanningProblem, first: tuple[Subgoal, ...], set_down: bool = True
     ) -> CheckedPlan | NoPlan:
-        """A search for one condition after the other, beginning with some."""
+        """A search for one condition after the other, beginning with some; `set_down` is that of
+        `_Reached`.
+        """
         world = problem.world
         searching = problem.budget.until(SEARCH_SHARE)
-        reached = _Reached(problem, dict(world.facts), searching)
+        reached = _Reached(problem, dict(world.facts), searching, set_down)
         unlocated: list[Subgoal] = []
         late: set[str] = set()
         subgoals = subgoals_in_order(problem, world.facts)
@@ -80,7 +82,7 @@ class SymbolicPlanner(Planner):
                 unlocated.append(subgoal)
             elif reached.options and subgoal not in first:
                 # What was done for others before may be what makes it impossible.
-                return self._one_by_one(problem, (subgoal, *first))
+                return self._one_by_one(problem, (subgoal, *first), set_down)
             else:
                 refused = NoPlan(_no_way(subgoal, reached.failure, problem))
                 alone = not any(g.goal == subgoal.goal and g.conditions[1:] for g in problem.goals)
@@ -106,6 +108,8 @@ class SymbolicPlanner(Planner):
         if isinstance(made, NoPlan):
             if problem.budget.over:
                 return replace(made, postponed=True)  # not all choices were looked at
+            if reached.any_set_down:
+                return self._one_by_one(problem, first, set_down=False)
             if not unlocated and any(goal.conditions[1:] for goal in problem.goals):
                 return self._each_goal_at_once(problem, made)
         return made
@@ -134,16 +138,16 @@ class SymbolicPlanner(Planner):
 class _Reached:
     """Action sequences for one subgoal after the other, and the facts after the cheapest of each.
 
-    A robot with what it delivered in its basket is not to be had for others. As long as there are
-    more like it, what it has is taken to be set down, and those others are left to choose from.
+    What was delivered in a robot's basket is taken to be `set_down` there, so that the ways for
+    later subgoals do not depend on how it was delivered: another robot may have done it.
     """
 
     problem: PlanningProblem
     facts: Facts
     budget: TimeBudget
+    set_down: bool = True
     options: list[Choice] = field(default_factory=list)
-    waiting: Counter[object] = field(default_factory=Counter)
-    """Of each class of robots, how many have something delivered in their basket."""
+    any_set_down: bool = False
     failure: Impossible | GaveUp = field(default_factory=lambda: Impossible("nothing was sought"))
 
     def add(self, subgoal: Subgoal, share: float = 1.0) -> bool:
@@ -162,25 +166,24 @@ class _Reached:
             return False
         sequences, self.facts = found
         self.options.append(sequences)
-        for thing in subgoal.condition.subjects:
-            self._set_down(thing)
+        if self.set_down:
+            self._set_down(subgoal)
         return True
 
-    def _set_down(self, thing: str) -> None:
-        """Take it to be where the robot is that has it in its basket, if it may stay there and
-        there are more robots like that."""
-        world, robot = self.problem.world, self.facts.get(FactKey(AT, thing))
-        if robot not in world.robots or self.facts.get(FactKey(HOLDING, str(robot))) == thing:
-            return
-        place = self.facts.get(FactKey(AT, str(robot)))
-        alike = [r for r in world.team if _class(r, world) == _class(str(robot), world)]
-        self.waiting[_class(str(robot), world)] += 1
-        if (
-            place in world.places
-            and self._spoken_of[thing] == 1
-            and self.waiting[_class(str(robot), world)] < len(alike)
-        ):
-            self.facts = {**self.facts, FactKey(AT, thing): place}
+    def _set_down(self, subgoal: Subgoal) -> None:
+        """Take what it is about to be where the robot is that has it in its basket, if no other
+        condition speaks of it."""
+        for thing in subgoal.condition.subjects:
+            robot = str(self.facts.get(FactKey(AT, thing)))
+            place = self.facts.get(FactKey(AT, robot))
+            if (
+                robot in self.problem.world.robots
+                and place in self.problem.world.places
+                and self.facts.get(FactKey(HOLDING, robot)) != thing
+                and self._spoken_of[thing] == 1
+            ):
+                self.facts = {**self.facts, FactKey(AT, thing): place}
+                self.any_set_down = True
 
     @cached_property
     def _spoken_of(self) -> Counter[object]:
@@ -200,11 +203,6 @@ class _Reached:
                     self.facts, condition, problem.world
                 ):
                     yield condition
-
-
-def _class(robot: str, world: WorldModel) -> object:
-    spec = world.robots[robot]
-    return spec.skills, tuple(sorted(spec.capabilities.items()))
 
 
 def _in_time(

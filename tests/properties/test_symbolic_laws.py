@@ -89,7 +89,8 @@ def done_by_a_helper() -> tuple[WorldModel, tuple[Goal, ...]]:
 
 def better_carried() -> tuple[WorldModel, tuple[Goal, ...]]:
     """The hand is so slow that things ride in a basket."""
-    return home((_driving(manipulator(), 0.1), carrier()), 2), (bring(1, "hallway"), bring(2, "hallway"))
+    world = home((_driving(manipulator(), 0.1), carrier()), 2)
+    return world, (bring(1, "hallway"), bring(2, "hallway"))
 
 
 @reaches(*STRATEGIES, "pick", "place", "place_on_robot", "pinned", "one goal after the other")

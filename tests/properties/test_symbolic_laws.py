@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from fleet.allocators.base import Allocated
 from fleet.core.checker.plan_checker import CheckedPlan, check_allocation, check_plan
@@ -79,6 +80,12 @@ def done_by_a_helper() -> tuple[WorldModel, tuple[Goal, ...]]:
     return world, (bring(1, "kitchen"), bring(3, "hallway"))
 
 
+def better_carried() -> tuple[WorldModel, tuple[Goal, ...]]:
+    """The hand is so slow that things ride in a basket."""
+    slow = replace(manipulator(), capabilities={**manipulator().capabilities, "drive": 0.1})
+    return home((slow, carrier()), 2), (bring(1, "hallway"), bring(2, "hallway"))
+
+
 @reaches(*STRATEGIES, "pick", "place", "place_on_robot", "pinned", "one goal after the other")
 @settings(max_examples=60, deadline=None)
 @given(missions(), st.sampled_from(STRATEGIES))
@@ -86,6 +93,7 @@ def done_by_a_helper() -> tuple[WorldModel, tuple[Goal, ...]]:
 @example(undone_by_a_helper(), "big-dag")
 @example(undone_by_a_helper(), "per-goal")
 @example(done_by_a_helper(), "monolithic")
+@example(better_carried(), "big-dag")
 def test_what_can_be_done_is_planned_and_allocated(
     reached: Reached, mission: tuple[WorldModel, tuple[Goal, ...]], strategy: str
 ) -> None:

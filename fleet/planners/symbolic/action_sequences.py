@@ -34,7 +34,8 @@ CLOSED = "openable & contains"
 NEAREST_STEPS = 4
 """Steps named of those that a search still lacked when it gave up."""
 REUSE_CHARGE_S = 200.0
-"""What an action costs more for each sequence that already uses it; more than any task takes."""
+"""What an action costs more for each sequence that already uses it, and as much again for each that
+uses its skill for the same things; more than any task takes."""
 
 
 @dataclass(frozen=True)
@@ -218,13 +219,13 @@ class _Sought:
 
 
 def _different_solutions(sought: _Sought, budget: TimeBudget) -> list[Solution] | Unfinished:
-    """The cheapest sequence, and others made different by charging for what was used before,
-    whichever robot did it.
-    """
+    """The cheapest sequence, and others made different by charging for what was used before."""
     charge_s = [0.0] * len(sought.task.operators)
     same: dict[object, list[int]] = {}
+    world = sought.task.world
     for number, operator in enumerate(sought.task.operators):
-        same.setdefault(_whoever_does_it(operator.action), []).append(number)
+        for use in _uses(operator.action, world):
+            same.setdefault(use, []).append(number)
     found: Solution | Unreachable | Unfinished | None = sought.solver.solve(charge_s, budget)
     if isinstance(found, Unfinished):
         return found
@@ -234,15 +235,21 @@ def _different_solutions(sought: _Sought, budget: TimeBudget) -> list[Solution] 
         if len(solutions) == ALTERNATIVES:
             break
         for action in found.actions:
-            for number in same.get(_whoever_does_it(action), ()):
-                charge_s[number] += REUSE_CHARGE_S
+            for use in _uses(action, world):
+                for number in same.get(use, ()):
+                    charge_s[number] += REUSE_CHARGE_S
         found = sought.solver.another(charge_s, budget)
     return solutions
 
 
-def _whoever_does_it(action: Action) -> object:
-    robots = action.skill.robot_parameters
-    return action.skill.name, *(v for name, v in action.args.items() if name not in robots)
+def _uses(action: Action, world: WorldModel) -> tuple[object, object]:
+    """What is charged for when an action was used: it, whichever robot does it; and the skill for
+    the same things wherever, so that another way to go about it comes before another place.
+    """
+    skill = action.skill
+    args = [v for name, v in action.args.items() if name not in skill.robot_parameters]
+    anywhere = (value for value in args if value not in world.places)
+    return (skill.name, *args), (skill.name, None, *anywhere)
 
 
 def _sought(

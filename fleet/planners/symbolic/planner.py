@@ -5,7 +5,8 @@ it are sought (for instance one with a helper that carries), and one is chosen a
 
 * `big-dag` chooses for all goals together, by the makespan that they lead to;
 * `per-goal` chooses for each goal alone, as if there were no other, and merges the results;
-* `monolithic` makes one flat list, each goal going on from where the one before left every robot.
+* `monolithic` makes one flat list, each goal going on from where the one before left every robot
+  (`flat_list`).
 
 Where it is not known where a needed object is, the plan looks for it: a search of every place, by
 all robots that can, in parallel. What is found leads to the next revision.
@@ -13,8 +14,10 @@ all robots that can, in parallel. What is found leads to the next revision.
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections import Counter
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.core.model.derived import is_located
@@ -32,7 +35,8 @@ from fleet.planners.symbolic.action_sequences import (
 from fleet.planners.symbolic.choosing import Choice, choose
 from fleet.planners.symbolic.engine.finite_domain import Trajectory
 from fleet.planners.symbolic.engine.instantiation import Facts
-from keyexpr_schema.facts import AT, HELD, IN, ON
+from keyexpr_schema.facts import AT, HELD, HOLDING, IN, ON, FactKey
+from keyexpr_schema.payloads.goals import Condition
 
 MAX_RESTORATIONS = 2
 """How often what the sequences for later subgoals undid is reached again, where no plan does."""
@@ -130,34 +134,77 @@ class SymbolicPlanner(Planner):
 class _Reached:
     """Action sequences for one subgoal after the other, and the facts after the cheapest of each.
 
-    Robots of a flat list are `settled`: they start from where the sequence before left them.
+    A robot with what it delivered in its basket is not to be had for others. As long as there are
+    more like it, what it has is taken to be set down, and those others are left to choose from.
     """
 
     problem: PlanningProblem
     facts: Facts
     budget: TimeBudget
     options: list[Choice] = field(default_factory=list)
-    settled: set[str] = field(default_factory=set)
+    waiting: Counter[object] = field(default_factory=Counter)
+    """Of each class of robots, how many have something delivered in their basket."""
     failure: Impossible | GaveUp = field(default_factory=lambda: Impossible("nothing was sought"))
 
     def add(self, subgoal: Subgoal, share: float = 1.0) -> bool:
         """Find sequences that reach one more subgoal, in a share of what is left of the time;
         whether there are any.
         """
-        settled = frozenset(self.settled)
         budget = self.budget if share == 1.0 else self.budget.part(share)
         problem = self.problem
         way = Trajectory(problem.always, problem.never)
-        found = alternatives_for(subgoal, self.facts, problem.world, budget, settled, way)
+        if problem.strategy == MONOLITHIC:
+            kept = tuple(c for c in self._in_baskets() if c != subgoal.condition)
+            subgoal = replace(subgoal, others=(*subgoal.others, *kept))
+        found = alternatives_for(subgoal, self.facts, problem.world, budget, on_the_way=way)
         if not isinstance(found, tuple):
             self.failure = found
             return False
         sequences, self.facts = found
         self.options.append(sequences)
-        if self.problem.strategy == MONOLITHIC:
-            for action in sequences[0].actions:
-                self.settled.update(action.participants)
+        for thing in subgoal.condition.subjects:
+            self._set_down(thing)
         return True
+
+    def _set_down(self, thing: str) -> None:
+        """Take it to be where the robot is that has it in its basket, if it may stay there and
+        there are more robots like that."""
+        world, robot = self.problem.world, self.facts.get(FactKey(AT, thing))
+        if robot not in world.robots or self.facts.get(FactKey(HOLDING, str(robot))) == thing:
+            return
+        place = self.facts.get(FactKey(AT, str(robot)))
+        alike = [r for r in world.team if _class(r, world) == _class(str(robot), world)]
+        self.waiting[_class(str(robot), world)] += 1
+        if (
+            place in world.places
+            and self._spoken_of[thing] == 1
+            and self.waiting[_class(str(robot), world)] < len(alike)
+        ):
+            self.facts = {**self.facts, FactKey(AT, thing): place}
+
+    @cached_property
+    def _spoken_of(self) -> Counter[object]:
+        """In how many conditions things occur."""
+        problem = self.problem
+        rows = [c for goal in problem.goals for c in goal.conditions]
+        rows += [*problem.always, *problem.never]
+        return Counter(name for c in rows for name in (*c.subjects, c.value))
+
+    def _in_baskets(self) -> Iterator[Condition]:
+        """What is reached by something that is in a basket, and undone if its robot drives off."""
+        problem = self.problem
+        for goal in problem.goals:
+            for condition in goal.conditions:
+                carriers = [self.facts.get(FactKey(AT, s)) for s in condition.subjects]
+                if any(robot in problem.world.robots for robot in carriers) and condition_holds(
+                    self.facts, condition, problem.world
+                ):
+                    yield condition
+
+
+def _class(robot: str, world: WorldModel) -> object:
+    spec = world.robots[robot]
+    return spec.skills, tuple(sorted(spec.capabilities.items()))
 
 
 def _in_time(

@@ -38,7 +38,9 @@ class Grounding:
     """The actions of some robots that matter for a goal, and what stood in the way of others.
 
     `robots` are those looked at, `free` those of them that can drive wherever they are needed.
-    `thorough`: also detours over furniture, trays and baskets that nothing speaks of.
+    Things are put down and handed over where something is that an action handles, where it shall
+    be, or where robots are that cannot drive. `thorough`: in all places, and also with detours over
+    furniture, trays and baskets that nothing speaks of.
     """
 
     def __init__(
@@ -57,6 +59,22 @@ class Grounding:
         self.free = frozenset(free)
         self._thorough = thorough
         self.skills = Instantiation(world, start, goal, robots, free)
+        self._carriers = self._that_carry()
+        self._places: tuple[str, ...] = tuple(world.places)
+        if thorough:
+            self._ground()
+            return
+        spoken_of = {name for (_, subject), value in goal for name in (subject, value)}
+        matter = self._where_are({*spoken_of, *(robot for robot in robots if robot not in free)})
+        known: set[str] | None = None
+        while known is None or not matter <= known:
+            known = set(matter)
+            self._places = tuple(place for place in world.places if place in known)
+            self.skills.look_at(self._places)
+            self._ground()
+            matter |= self._where_are({n for a in self._made.values() for n in a.args.values()})
+
+    def _ground(self) -> None:
         self._along: set[Literal] = set()
         self._looked_into: set[str] = set()
         self._wanted: set[Literal] = set()
@@ -64,8 +82,7 @@ class Grounding:
         self._possible: dict[FactKey, set[Value]] = {}
         self._waiting: dict[FactKey, list[tuple[Row, Literal, Literal]]] = defaultdict(list)
         self._made: dict[tuple[str, tuple[str, ...]], Action] = {}
-        self._carriers = self._that_carry()
-        for literal in goal:
+        for literal in self.goal:
             self._want_reading(literal, aboard=True)
         while self._open:
             self._achieve(self._open.pop())
@@ -108,7 +125,7 @@ class Grounding:
                     hand = subject if wanted is True else NOTHING
                     self._want(Literal(FactKey(HOLDING, robot), hand))
             if relation == LOCATED or wanted is not True:
-                for place in self.world.places:
+                for place in self._places:
                     self._want(Literal(FactKey(AT, subject), place))
         else:
             for key in derived.read_by(literal, self._values, self.world, aboard=aboard):
@@ -153,6 +170,17 @@ class Grounding:
             for name in self.world.objects
             if any(kind is not None and self.skills.fits(kind, name) for kind in kinds)
         )
+
+    def _where_are(self, names: Collection[Value]) -> set[str]:
+        """The innermost places around things and robots; places themselves."""
+        found = set[str]()
+        for name in names:
+            if not isinstance(name, str):
+                continue
+            chain = (name, *derived.carriers(name, self.skills.known, self.world, aboard=True))
+            here = next((carrier for carrier in chain if carrier in self.world.places), None)
+            found |= set() if here is None else {here}
+        return found
 
     def _around(self, name: str) -> tuple[str, ...]:
         return tuple(derived.carriers(name, self.skills.known, self.world, aboard=True))
@@ -203,7 +231,7 @@ class Grounding:
             return
         for thing in self.world.objects:
             if self.start.get(FactKey(AT, thing)) == carrier:
-                for value in (*self.robots, *self.world.places):
+                for value in (*self.robots, *self._places):
                     if value != carrier:
                         self._want(Literal(FactKey(AT, thing), value))
 

@@ -51,6 +51,12 @@ class Instantiation:
         self.writable = cache(self._writable)
         self._fixed_chain = cache(self._chain_if_fixed)
         self.restores = cache(self._only_from)
+        self._places: frozenset[str] = frozenset(world.places)
+
+    def look_at(self, places: Collection[str]) -> None:
+        """Fill in no other places than these, where it is open which."""
+        self._places = frozenset(places)
+        self._names.cache_clear()
 
     def known(self, variable: FactKey) -> Value:
         """The value of a variable at the start."""
@@ -198,7 +204,8 @@ class Instantiation:
         if kind == ROBOT:
             return tuple(self.robots)
         if OBJECT not in parse_type(kind).bases:
-            return self.world.of_type(kind)
+            names = self.world.of_type(kind)
+            return tuple(n for n in names if n not in self.world.places or n in self._places)
         few = few_of_each(self.world, self.start, self.goal, self._skills)
         return tuple(n for n in self.world.of_type(kind) if n not in self.world.objects or n in few)
 

@@ -10,7 +10,7 @@ nobody uses the top of what is a container, too, and nobody reaches through what
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 from benchmarks.public.errors import BadTaskFile
@@ -27,7 +27,6 @@ from benchmarks.public.graph_rules import (
 )
 from benchmarks.public.scene_graph import (
     AGENTS,
-    CLOSED,
     CONTAINERS,
     DOOR,
     FLOOR,
@@ -252,7 +251,3 @@ def _check_surface(task: Task, node: Node, where: Node, relation: str) -> None:
     """Where our world would say something else than the graph."""
     if relation == ON and CONTAINERS in where.properties and GRABABLE in node.properties:
         raise BadTaskFile(f"{task.name}: {node} is on {where}, which is a container")
-
-
-__all__ = ["goal_of", "name_of", "step_of", "world_of"]
-_UNUSED: Mapping[str, str] = {CLOSED: ON_HIGH_SURFACE}

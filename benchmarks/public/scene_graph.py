@@ -122,8 +122,8 @@ def _task(env: str, row: _TaskRow, where: str) -> Task:
 def _goal(text: str, count: int, nodes: dict[int, Node], where: str) -> Edge:
     found = _GOAL.fullmatch(text)
     if found is None or count != 1:
-        raise BadTaskFile(f"{where}: a goal is on|inside_<name>(id)_<name>(id): [1, []]; not {text}")
+        raise BadTaskFile(f"{where}: {text} is no goal such as on_<cup>(1)_<table>(2): [1, []]")
     of, to = int(found[2]), int(found[3])
     if unknown := {of, to} - nodes.keys():
-        raise BadTaskFile(f"{where}: the goal {text} speaks of {sorted(unknown)}, which are no nodes")
+        raise BadTaskFile(f"{where}: {text} speaks of {sorted(unknown)}, which are no nodes")
     return Edge(of, found[1].upper(), to)

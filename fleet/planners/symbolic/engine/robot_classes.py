@@ -54,7 +54,9 @@ def representatives(
             if full[able] > MAX_FULL_HANDS:
                 continue
         alone = named or robot in world.marked
-        drives = any(name in world.skills and only_drives(world.skills[name]) for name in spec.skills)
+        drives = any(
+            name in world.skills and only_drives(world.skills[name]) for name in spec.skills
+        )
         relations = asked - {AT} if drives else asked
         known = tuple(facts.get(FactKey(relation, robot)) for relation in sorted(relations))
         same = kinds.setdefault((able, holds, known, robot if alone else None), [])

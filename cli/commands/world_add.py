@@ -100,7 +100,7 @@ async def add(
     from cli.client.planner_requests import statement_status
     from cli.client.publish import put_fact, put_statement
     from cli.client.world import put_object, put_place
-    from cli.errors import BadArgument
+    from cli.errors import BadArgument, Refused
     from cli.views.text import statement_means
 
     _check_options(
@@ -153,6 +153,11 @@ async def add(
         else:
             statement = await put_statement(session, " ".join(words), name)
             status = await statement_status(session, statement.statement)
+            if status is not None and not status.facts:
+                raise Refused(
+                    f"statement {statement.statement} is kept as it was said, “{statement.text}”"
+                    f"{statement_means(status)}"
+                )
             call.show(
                 {"statement": statement, "status": status},
                 lambda: (

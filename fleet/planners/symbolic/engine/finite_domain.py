@@ -21,7 +21,7 @@ from fleet.core.model.formulas.nodes import (
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, room_left
 from fleet.planners.symbolic.engine.instantiation import Facts
-from fleet.planners.symbolic.engine.nodes import Nodes, Stands, State, watch_lists
+from fleet.planners.symbolic.engine.nodes import Nodes, Stands, State, merged, watch_lists
 from fleet.planners.symbolic.engine.travel import Moves, Travel
 from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
@@ -199,7 +199,7 @@ class FiniteDomainTask:
             return None
         best: Moves | None = None
         for chosen in islice(product(*options), MAX_GOAL_WAYS):
-            stands = _merged((self.goal_stands, *chosen))
+            stands = merged((self.goal_stands, *chosen))
             if stands is None:
                 continue
             moves = {r: place for r, place in stands if self.where(state, r) != place}
@@ -342,21 +342,11 @@ def _each(effect: ConditionalEffect, world: WorldModel) -> Iterator[ConditionalE
         yield ConditionalEffect(literal.variable, literal.value, one.add, one.when)
 
 
-def _merged(parts: Sequence[Stands]) -> Stands | None:
-    """All of them at once; `None` if a robot would have to be in two places."""
-    stands: dict[str, str] = {}
-    for part in parts:
-        for robot, place in part:
-            if stands.setdefault(robot, place) != place:
-                return None
-    return tuple(stands.items())
-
-
 def _compatible(stands: Stands, options: Sequence[Stands]) -> Stands | None:
     """`stands` with the first of the options that does not contradict them."""
     for option in options:
         if not option:
             return stands
-        if (merged := _merged((stands, option))) is not None:
-            return merged
+        if (both := merged((stands, option))) is not None:
+            return both
     return None

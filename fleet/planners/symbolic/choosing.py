@@ -316,12 +316,14 @@ class _Choosing:
         sequences = [*choice, *(explored.sequences if explored else ())]
         if problem.strategy == MONOLITHIC:
             things = {s for goal in problem.goals for c in goal.conditions for s in c.subjects}
-            sequences = in_one_list(sequences, problem.world, self.roles, things)
+            constrained = bool(problem.always or problem.never or problem.sometime_before)
+            sequences = in_one_list(sequences, problem.world, self.roles, things, constrained)
         tasks, pins = deordered(
             sequences,
             problem.first_task,
             one_actor_each=problem.strategy == MONOLITHIC,
             world=problem.world,
+            in_order=problem.sometime_before,
         )
         seeks = frozenset(explored.seeks if explored else ())
         served = frozenset[str]().union(*(sequence.goals for sequence in choice))
@@ -345,6 +347,7 @@ class _Choosing:
             seeks=tuple(explored.seeks) if explored else (),
             always=problem.always,
             never=problem.never,
+            sometime_before=problem.sometime_before,
         )
 
 

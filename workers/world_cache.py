@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
-from keyexpr_schema.facts import AT, IS_OPEN, FactKey, Value
+from keyexpr_schema.facts import AT, BLOCKED_BY, IS_OPEN, FactKey, Value
 from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, ROBOT_SPEC, ROBOT_STATE
 from keyexpr_schema.payloads.motions import Detection
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
@@ -76,7 +76,7 @@ class WorldCache:
                 for name in self.objects
                 if self.moves(name)
                 and self.place_of(_word(self.value_of(AT, name))) == place
-                and not any(self.closed(c) for c in self.carriers(name))
+                and not any(self.closed(c) or self.blocked(c) for c in self.carriers(name))
             )
         )
 
@@ -102,6 +102,12 @@ class WorldCache:
         about = self.objects.get(thing)
         opens = about is not None and about.is_a(Feature.OPENABLE)
         return opens and self.value_of(IS_OPEN, thing) is not True
+
+    def blocked(self, thing: str) -> bool:
+        """Whether something that is open is in the way of a thing and of what is in it."""
+        about = self.objects.get(thing)
+        others = (*(about.blocked_by if about else ()), self.value_of(BLOCKED_BY, thing))
+        return any(isinstance(o, str) and self.value_of(IS_OPEN, o) is True for o in others)
 
     def place_of(self, where: str | None) -> str | None:
         """The place where something is that is at `where`: a place, or a thing in one. A robot's

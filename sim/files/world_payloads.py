@@ -112,6 +112,7 @@ def _parts(world: WorldFile, fixture: Fixture) -> list[Object]:
                 home=entry.place,
                 features=features_of(fixture, name),
                 part_of=fixture.name,
+                blocked_by=fixture.drawers_above(name),
             )
         )
     return found

@@ -303,7 +303,9 @@ def exploration_for(
     suffice for are left to a later revision.
     """
     world = problem.world
-    closed = (name for name in world.of_type(CLOSED) if is_closed(name, world.facts.get, world))
+    closed = [name for name in world.of_type(CLOSED) if is_closed(name, world.facts.get, world)]
+    # What would be behind others once those are open comes before them: no need to close any.
+    closed.sort(key=lambda name: len(world.objects[name].blocked_by), reverse=True)
     return _looked_into(world.places, seeks, goal, problem, budget) or _looked_into(
         closed, seeks, goal, problem, budget
     )
@@ -327,6 +329,7 @@ def _looked_into(
         condition = Condition(relation=SEARCHED, subject=place, value=True)
         found = alternatives_for(Subgoal(goal, condition), facts, problem.world, budget)
         if isinstance(found, tuple):
-            sequences.append(found[0][0])
+            looked, facts = found
+            sequences.append(looked[0])
             conditions.append(condition)
     return Exploration(tuple(sequences), tuple(conditions), seeks) if sequences else None

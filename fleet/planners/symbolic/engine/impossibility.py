@@ -16,9 +16,10 @@ from fleet.core.model.formulas.evaluation import conjuncts, expanded
 from fleet.core.model.formulas.nodes import Formula
 from fleet.core.model.formulas.text import formula_text
 from fleet.core.model.parameter_types import PLACE, ROBOT
-from fleet.core.model.skills import Action
+from fleet.core.model.skills import Action, SkillModel
 from fleet.planners.symbolic.engine.finite_domain import FiniteDomainTask
 from fleet.planners.symbolic.engine.grounding import Grounding
+from fleet.planners.symbolic.engine.instantiation import Binding
 from fleet.planners.symbolic.engine.relevance import rows_of
 from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, REACHABLE, Literal
 
@@ -93,13 +94,28 @@ class _Missing:
         makers = self._grounding.makers_of(literal)
         if not makers:
             return self._no_maker(stored)
-        for skill, binding in makers:
+        lacking = [list(self._lacking(skill, args)) for skill, args in makers]
+        if any(lacking):
+            self.certain &= all(lacking)
+            named = dict.fromkeys(what for rows in lacking for what in rows)
+            return "; ".join(list(named)[:MAX_NAMED])
+        for skill, args in makers:
             for (relation, parameter), _ in skill.before:
-                name = binding.get(parameter)
+                name = args.get(parameter)
                 if name is not None and self._is_lost(relation, name):
                     return self._nobody_knows_where(name)
         self.certain = False
         return f"nothing leads to {literal}"
+
+    def _lacking(self, skill: SkillModel, args: Binding) -> Iterator[str]:
+        """What there is not of the kind that a skill takes: a tool, a second robot."""
+        for name, kind in skill.parameters.items():
+            if name not in args and kind != ROBOT and not self._world.of_type(kind):
+                yield f"{skill.name} takes a {kind}, and there is none"
+        takes, robots = len(skill.robot_parameters), self._grounding.robots
+        if len(robots) < takes:
+            alone = ", ".join(robots) or "none"
+            yield f"{skill.name} takes {takes} robots, and there is {alone}"
 
     def _unknown(self, literal: Literal) -> str | None:
         """What it speaks of that nobody knows of, or knows the place of."""

@@ -321,6 +321,7 @@ class _Choosing:
             problem.first_task,
             one_actor_each=problem.strategy == MONOLITHIC,
             world=problem.world,
+            in_order=problem.sometime_before,
         )
         seeks = frozenset(explored.seeks if explored else ())
         served = frozenset[str]().union(*(sequence.goals for sequence in choice))
@@ -344,6 +345,7 @@ class _Choosing:
             seeks=tuple(explored.seeks) if explored else (),
             always=problem.always,
             never=problem.never,
+            sometime_before=problem.sometime_before,
         )
 
 

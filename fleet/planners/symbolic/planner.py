@@ -124,9 +124,7 @@ class SymbolicPlanner(Planner):
                 return replace(made, postponed=True)  # not all choices were looked at
             if problem.strategy != MONOLITHIC and len(problem.goals) > 1:
                 # What one goal leaves in a hand may be what another begins with.
-                in_a_row = choose(
-                    replace(problem, strategy=MONOLITHIC), reached.options, explored
-                )
+                in_a_row = choose(replace(problem, strategy=MONOLITHIC), reached.options, explored)
                 if isinstance(in_a_row, CheckedPlan):
                     return in_a_row
             if not unlocated and any(goal.conditions[1:] for goal in problem.goals):

@@ -1,4 +1,4 @@
-"""On and in, what must be opened, a switch, a person; and what is looked for behind closed doors."""
+"""On and in, what must be opened, a switch, a person; and what is looked for in closed things."""
 
 from __future__ import annotations
 

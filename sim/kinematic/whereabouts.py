@@ -19,7 +19,7 @@ from sim.states import ThingStates
 REACH_M = 1.2
 """How far from a robot's centre its hand gets, sideways; generous, as stances here are coarse."""
 
-REACH_IN_M = 2.0
+REACH_IN_M = 2.4
 """The same at furniture whose doors and drawers take up the floor before it."""
 
 SLOT_M = 0.12

@@ -10,6 +10,7 @@ from heapq import merge
 
 from msgspec.structs import replace
 
+from fleet.core.dispatch.trajectory import in_order
 from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
 from fleet.core.indexes.fleet_index import carried_by
 from fleet.core.model.preconditions import action_of, first_broken, unmet_before, variables_of
@@ -82,8 +83,10 @@ def order_if_ready(state: State, plan: str, task: str, reservations: bool = True
         return state
     if _touches_unwanted_work(state, action):
         return state
-    world, plan_ = state.world(), entry.plan
-    unmet = unmet_before(action, world) or first_broken(action, plan_.always, plan_.never, world)
+    world = state.world()
+    unmet = unmet_before(action, world)
+    if unmet is None and entry.plan.is_constrained:
+        unmet = first_broken(action, entry.plan, in_order(state, entry), world)
     if unmet is not None:
         reason = f"{record.task} ({record.skill}) cannot start: {unmet}"
         goals, tasks = (record.goal,), (record.task,)

@@ -36,7 +36,7 @@ from fleet.planners.symbolic.choosing import Choice, choose
 from fleet.planners.symbolic.engine.finite_domain import Trajectory
 from fleet.planners.symbolic.engine.instantiation import Facts
 from keyexpr_schema.facts import AT, HELD, HOLDING, IN, ON, FactKey
-from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.goals import Condition, Precedence
 
 MAX_RESTORATIONS = 2
 """How often what the sequences for later subgoals undid is reached again, where no plan does."""
@@ -52,18 +52,36 @@ class SymbolicPlanner(Planner):
     strategies = (BIG_DAG, PER_GOAL, MONOLITHIC)
 
     def _solve(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
-        return self._one_by_one(problem, ())
+        world, rows = problem.world, problem.sometime_before
+        for row in rows:
+            if world.holds(row.then):
+                return NoPlan(f"{row.first} must hold before {row.then} does, which it does now")
+        wanted = tuple(row for row in rows if _is_wanted(row.then, problem))
+        made = self._one_by_one(problem, (), wanted)
+        if isinstance(made, CheckedPlan) or made.postponed or wanted == rows:
+            return made
+        # What need not hold could not be avoided, so what has to hold before it does so first.
+        return self._one_by_one(problem, (), rows)
 
     def _one_by_one(
-        self, problem: PlanningProblem, first: tuple[Subgoal, ...]
+        self,
+        problem: PlanningProblem,
+        first: tuple[Subgoal, ...],
+        in_order: tuple[Precedence, ...],
+        set_down: bool = True,
     ) -> CheckedPlan | NoPlan:
-        """A search for one condition after the other, beginning with some."""
+        """A search for one condition after the other, beginning with some, when all that has to
+        hold first has; what may then hold is avoided where it is not one of those `in_order`.
+        `set_down` is that of `_Reached`.
+        """
         world = problem.world
         searching = problem.budget.until(SEARCH_SHARE)
-        reached = _Reached(problem, dict(world.facts), searching)
+        reached = _Reached(problem, dict(world.facts), searching, set_down)
         unlocated: list[Subgoal] = []
         late: set[str] = set()
-        subgoals = subgoals_in_order(problem, world.facts)
+        if (failed := reached.pass_first(in_order)) is not None:
+            return failed
+        subgoals = subgoals_in_order(problem, reached.facts)
         subgoals.sort(key=lambda subgoal: subgoal not in first)
         for subgoal in subgoals:
             if _is_of_lost_things(subgoal, reached.facts, world):
@@ -80,11 +98,11 @@ class SymbolicPlanner(Planner):
                 unlocated.append(subgoal)
             elif reached.options and subgoal not in first:
                 # What was done for others before may be what makes it impossible.
-                return self._one_by_one(problem, (subgoal, *first))
+                return self._one_by_one(problem, (subgoal, *first), in_order, set_down)
             else:
                 refused = NoPlan(_no_way(subgoal, reached.failure, problem))
                 alone = not any(g.goal == subgoal.goal and g.conditions[1:] for g in problem.goals)
-                return refused if alone else self._each_goal_at_once(problem, refused)
+                return refused if alone else self._each_goal_at_once(problem, in_order, refused)
         if late and len(problem.goals) == 1 and isinstance(reached.failure, GaveUp):
             return NoPlan(reached.failure.reason, postponed=True)
         if late:
@@ -106,18 +124,22 @@ class SymbolicPlanner(Planner):
         if isinstance(made, NoPlan):
             if problem.budget.over:
                 return replace(made, postponed=True)  # not all choices were looked at
+            if reached.any_set_down:
+                return self._one_by_one(problem, first, in_order, set_down=False)
             if not unlocated and any(goal.conditions[1:] for goal in problem.goals):
-                return self._each_goal_at_once(problem, made)
+                return self._each_goal_at_once(problem, in_order, made)
         return made
 
     def _each_goal_at_once(
-        self, problem: PlanningProblem, otherwise: NoPlan
+        self, problem: PlanningProblem, in_order: tuple[Precedence, ...], otherwise: NoPlan
     ) -> CheckedPlan | NoPlan:
         """All conditions of a goal in one search: what one of them leaves in a hand is there for
         the next, and what is undone on the way is made true again. `otherwise` where that is no
         plan either.
         """
         reached = _Reached(problem, dict(problem.world.facts), problem.budget.until(SEARCH_SHARE))
+        if reached.pass_first(in_order) is not None:
+            return otherwise
         for goal in problem.goals:
             if all(condition_holds(reached.facts, c, problem.world) for c in goal.conditions):
                 continue
@@ -134,17 +156,38 @@ class SymbolicPlanner(Planner):
 class _Reached:
     """Action sequences for one subgoal after the other, and the facts after the cheapest of each.
 
-    A robot with what it delivered in its basket is not to be had for others. As long as there are
-    more like it, what it has is taken to be set down, and those others are left to choose from.
+    What was delivered in a robot's basket is taken to be `set_down` there, so that the ways for
+    later subgoals do not depend on how it was delivered: another robot may have done it.
     """
 
     problem: PlanningProblem
     facts: Facts
     budget: TimeBudget
+    set_down: bool = True
     options: list[Choice] = field(default_factory=list)
-    waiting: Counter[object] = field(default_factory=Counter)
-    """Of each class of robots, how many have something delivered in their basket."""
+    any_set_down: bool = False
     failure: Impossible | GaveUp = field(default_factory=lambda: Impossible("nothing was sought"))
+    passed: set[Precedence] = field(default_factory=set)
+
+    def pass_first(self, in_order: tuple[Precedence, ...]) -> NoPlan | None:
+        """Reach what has to hold before something else may; why that cannot be done, if it cannot.
+
+        One may have to come before the other: each is sought while of none that is left the second
+        may hold.
+        """
+        problem, left = self.problem, list(in_order)
+        while left:
+            for row in left:
+                goal = next(g.goal for g in problem.goals if row in g.sometime_before)
+                holds = condition_holds(self.facts, row.first, problem.world)
+                if holds or self.add(Subgoal(goal, row.first), 0.5):
+                    self.passed.add(row)
+                    left.remove(row)
+                    break
+            else:
+                reason = _no_way(Subgoal(goal, row.first), self.failure, problem)
+                return NoPlan(reason, postponed=isinstance(self.failure, GaveUp))
+        return None
 
     def add(self, subgoal: Subgoal, share: float = 1.0) -> bool:
         """Find sequences that reach one more subgoal, in a share of what is left of the time;
@@ -152,7 +195,8 @@ class _Reached:
         """
         budget = self.budget if share == 1.0 else self.budget.part(share)
         problem = self.problem
-        way = Trajectory(problem.always, problem.never)
+        too_early = (row.then for row in problem.sometime_before if row not in self.passed)
+        way = Trajectory(problem.always, (*problem.never, *too_early))
         if problem.strategy == MONOLITHIC:
             kept = tuple(c for c in self._in_baskets() if c != subgoal.condition)
             subgoal = replace(subgoal, others=(*subgoal.others, *kept))
@@ -162,32 +206,30 @@ class _Reached:
             return False
         sequences, self.facts = found
         self.options.append(sequences)
-        for thing in subgoal.condition.subjects:
-            self._set_down(thing)
+        if self.set_down:
+            self._set_down(subgoal)
         return True
 
-    def _set_down(self, thing: str) -> None:
-        """Take it to be where the robot is that has it in its basket, if it may stay there and
-        there are more robots like that."""
-        world, robot = self.problem.world, self.facts.get(FactKey(AT, thing))
-        if robot not in world.robots or self.facts.get(FactKey(HOLDING, str(robot))) == thing:
-            return
-        place = self.facts.get(FactKey(AT, str(robot)))
-        alike = [r for r in world.team if _class(r, world) == _class(str(robot), world)]
-        self.waiting[_class(str(robot), world)] += 1
-        if (
-            place in world.places
-            and self._spoken_of[thing] == 1
-            and self.waiting[_class(str(robot), world)] < len(alike)
-        ):
-            self.facts = {**self.facts, FactKey(AT, thing): place}
+    def _set_down(self, subgoal: Subgoal) -> None:
+        """Take what it is about to be where the robot is that has it in its basket, if no other
+        condition speaks of it."""
+        for thing in subgoal.condition.subjects:
+            robot = str(self.facts.get(FactKey(AT, thing)))
+            place = self.facts.get(FactKey(AT, robot))
+            if (
+                robot in self.problem.world.robots
+                and place in self.problem.world.places
+                and self.facts.get(FactKey(HOLDING, robot)) != thing
+                and self._spoken_of[thing] == 1
+            ):
+                self.facts = {**self.facts, FactKey(AT, thing): place}
+                self.any_set_down = True
 
     @cached_property
     def _spoken_of(self) -> Counter[object]:
         """In how many conditions things occur."""
         problem = self.problem
-        rows = [c for goal in problem.goals for c in goal.conditions]
-        rows += [*problem.always, *problem.never]
+        rows = [c for goal in problem.goals for c in (*goal.conditions, *goal.constraints)]
         return Counter(name for c in rows for name in (*c.subjects, c.value))
 
     def _in_baskets(self) -> Iterator[Condition]:
@@ -200,11 +242,6 @@ class _Reached:
                     self.facts, condition, problem.world
                 ):
                     yield condition
-
-
-def _class(robot: str, world: WorldModel) -> object:
-    spec = world.robots[robot]
-    return spec.skills, tuple(sorted(spec.capabilities.items()))
 
 
 def _in_time(
@@ -223,6 +260,16 @@ def _in_time(
     made = choose(replace(problem, goals=goals), found, None)
     # What was found for a goal may need what was found for one that is late.
     return made if isinstance(made, CheckedPlan) else none
+
+
+def _is_wanted(condition: Condition, problem: PlanningProblem) -> bool:
+    """Whether a goal cannot be reached without it."""
+    return any(
+        (wanted.relation, wanted.value) == (condition.relation, condition.value)
+        and set(wanted.subjects) <= set(condition.subjects)
+        for goal in problem.goals
+        for wanted in goal.conditions
+    )
 
 
 def _needs_locating(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
@@ -244,6 +291,7 @@ def _no_way(subgoal: Subgoal, why: Impossible | GaveUp, problem: PlanningProblem
     world = problem.world
     kept = [f"{condition} must always hold" for condition in problem.always]
     kept += [f"{condition} must never hold" for condition in problem.never]
+    kept += [f"{row.first} must hold before {row.then} does" for row in problem.sometime_before]
     on_the_way = f"; on the way {' and '.join(kept)}" if kept else ""
     failed = (f"; {known.robot} cannot {known.skill}: {known.reason}" for known in world.hopeless)
     return (

@@ -14,9 +14,10 @@ from fleet.core.model.formulas.evaluation import conjuncts, expanded
 from fleet.core.model.formulas.nodes import Formula
 from fleet.core.model.formulas.text import formula_text
 from fleet.core.model.parameter_types import PLACE, ROBOT
-from fleet.core.model.skills import Action
+from fleet.core.model.skills import Action, SkillModel
 from fleet.planners.symbolic.engine.finite_domain import FiniteDomainTask
 from fleet.planners.symbolic.engine.grounding import Grounding
+from fleet.planners.symbolic.engine.instantiation import Binding
 from fleet.planners.symbolic.engine.relevance import rows_of
 from keyexpr_schema.facts import AT, IN, ON, REACHABLE, Literal
 
@@ -69,9 +70,21 @@ class _Missing:
         if refused:
             more = f" (and {len(refused) - MAX_NAMED} more)" if len(refused) > MAX_NAMED else ""
             return "; ".join(refused[:MAX_NAMED]) + more
-        if not self._grounding.makers_of(literal):
+        makers = self._grounding.makers_of(literal)
+        if not makers:
             return self._no_maker(stored)
-        return f"nothing leads to {literal}"
+        lacking = dict.fromkeys(w for skill, args in makers for w in self._lacking(skill, args))
+        return "; ".join(list(lacking)[:MAX_NAMED]) or f"nothing leads to {literal}"
+
+    def _lacking(self, skill: SkillModel, args: Binding) -> Iterator[str]:
+        """What there is not of the kind that a skill takes: a tool, a second robot."""
+        for name, kind in skill.parameters.items():
+            if name not in args and kind != ROBOT and not self._world.of_type(kind):
+                yield f"{skill.name} takes a {kind}, and there is none"
+        takes, robots = len(skill.robot_parameters), self._grounding.robots
+        if len(robots) < takes:
+            alone = ", ".join(robots) or "none"
+            yield f"{skill.name} takes {takes} robots, and there is {alone}"
 
     def _unknown(self, literal: Literal) -> str | None:
         """What it speaks of that nobody knows of, or knows the place of."""

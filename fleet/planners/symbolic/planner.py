@@ -68,13 +68,15 @@ class SymbolicPlanner(Planner):
         problem: PlanningProblem,
         first: tuple[Subgoal, ...],
         in_order: tuple[Precedence, ...],
+        set_down: bool = True,
     ) -> CheckedPlan | NoPlan:
         """A search for one condition after the other, beginning with some, when all that has to
         hold first has; what may then hold is avoided where it is not one of those `in_order`.
+        `set_down` is that of `_Reached`.
         """
         world = problem.world
         searching = problem.budget.until(SEARCH_SHARE)
-        reached = _Reached(problem, dict(world.facts), searching)
+        reached = _Reached(problem, dict(world.facts), searching, set_down)
         unlocated: list[Subgoal] = []
         late: set[str] = set()
         if (failed := reached.pass_first(in_order)) is not None:
@@ -96,7 +98,7 @@ class SymbolicPlanner(Planner):
                 unlocated.append(subgoal)
             elif reached.options and subgoal not in first:
                 # What was done for others before may be what makes it impossible.
-                return self._one_by_one(problem, (subgoal, *first), in_order)
+                return self._one_by_one(problem, (subgoal, *first), in_order, set_down)
             else:
                 refused = NoPlan(_no_way(subgoal, reached.failure, problem))
                 alone = not any(g.goal == subgoal.goal and g.conditions[1:] for g in problem.goals)
@@ -122,6 +124,8 @@ class SymbolicPlanner(Planner):
         if isinstance(made, NoPlan):
             if problem.budget.over:
                 return replace(made, postponed=True)  # not all choices were looked at
+            if reached.any_set_down:
+                return self._one_by_one(problem, first, in_order, set_down=False)
             if problem.strategy != MONOLITHIC and len(problem.goals) > 1:
                 # What one goal leaves in a hand may be what another begins with.
                 in_a_row = choose(replace(problem, strategy=MONOLITHIC), reached.options, explored)
@@ -157,16 +161,16 @@ class SymbolicPlanner(Planner):
 class _Reached:
     """Action sequences for one subgoal after the other, and the facts after the cheapest of each.
 
-    A robot with what it delivered in its basket is not to be had for others. As long as there are
-    more like it, what it has is taken to be set down, and those others are left to choose from.
+    What was delivered in a robot's basket is taken to be `set_down` there, so that the ways for
+    later subgoals do not depend on how it was delivered: another robot may have done it.
     """
 
     problem: PlanningProblem
     facts: Facts
     budget: TimeBudget
+    set_down: bool = True
     options: list[Choice] = field(default_factory=list)
-    waiting: Counter[object] = field(default_factory=Counter)
-    """Of each class of robots, how many have something delivered in their basket."""
+    any_set_down: bool = False
     failure: Impossible | GaveUp = field(default_factory=lambda: Impossible("nothing was sought"))
     passed: set[Precedence] = field(default_factory=set)
 
@@ -207,25 +211,24 @@ class _Reached:
             return False
         sequences, self.facts = found
         self.options.append(sequences)
-        for thing in subgoal.condition.subjects:
-            self._set_down(thing)
+        if self.set_down:
+            self._set_down(subgoal)
         return True
 
-    def _set_down(self, thing: str) -> None:
-        """Take it to be where the robot is that has it in its basket, if it may stay there and
-        there are more robots like that."""
-        world, robot = self.problem.world, self.facts.get(FactKey(AT, thing))
-        if robot not in world.robots or self.facts.get(FactKey(HOLDING, str(robot))) == thing:
-            return
-        place = self.facts.get(FactKey(AT, str(robot)))
-        alike = [r for r in world.team if _class(r, world) == _class(str(robot), world)]
-        self.waiting[_class(str(robot), world)] += 1
-        if (
-            place in world.places
-            and self._spoken_of[thing] == 1
-            and self.waiting[_class(str(robot), world)] < len(alike)
-        ):
-            self.facts = {**self.facts, FactKey(AT, thing): place}
+    def _set_down(self, subgoal: Subgoal) -> None:
+        """Take what it is about to be where the robot is that has it in its basket, if no other
+        condition speaks of it."""
+        for thing in subgoal.condition.subjects:
+            robot = str(self.facts.get(FactKey(AT, thing)))
+            place = self.facts.get(FactKey(AT, robot))
+            if (
+                robot in self.problem.world.robots
+                and place in self.problem.world.places
+                and self.facts.get(FactKey(HOLDING, robot)) != thing
+                and self._spoken_of[thing] == 1
+            ):
+                self.facts = {**self.facts, FactKey(AT, thing): place}
+                self.any_set_down = True
 
     @cached_property
     def _spoken_of(self) -> Counter[object]:
@@ -244,11 +247,6 @@ class _Reached:
                     self.facts, condition, problem.world
                 ):
                     yield condition
-
-
-def _class(robot: str, world: WorldModel) -> object:
-    spec = world.robots[robot]
-    return spec.skills, tuple(sorted(spec.capabilities.items()))
 
 
 def _in_time(

@@ -126,6 +126,11 @@ class SymbolicPlanner(Planner):
                 return replace(made, postponed=True)  # not all choices were looked at
             if reached.any_set_down:
                 return self._one_by_one(problem, first, in_order, set_down=False)
+            if problem.strategy != MONOLITHIC and len(problem.goals) > 1:
+                # What one goal leaves in a hand may be what another begins with.
+                in_a_row = choose(replace(problem, strategy=MONOLITHIC), reached.options, explored)
+                if isinstance(in_a_row, CheckedPlan):
+                    return in_a_row
             if not lost and any(goal.conditions[1:] for goal in problem.goals):
                 return self._each_goal_at_once(problem, in_order, made)
         return made

@@ -22,8 +22,9 @@ from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, room_left
 from fleet.jobshop.time_budget import TimeBudget, Watch
 from fleet.planners.symbolic.engine.instantiation import Facts
-from fleet.planners.symbolic.engine.nodes import Nodes, Stands, State, merged, watch_lists
+from fleet.planners.symbolic.engine.nodes import Nodes, Stands, State, merged
 from fleet.planners.symbolic.engine.travel import Moves, Travel
+from fleet.planners.symbolic.engine.watch_lists import watch_lists
 from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 

@@ -187,10 +187,10 @@ class SkillContext:
             SkillFailed: the way is not open.
         """
         senses = await self.embodiment.senses()
-        if senses.place != place:
+        if not self.world.within(senses.place, place):
             self.log(f"is in {senses.place or 'no place'}, not in {place}: goes there first")
             senses = (await self.do(MotionKind.GO_TO, place=place)).senses
-        self.observe(AT, self.robot, place)
+        self.observe(AT, self.robot, senses.place or place)
         return senses
 
     def known(self, relation: str, subject: str) -> Value:

@@ -305,7 +305,7 @@ class Navigator:
             traveller.parked is not None
             and not traveller.leaving
             and name not in self._lingers
-            and self._world.place_at(x, y) == task.place
+            and task.place in self._world.places_around(self._world.place_at(x, y))
             and here in self._spots.waiting[task.place]
         ):
             self._arrive(name)

@@ -83,7 +83,7 @@ class Spots:
             name: tuple(
                 node
                 for node, place in enumerate(places)
-                if place == name and not self.by_door[node]
+                if name in world.places_around(place) and not self.by_door[node]
             )
             for name in world.place_entries
         }

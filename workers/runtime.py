@@ -12,13 +12,14 @@ from msgspec.structs import replace
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.facts import HOLDING, FactKey
+from keyexpr_schema.keyspace import ROBOT_ALIVE
 from keyexpr_schema.payloads.programs import ProgramEnd, ProgramTrace
-from keyexpr_schema.payloads.robots import RobotActivity, RobotSpec
+from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotSpec
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState
 from keyexpr_schema.transport.session import Session
 from workers.embodiment import Embodiment
 from workers.errors import BadArguments, RobotTaken, RobotUnreachable, UnknownSkill
-from workers.only_worker import OnlyWorker
+from workers.only_run import OnlyRun
 from workers.orders.fencing import Phase
 from workers.orders.journal import FinishedCall, Journal
 from workers.orders.order_queue import OrderQueue
@@ -88,7 +89,9 @@ class Worker:
         Raises:
             RobotTaken: another worker of this robot is connected.
         """
-        only = OnlyWorker(self._session, self.spec.robot, self.incarnation)
+        robot = self.spec.robot
+        own = AliveAddress(robot, self.incarnation)
+        only = OnlyRun(self._session, ROBOT_ALIVE, own, self._taken, robot=robot)
         async with only.connected():
             await only.settled()
             sending = asyncio.create_task(self._outbox.run())
@@ -108,6 +111,12 @@ class Worker:
                     await asyncio.gather(sending, return_exceptions=True)
             if taken is not None:
                 raise RobotTaken(str(taken.exceptions[0]))
+
+    def _taken(self, others: str) -> RobotTaken:
+        return RobotTaken(
+            f"a worker of {self.spec.robot} is connected already ({others}): two would "
+            "both carry out each order; stop that one first"
+        )
 
     async def _serve(self, sending: asyncio.Task[None], group: asyncio.TaskGroup) -> None:
         await first_senses(self._embodiment)

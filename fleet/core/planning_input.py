@@ -114,6 +114,7 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
                 # What must hold until it is reached need not any longer.
                 always=() if goal.goal in reached else goal.always,
                 never=() if goal.goal in reached else goal.never,
+                sometime_before=state.goal_states[goal.goal].still_in_order(goal),
             )
             for goal in goals
         ),

@@ -6,7 +6,7 @@ from enum import Enum
 
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
-from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.goals import Condition, Precedence
 from keyexpr_schema.payloads.programs import Program
 
 
@@ -65,7 +65,8 @@ class Plan(Payload, frozen=True, kw_only=True):
 
     `revision` counts replans of the same plan from 1. `made_by` names planner and strategy.
     `conditions` are the facts that hold when the plan is done, goal by goal; `always` hold
-    before and after each of its tasks, and `never` at no such time.
+    before and after each of its tasks, and `never` at no such time. What of `sometime_before` is
+    second holds at no such time before which the first never did.
     `pins` maps actors to the robot that they must be; every other actor is free to allocate.
     """
 
@@ -84,6 +85,12 @@ class Plan(Payload, frozen=True, kw_only=True):
     """Objects that this plan only looks for; once one is found, a new revision goes on."""
     always: tuple[Condition, ...] = ()
     never: tuple[Condition, ...] = ()
+    sometime_before: tuple[Precedence, ...] = ()
+
+    @property
+    def is_constrained(self) -> bool:
+        """Whether it matters what holds on the way."""
+        return bool(self.always or self.never or self.sometime_before)
 
     @property
     def actors(self) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from dataclasses import replace as changed
-from typing import Any
+from typing import Any, TypeVar
 
 from msgspec.structs import replace
 
@@ -24,9 +24,9 @@ from fleet.planners.plan_repair import repair_plan
 from fleet.planners.programs.writer import with_programs
 from fleet.service.composition import Composition
 from fleet.service.planning.job_context import context_of, robots_under_way
-from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan
 
+T = TypeVar("T")
 PLANNERS_SHARE = 0.5
 """Of a job's time, how much its planner has; allocating and checking take the rest."""
 ALLOCATED_BY = 0.9
@@ -264,8 +264,11 @@ class _Run:
             conditions=_both(plan.conditions, (c for g in goals for c in g.conditions)),
             always=_both(plan.always, (c for g in goals for c in g.always)),
             never=_both(plan.never, (c for g in goals for c in g.never)),
+            sometime_before=_both(
+                plan.sometime_before, (row for g in goals for row in g.sometime_before)
+            ),
         )
 
 
-def _both(mine: Iterable[Condition], wanted: Iterable[Condition]) -> tuple[Condition, ...]:
+def _both(mine: Iterable[T], wanted: Iterable[T]) -> tuple[T, ...]:
     return tuple(dict.fromkeys([*mine, *wanted]))

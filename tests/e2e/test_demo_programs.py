@@ -1,4 +1,4 @@
-"""Both demonstrations with programs: orders carry several calls, and what is found ends a search."""
+"""Both demonstrations with programs: orders carry several calls; what is found ends a search."""
 
 from __future__ import annotations
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from keyexpr_schema.payloads.goals import *  # noqa: F403
     from keyexpr_schema.payloads.motions import *  # noqa: F403
     from keyexpr_schema.payloads.plans import *  # noqa: F403
+    from keyexpr_schema.payloads.programs import *  # noqa: F403
     from keyexpr_schema.payloads.requests import *  # noqa: F403
     from keyexpr_schema.payloads.robots import *  # noqa: F403
     from keyexpr_schema.payloads.simulation import *  # noqa: F403
@@ -40,8 +41,8 @@ else:
                 "UndecodablePayload Unreachable"
             ),
             "facts": (
-                "AT HELD HOLDING IN IS_OPEN LOCATED NOTHING ON REACHABLE SEARCHED FactKey Literal "
-                "Value parse_literal parse_value render_value"
+                "AT BLOCKED_BY HELD HOLDING IN IS_OPEN LOCATED NOTHING ON REACHABLE SEARCHED "
+                "FactKey Literal Value parse_literal parse_value render_value"
             ),
             "ids": "Id actor_arg check_id slug",
             "key": "Address Component Delivery Key Payload",
@@ -51,8 +52,8 @@ else:
                 "PLAN_STATUS TASK_RECORD PLAN_REQUEST REPLAN_REQUEST CONTROL_REQUEST ANSWER "
                 "PLANNER_STATUS PLANNER_ALIVE UNDECODABLE DIAGNOSTIC STORE_JOURNAL STORE_STAMPS "
                 "STORE_REPLACE STORE_CHANGES "
-                "SIM_MOTION SIM_SENSES SIM_CLOCK SIM_FRAMES SIM_SCENE SIM_TRUTH SIM_CONTACTS "
-                "KEYSPACE key_of"
+                "SIM_MOTION SIM_SENSES SIM_ALIVE SIM_CLOCK SIM_FRAMES SIM_SCENE SIM_TRUTH "
+                "SIM_CONTACTS KEYSPACE key_of"
             ),
             "payloads.durations": "Durations DurationsAddress Estimate",
             "payloads.goals": "Condition ENDED_GOALS Goal GoalAddress GoalState GoalStatus",
@@ -62,6 +63,7 @@ else:
             "payloads.plans": (
                 "ENDED_PLANS Making Plan PlanAddress PlanChange PlanState PlanStatus Task Violation"
             ),
+            "payloads.programs": "DO Program ProgramCall ProgramEnd ProgramStep ProgramTrace",
             "payloads.requests": (
                 "Answer Control ControlRequest PlanRequest ReplanRequest RequestAddress"
             ),

@@ -40,7 +40,11 @@ LOCATED = "located"
 HELD = "held"
 """Derived: whether a robot's hand holds an object."""
 REACHABLE = "reachable"
-"""Derived: whether an object can be seen and taken, because it is in nothing that is closed."""
+"""Derived: whether an object can be seen and taken, because it is in nothing that is closed, and
+nothing that is open is in the way."""
+BLOCKED_BY = "blocked_by"
+"""The thing that somebody found in the way of hands at a piece of furniture; it is so while it is
+open. What always is (a drawer of the one below) the thing itself says."""
 
 
 class FactKey(NamedTuple):

@@ -230,9 +230,14 @@ SIM_SENSES = Key(
     delivery=STREAM, writers=SIMULATION, readers=OWN_WORKER | PERSON,
     about="Odometry, hand and basket sensors of one simulated robot.",
 )
+SIM_ALIVE = Key(
+    "sim_alive", "sim/alive/{incarnation}", simulation.SimAliveAddress, robots.Alive,
+    delivery=TOKEN, writers=SIMULATION, readers=SIMULATION,
+    about="There while that run of the simulated world is connected: there is one to a realm.",
+)
 SIM_CLOCK = Key(
     "sim_clock", "sim/clock", simulation.SimAddress, simulation.SimClock,
-    delivery=STREAM, writers=SIMULATION, readers=PLANNER | WORKER | PERSON | RECORDER | SIMULATION,
+    delivery=STREAM, writers=SIMULATION, readers=PLANNER | WORKER | PERSON | RECORDER,
     about="Simulated time.",
 )
 SIM_FRAMES = Key(
@@ -242,7 +247,7 @@ SIM_FRAMES = Key(
 )
 SIM_SCENE = Key(
     "sim_scene", "sim/scene", simulation.SimAddress, simulation.Scene,
-    delivery=STORED, writers=SIMULATION, readers=PLANNER | SIMULATION | PERSON | RECORDER,
+    delivery=STORED, writers=SIMULATION, readers=PLANNER | PERSON | RECORDER,
     about="The shapes of every body, and where the fixed ones stand.",
 )
 SIM_TRUTH = Key(

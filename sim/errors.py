@@ -15,9 +15,20 @@ class BadFile(SimError):
     """A world, robot or mission file is missing or says something that cannot be."""
 
 
-class NoStance(SimError):
+class NoWay(SimError):
+    """A robot cannot get to where it can do what was asked.
+
+    `blocked_by` is the thing but for which it could, were that closed.
+    """
+
+    def __init__(self, sentence: str, blocked_by: str | None = None) -> None:
+        super().__init__(sentence)
+        self.blocked_by = blocked_by
+
+
+class NoStance(NoWay):
     """There is nowhere for the robot to stand from which it can do what was asked."""
 
 
-class NoPath(SimError):
+class NoPath(NoWay):
     """There is somewhere to stand, and no way for the robot to get there."""

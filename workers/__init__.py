@@ -23,8 +23,9 @@ else:
             "skill_context": "SkillContext",
             "embodiment": "Embodiment EmbodimentFactory SensingEmbodiment",
             "errors": (
-                "BadArguments BadSkill JournalBusy JournalUnreadable RobotTaken "
-                "RobotUnreachable SkillFailed UnknownSkill WorkerError WorkersEnded"
+                "BadArguments BadSkill JournalBusy JournalUnreadable ProgramRefused "
+                "ProgramStopped RobotTaken RobotUnreachable SkillFailed UnknownSkill "
+                "WorkerError WorkersEnded"
             ),
             "orders.journal": "Retention",
             "process": "run_worker run_workers",

@@ -44,6 +44,14 @@ class BadSkill(WorkerError):
     """Something that was offered as a skill (say, by an entry point) is not one."""
 
 
+class ProgramRefused(WorkerError):
+    """A skill program does not pass the checks before its start; nothing of it was run."""
+
+
+class ProgramStopped(WorkerError):
+    """A skill program broke a limit, asked for what no program may have, or raised something."""
+
+
 class JournalBusy(WorkerError):
     """Another process has the journal open: two workers for one robot must not be."""
 

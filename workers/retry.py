@@ -44,17 +44,20 @@ async def run_attempt(
     deadline_s: float,
     cancelled: asyncio.Event,
     on_failure: Callable[[SkillFailed], None] = lambda failure: None,
+    most_tries: int = MOST_TRIES,
+    started_s: float | None = None,
 ) -> Report:
-    """Run `once` until it returns, but at most `MOST_TRIES` times; `report` with how it ended.
+    """Run `once` until it returns, but at most `most_tries` times; `report` with how it ended.
 
     A try ends by returning (success), by `SkillFailed`, by any other exception (a bug in the
     skill: no further try), at the deadline (`deadline_s` fleet seconds after the start of the
     attempt), or when `cancelled` is set. After every try that did not succeed, and so before the
-    next one, `make_safe` is awaited. `on_failure` hears of every `SkillFailed`.
+    next one, `make_safe` is awaited. `on_failure` hears of every `SkillFailed`. `started_s` is when
+    the attempt started, if that was before now.
 
     Being cancelled itself, it stops the try and passes `CancelledError` on.
     """
-    started_s = now_s()
+    started_s = now_s() if started_s is None else started_s
     tries: list[Try] = []
     while True:
         began_s = now_s()
@@ -73,7 +76,7 @@ async def run_attempt(
         if failure is not None:
             await make_safe()
             ended_s = now_s()
-            if failure.again and number < MOST_TRIES:
+            if failure.again and number < most_tries:
                 continue
         return replace(
             report,

@@ -4,22 +4,27 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 
 from msgspec.structs import replace
 
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.facts import HOLDING, FactKey
-from keyexpr_schema.payloads.robots import RobotActivity, RobotSpec
+from keyexpr_schema.keyspace import ROBOT_ALIVE
+from keyexpr_schema.payloads.programs import ProgramEnd, ProgramTrace
+from keyexpr_schema.payloads.robots import AliveAddress, RobotActivity, RobotSpec
 from keyexpr_schema.payloads.tasks import Order, Report, ReportState
 from keyexpr_schema.transport.session import Session
 from workers.embodiment import Embodiment
 from workers.errors import BadArguments, RobotTaken, RobotUnreachable, UnknownSkill
-from workers.only_worker import OnlyWorker
+from workers.only_run import OnlyRun
 from workers.orders.fencing import Phase
-from workers.orders.journal import Journal
+from workers.orders.journal import FinishedCall, Journal
 from workers.orders.order_queue import OrderQueue
 from workers.orders.outbox import Outbox, make_report
+from workers.programs.run import ProgramRun
 from workers.recovery import (
     first_senses,
     make_safe,
@@ -27,10 +32,10 @@ from workers.recovery import (
     observe_robot,
     was_interrupted,
 )
-from workers.retry import run_attempt
+from workers.retry import MOST_TRIES, run_attempt
 from workers.shared_watch import SharedWatch
 from workers.skill_context import SkillContext
-from workers.skill_registry import SkillRegistry
+from workers.skill_registry import Skill, SkillRegistry
 from workers.state_publisher import StatePublisher
 
 DRAIN_S = 3.0
@@ -66,6 +71,9 @@ class Worker:
         self._outbox = Outbox(session, journal, embodiment.now_s)
         self._order_queue = OrderQueue(session, journal, self._outbox, spec.robot, incarnation)
         self._ready = asyncio.Event()
+        self._orders_known = asyncio.Event()
+        self._begun: list[Order] = []
+        """Programs that an earlier run of the worker had begun."""
         self._log = logging.getLogger(f"robotfleet.worker.{spec.robot}")
 
     async def ready(self) -> None:
@@ -81,7 +89,9 @@ class Worker:
         Raises:
             RobotTaken: another worker of this robot is connected.
         """
-        only = OnlyWorker(self._session, self.spec.robot, self.incarnation)
+        robot = self.spec.robot
+        own = AliveAddress(robot, self.incarnation)
+        only = OnlyRun(self._session, ROBOT_ALIVE, own, self._taken, robot=robot)
         async with only.connected():
             await only.settled()
             sending = asyncio.create_task(self._outbox.run())
@@ -101,6 +111,12 @@ class Worker:
                     await asyncio.gather(sending, return_exceptions=True)
             if taken is not None:
                 raise RobotTaken(str(taken.exceptions[0]))
+
+    def _taken(self, others: str) -> RobotTaken:
+        return RobotTaken(
+            f"a worker of {self.spec.robot} is connected already ({others}): two would "
+            "both carry out each order; stop that one first"
+        )
 
     async def _serve(self, sending: asyncio.Task[None], group: asyncio.TaskGroup) -> None:
         await first_senses(self._embodiment)
@@ -129,6 +145,7 @@ class Worker:
             for _ in range(arrivals.qsize()):
                 await self._order_queue.receive(*arrivals.get_nowait())
             self._order_queue.all_received()
+            self._orders_known.set()
             while True:
                 await self._order_queue.receive(*await arrivals.get())
 
@@ -171,12 +188,22 @@ class Worker:
         await observe_robot(ctx)
         self._journal.send(*ctx.observed)
         for attempt in ledger.in_phase(Phase.STARTED):
-            ctx = self._context()
-            await observe_after_crash(ctx, attempt.order)
-            reason = f"the worker of {self.spec.robot} went down while it did this"
-            report = make_report(attempt.order, self.incarnation, ReportState.STARTED)
-            self._end(attempt.order, self._interrupted(report, reason, ctx))
+            if attempt.order.program is not None:
+                self._begun.append(attempt.order)
+            else:
+                await self._end_interrupted(attempt.order)
         self._outbox.wake()
+
+    async def _end_interrupted(self, order: Order) -> None:
+        ctx = self._context()
+        await observe_after_crash(ctx, order)
+        reason = f"the worker of {self.spec.robot} went down while it did this"
+        report = make_report(order, self.incarnation, ReportState.STARTED)
+        if order.program is not None:
+            calls = tuple(finished.call for finished in self._journal.calls(order))
+            code, end = order.program.code, ProgramEnd.INTERRUPTED
+            report = replace(report, program=ProgramTrace(code=code, calls=calls, end=end))
+        self._end(order, self._interrupted(report, reason, ctx))
 
     def _context(self) -> SkillContext:
         return SkillContext(self._latest_spec(), self._embodiment, self._world)
@@ -195,50 +222,103 @@ class Worker:
         )
 
     async def _execute(self) -> None:
+        await self._orders_known.wait()
+        for order in self._begun:
+            if self._order_queue.resume(order):
+                await self._carry_out(order, self._journal.calls(order))
+            else:
+                await self._end_interrupted(order)
         while True:
             self._state_publisher.set_activity(RobotActivity.IDLE)
             await self._carry_out(await self._order_queue.next())
 
-    async def _carry_out(self, order: Order) -> None:
+    async def _carry_out(self, order: Order, finished: tuple[FinishedCall, ...] = ()) -> None:
+        ctx = self._context()
         try:
-            skill = self._registry.get(order.skill, self._latest_spec().skills)
-            arguments = skill.bind(order.args, self.spec.robot, self._world)
+            work = self._work_of(order, ctx, finished)
         except (UnknownSkill, BadArguments) as error:
             refused, reason = ReportState.REFUSED, str(error)
             self._end(order, make_report(order, self.incarnation, refused, reason, retryable=False))
             return
-        ctx = self._context()
         report = make_report(
             order, self.incarnation, ReportState.STARTED, started_s=self._embodiment.now_s()
         )
         self._journal.started(order, report)  # before anything moves
         self._outbox.wake()
         self._state_publisher.set_activity(RobotActivity.BUSY, order)
+        program = work if isinstance(work, ProgramRun) else None
         try:
             ended = await run_attempt(
                 report,
                 order.skill,
-                lambda: skill(ctx, **arguments),
+                work,
                 now_s=self._embodiment.now_s,
                 make_safe=lambda: make_safe(self._embodiment),
                 deadline_s=order.deadline_s,
                 cancelled=self._order_queue.cancelled,
                 on_failure=ctx.observe_failure,
+                most_tries=MOST_TRIES if program is None else 1,
+                started_s=finished[0].call.started_s if finished else None,
             )
         except asyncio.CancelledError:
             reason = f"the worker of {self.spec.robot} was stopped while it did this"
-            self._end(order, self._interrupted(report, reason, ctx))
+            self._end(order, _traced(self._interrupted(report, reason, ctx), program))
             raise
         try:
             # Others may go by the robot's state as soon as they have the report.
             await self._state_publisher.read_senses()
         finally:
-            self._end(order, replace(ended, facts=ctx.observed))
+            self._end(order, _traced(replace(ended, facts=ctx.observed), program))
+
+    def _work_of(
+        self, order: Order, ctx: SkillContext, finished: tuple[FinishedCall, ...]
+    ) -> Callable[[], Awaitable[None]]:
+        """What one try of an order is.
+
+        Raises:
+            UnknownSkill, BadArguments: there is nothing to try.
+        """
+        if order.program is None:
+            skill = self._registry.get(order.skill, self._latest_spec().skills)
+            arguments = skill.bind(order.args, self.spec.robot, self._world)
+            return lambda: skill(ctx, **arguments)
+        if not order.program.code:
+            raise BadArguments(f"{order.task}: the order brings no program for its sentence")
+
+        async def run_skill(called: Skill, given: dict[str, str | float]) -> Report:
+            return await run_attempt(
+                make_report(order, self.incarnation, ReportState.STARTED),
+                called.name,
+                lambda: called(ctx, **given),
+                now_s=self._embodiment.now_s,
+                make_safe=lambda: make_safe(self._embodiment),
+                deadline_s=math.inf,  # that of the order is over all of it
+                cancelled=asyncio.Event(),
+                on_failure=ctx.observe_failure,
+            )
+
+        def note(call: FinishedCall) -> None:
+            self._journal.called(order, call)
+            self._outbox.wake()
+
+        return ProgramRun(
+            order.program.code,
+            ctx,
+            self._registry,
+            lambda: self._latest_spec().skills,
+            run_skill,
+            note,
+            finished,
+        )
 
     def _end(self, order: Order, report: Report) -> None:
         """Write the end of an attempt into the journal; its facts and report go out from there."""
         self._journal.ended(order, report)
         self._outbox.wake()
+
+
+def _traced(report: Report, program: ProgramRun | None) -> Report:
+    return report if program is None else replace(report, program=program.trace)
 
 
 async def _propagate(task: asyncio.Task[None]) -> None:

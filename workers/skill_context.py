@@ -3,8 +3,19 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterable
 
-from keyexpr_schema.facts import AT, HOLDING, IS_OPEN, NOTHING, ON, FactKey, Literal, Value
+from keyexpr_schema.facts import (
+    AT,
+    BLOCKED_BY,
+    HOLDING,
+    IS_OPEN,
+    NOTHING,
+    ON,
+    FactKey,
+    Literal,
+    Value,
+)
 from keyexpr_schema.payloads.motions import (
     Detection,
     Motion,
@@ -17,7 +28,7 @@ from keyexpr_schema.payloads.motions import (
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from keyexpr_schema.payloads.world import Fact
 from workers.embodiment import Embodiment
-from workers.errors import SkillFailed
+from workers.errors import Observation, SkillFailed
 from workers.world_cache import WorldCache
 
 
@@ -51,6 +62,10 @@ class SkillContext:
         literal = Literal(FactKey(relation, subject), value)
         self._observed[literal.variable] = Fact.of(literal, self.robot, self.now_s)
 
+    def recall(self, facts: Iterable[Fact]) -> None:
+        """Take over what an earlier run of the worker had observed in this attempt."""
+        self._observed.update((fact.key, fact) for fact in facts)
+
     def observe_failure(self, failure: SkillFailed) -> None:
         """Take over the facts that a failure brought."""
         for relation, subject, value in failure.facts:
@@ -78,7 +93,8 @@ class SkillContext:
         """Perform one motion; returns when it has succeeded.
 
         Raises:
-            SkillFailed: it failed or was stopped; retryable, with the driver's own sentence.
+            SkillFailed: it failed or was stopped, with the driver's own sentence; retryable unless
+                something is in the way that is open, which is then a fact.
         """
         motion = Motion(
             kind=kind,
@@ -90,10 +106,18 @@ class SkillContext:
         )
         outcome = await self.embodiment.perform(motion)
         if outcome.state is not MotionState.SUCCEEDED:
-            raise SkillFailed(
-                outcome.reason or f"{kind.value} {outcome.state.value} without a reason"
-            )
+            reason = outcome.reason or f"{kind.value} {outcome.state.value} without a reason"
+            blocked = self._blocked(object, outcome.blocked_by)
+            raise SkillFailed(reason, retryable=not blocked, facts=blocked)
         return outcome
+
+    def _blocked(self, object: str | None, by: str | None) -> tuple[Observation, ...]:
+        """The facts that `by` is open and in the way of the furniture that a motion was about."""
+        around = () if object is None else (object, *self.world.carriers(object))
+        about = next((n for n in around if n in self.world.objects and not self.world.moves(n)), by)
+        if by is None or about is None or about == by:
+            return ()
+        return ((BLOCKED_BY, about, by), (IS_OPEN, by, True))
 
     async def look(self) -> tuple[Detection, ...]:
         """Look around. What is seen elsewhere than the facts say, or on another support, or in
@@ -132,6 +156,32 @@ class SkillContext:
                 self.observe(ON, held, None)
         return held
 
+    async def has_hand_for(self, object: str) -> bool:
+        """Whether the hand is empty; not if it holds `object` already, from an earlier try.
+
+        Raises:
+            SkillFailed: it holds something else.
+        """
+        held = await self.holding()
+        if held not in (None, object):
+            raise SkillFailed(
+                f"{self.robot} holds {held} already, one hand cannot take {object} too",
+                retryable=False,
+            )
+        return held is None
+
+    def observe_taken(self, object: str, held: str | None, where: str) -> None:
+        """Note what came of a grasp, after which the hand holds `held`.
+
+        Raises:
+            SkillFailed: it is not the object.
+        """
+        if held != object:
+            self.observe(AT, object, None)
+            raise SkillFailed(f"{object} was grasped {where} but slipped out of the hand")
+        self.observe(HOLDING, self.robot, object)
+        self.observe(AT, object, self.robot)
+
     async def be_in(self, place: str) -> Senses:
         """Make sure that the robot stands in `place`; drives there if it does not.
 
@@ -142,10 +192,10 @@ class SkillContext:
             SkillFailed: the way is not open.
         """
         senses = await self.embodiment.senses()
-        if senses.place != place:
+        if not self.world.within(senses.place, place):
             self.log(f"is in {senses.place or 'no place'}, not in {place}: goes there first")
             senses = (await self.do(MotionKind.GO_TO, place=place)).senses
-        self.observe(AT, self.robot, place)
+        self.observe(AT, self.robot, senses.place or place)
         return senses
 
     def known(self, relation: str, subject: str) -> Value:

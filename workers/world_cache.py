@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
-from keyexpr_schema.facts import AT, IS_OPEN, FactKey, Value
+from keyexpr_schema.facts import AT, BLOCKED_BY, IS_OPEN, FactKey, Value
 from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, ROBOT_SPEC, ROBOT_STATE
 from keyexpr_schema.payloads.motions import Detection
 from keyexpr_schema.payloads.robots import RobotSpec, RobotState
@@ -75,8 +75,8 @@ class WorldCache:
                 name
                 for name in self.objects
                 if self.moves(name)
-                and self.place_of(_word(self.value_of(AT, name))) == place
-                and not any(self.closed(c) for c in self.carriers(name))
+                and self.within(self.place_of(_word(self.value_of(AT, name))), place)
+                and not any(self.closed(c) or self.blocked(c) for c in self.carriers(name))
             )
         )
 
@@ -103,6 +103,12 @@ class WorldCache:
         opens = about is not None and about.is_a(Feature.OPENABLE)
         return opens and self.value_of(IS_OPEN, thing) is not True
 
+    def blocked(self, thing: str) -> bool:
+        """Whether something that is open is in the way of a thing and of what is in it."""
+        about = self.objects.get(thing)
+        others = (*(about.blocked_by if about else ()), self.value_of(BLOCKED_BY, thing))
+        return any(isinstance(o, str) and self.value_of(IS_OPEN, o) is True for o in others)
+
     def place_of(self, where: str | None) -> str | None:
         """The place where something is that is at `where`: a place, or a thing in one. A robot's
         basket is where it is; `None`: unknown."""
@@ -110,6 +116,18 @@ class WorldCache:
             return where
         found = self.carriers(where)
         return found[-1] if found and found[-1] in {*self.places, *self.specs} else None
+
+    def within(self, place: str | None, whole: str) -> bool:
+        """Whether a place is `whole`, or a part of it."""
+        return place is not None and whole in self._around(place)
+
+    def _around(self, place: str) -> tuple[str, ...]:
+        found = [place]
+        while (about := self.places.get(found[-1])) is not None and about.part_of is not None:
+            if about.part_of in found:
+                break
+            found.append(about.part_of)
+        return tuple(found)
 
     def whereabouts(self, seen: Detection) -> str | None:
         """The value of `at(object)` that a detection shows.
@@ -124,7 +142,8 @@ class WorldCache:
             if seen.place is not None:
                 return seen.place
             x_m, y_m, _ = seen.point_m
-            return next((p.place for p in self.places.values() if p.contains(x_m, y_m)), None)
+            found = [p.place for p in self.places.values() if p.contains(x_m, y_m)]
+            return max(found, key=lambda place: len(self._around(place)), default=None)
         for place in self.places.values():
             if any(surface.surface == seen.support for surface in place.surfaces):
                 return place.place

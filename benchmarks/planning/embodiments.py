@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
+from functools import partial
 
+from benchmarks.planning.household_world import Deed, HouseholdWorld
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState, Senses
-from sim.kinematic.backend import KinematicBackend
 
 
 class SharedWorld:
     """The backend, who waits for it, and every look that anybody took."""
 
-    def __init__(self, backend: KinematicBackend) -> None:
+    def __init__(self, backend: HouseholdWorld) -> None:
         self.backend = backend
         self.looks: list[tuple[str, float, float, str]] = []
         """Place, x [m], y [m], and the robot that looked."""
@@ -34,7 +36,19 @@ class SharedWorld:
 
     async def perform(self, robot: str, motion: Motion) -> MotionOutcome:
         """One motion, to its end."""
-        self.backend.begin(robot, motion)
+        outcome = await self._to_its_end(robot, partial(self.backend.begin, robot, motion))
+        if motion.kind is MotionKind.LOOK and outcome.state is MotionState.SUCCEEDED:
+            senses = outcome.senses
+            if senses.place is not None:
+                self.looks.append((senses.place, *senses.pose_m_rad[:2], robot))
+        return outcome
+
+    async def work(self, robot: str, takes_s: float, deed: Deed) -> MotionOutcome:
+        """One piece of work, to its end."""
+        return await self._to_its_end(robot, partial(self.backend.begin_work, robot, takes_s, deed))
+
+    async def _to_its_end(self, robot: str, begin: Callable[[], None]) -> MotionOutcome:
+        begin()
         outcome = self.backend.outcome(robot)
         assert outcome is not None
         if outcome.state is MotionState.RUNNING:
@@ -46,15 +60,11 @@ class SharedWorld:
                 self._waiting.pop(robot, None)
                 self.backend.stop(robot)
                 raise
-        if motion.kind is MotionKind.LOOK and outcome.state is MotionState.SUCCEEDED:
-            senses = outcome.senses
-            if senses.place is not None:
-                self.looks.append((senses.place, *senses.pose_m_rad[:2], robot))
         return outcome
 
 
 class KinematicEmbodiment:
-    """`workers.embodiment.Embodiment` for one robot of a shared world."""
+    """`workers.embodiment.Embodiment` for one robot of a shared world, and its work there."""
 
     def __init__(self, world: SharedWorld, robot: str) -> None:
         self.robot = robot
@@ -63,6 +73,14 @@ class KinematicEmbodiment:
     async def perform(self, motion: Motion) -> MotionOutcome:
         """Carry out `motion`; returns when it has ended."""
         return await self._world.perform(self.robot, motion)
+
+    async def work(self, takes_s: float, deed: Deed) -> MotionOutcome:
+        """Be at work for so long; what that does to the world happens at its end."""
+        return await self._world.work(self.robot, takes_s, deed)
+
+    async def perform_as(self, robot: str, motion: Motion) -> MotionOutcome:
+        """A motion of a partner, to its end."""
+        return await self._world.perform(robot, motion)
 
     async def senses(self) -> Senses:
         """What the robot knows of itself."""

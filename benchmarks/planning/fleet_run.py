@@ -11,29 +11,40 @@ from typing import Any
 
 from benchmarks.planning.embodiments import KinematicEmbodiment, SharedWorld
 from benchmarks.planning.expectations import GroundTruth
+from benchmarks.planning.household_world import HouseholdWorld
+from benchmarks.planning.mishaps import Mishap, Mishaps
 from benchmarks.planning.missions import Mission
 from benchmarks.planning.robot_worker import INCARNATION, RobotWorker
 from benchmarks.planning.simulated_time import Deadlock, SimulatedLoop
+from benchmarks.planning.tool_skills import TOOL_SKILLS
 from fleet.core import events
+from fleet.core.dispatch.dispatcher import next_timer
 from fleet.core.effects import Effect, Interpret, MakePlan, Publish, Retract
 from fleet.core.events import Event
-from fleet.core.state import Policy, State
+from fleet.core.model.skills import phrases_of
+from fleet.core.state import LOGIC, Policy, State
 from fleet.core.step import step
 from fleet.planners import LlmInterpreter
 from fleet.service.composition import Composition
 from fleet.service.planning.planning_job import run_planning_job
-from fleet.service.skill_models import load_all_skills
 from keyexpr_schema.facts import AT, ON
 from keyexpr_schema.keyspace import FACT, OBJECT, ORDER, PLACE, ROBOT_SPEC, ROBOT_STATE
-from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal
-from keyexpr_schema.payloads.plans import ENDED_PLANS
-from keyexpr_schema.payloads.requests import PlanRequest
+from keyexpr_schema.payloads.goals import GoalStatus
+from keyexpr_schema.payloads.plans import ENDED_PLANS, PlanStatus
+from keyexpr_schema.payloads.requests import Answer, PlanRequest
 from keyexpr_schema.payloads.robots import RobotActivity, RobotAddress, RobotState
 from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Report, ReportState
-from keyexpr_schema.payloads.world import Fact, FactAddress, ObjectAddress, PlaceAddress, Statement
+from keyexpr_schema.payloads.world import (
+    Fact,
+    FactAddress,
+    Feature,
+    ObjectAddress,
+    PlaceAddress,
+    Statement,
+)
 from keyexpr_schema.transport.watch import Change
 from sim.files.world_payloads import object_payloads
-from sim.kinematic.backend import KinematicBackend
+from sim.kinematic.backend import MotionModel
 from workers.skill_registry import SkillRegistry
 from workers.skills.household import HOUSEHOLD
 from workers.world_cache import WorldCache
@@ -45,7 +56,7 @@ MOST_REVISIONS = 60
 
 @dataclass
 class Counts:
-    """What a mission took. `planning_s` is wall time, over all revisions."""
+    """What a mission took. `planning_s` is CPU time, over all revisions."""
 
     tasks: int = 0
     failed_tasks: int = 0
@@ -75,9 +86,18 @@ class FleetRun:
         self.counts = Counts()
         self.stage = 0
         """How many of the mission's stages have held, in their order."""
+        self.goals: dict[str, GoalStatus] = {}
+        """What was last said of each goal: what is over leaves the planner's state."""
+        self._plans: dict[str, PlanStatus] = {}
+        self._answers: dict[str, Answer] = {}
         self._composition, self._planner, self._strategy = composition, planner, strategy
         self._interpreter = interpreter
-        self.backend = KinematicBackend(mission.existing_world(), mission.robots, seed=SEED)
+        self.backend = HouseholdWorld(
+            mission.existing_world(),
+            mission.robots,
+            MotionModel(failures=mission.entry.failures),
+            seed=SEED,
+        )
         self.shared = SharedWorld(self.backend)
         self._ended: asyncio.Future[None] = loop.create_future()
         loop.drive(
@@ -86,7 +106,7 @@ class FleetRun:
         )
         self._places = {place.place: place for place in mission.places}
         self._world = WorldCache()
-        registry = SkillRegistry(HOUSEHOLD)
+        registry = SkillRegistry((*HOUSEHOLD, *TOOL_SKILLS))
         self._robots = {
             spec.robot: RobotWorker(
                 spec,
@@ -97,6 +117,9 @@ class FleetRun:
             )
             for spec, _ in mission.robots
         }
+        self._working: dict[str, asyncio.Future[None]] = {}
+        self._mishaps = Mishaps(mission.entry)
+        self._broken: dict[str, None] = {}
         self._pending: deque[Event] = deque()
         self._busy = False
 
@@ -109,27 +132,25 @@ class FleetRun:
         for robot in self._robots.values():
             await robot.introduce_itself()
         self._put_beliefs()
-        working = [asyncio.ensure_future(robot.work()) for robot in self._robots.values()]
-        for number, text in enumerate(self.mission.entry.goals, 1):
-            self._handle(
-                events.GoalPut, goal=Goal(goal=f"goal_{number}", text=text, ordinal=number)
-            )
+        self._working = {
+            name: asyncio.ensure_future(robot.work()) for name, robot in self._robots.items()
+        }
+        for goal in self.mission.goals:
+            self._handle(events.GoalPut, goal=goal)
         request = PlanRequest(request="r1", planner=self._planner, strategy=self._strategy)
         self._handle(events.PlanRequested, request=request)
-        self._advance_stage()
+        self._observe_conduct()
         wrong: str | None = None
         try:
             if not self._done():
                 await self._ended
         except (Deadlock, TimeoutError) as error:
             wrong = str(error)
-        for task in working:
+        for task in self._working.values():
             task.cancel()
         with suppress(asyncio.CancelledError):
-            await asyncio.gather(*working)
-        for entry in self.state.plans.values():
-            if entry.reason:
-                self.counts.reasons.append(entry.reason)
+            await asyncio.gather(*self._working.values())
+        self.counts.reasons += [plan.reason for plan in self._plans.values() if plan.reason]
         return wrong
 
     def ground_truth(self) -> GroundTruth:
@@ -141,36 +162,72 @@ class FleetRun:
             places=self._places,
             believed=dict(self.state.vocabulary().whereabouts),
             looks=[(place, x, y, see_m[robot]) for place, x, y, robot in self.shared.looks],
+            parts={name: thing.part_of for name, thing in self.backend.things.items()},
+            state_of=self.backend.state_of,
         )
 
     def refusals(self) -> list[str]:
         """Why goals were not reached and requests were refused, as the fleet puts it."""
         reasons = [
-            f"{status.goal}: {status.reason}"
-            for status in self.state.goal_states.values()
-            if status.reason
+            f"{status.goal}: {status.reason}" for status in self.goals.values() if status.reason
         ]
-        reasons += [a.sentence for a in self.state.answers.values() if not a.accepted]
-        reasons += [b.reason for b in self.state.plans.values() if b.reason]
+        reasons += [a.sentence for a in self._answers.values() if not a.accepted]
+        reasons += [plan.reason for plan in self._plans.values() if plan.reason]
         return list(dict.fromkeys(reasons))
 
     # --- the world goes on -----------------------------------------------------------------------
 
     def _advance(self) -> float | None:
+        before_s = self.backend.time_s
         passed_s = self.shared.advance()
+        if passed_s is None and self._due_s() is not None:
+            self.backend.advance()  # nothing moves, and time will change something
+            passed_s = self.backend.time_s - before_s
         if passed_s is not None:
             self._update_robots()
-            self._advance_stage()
+            self._let_happen()
+            self._observe_conduct()
             if self.backend.time_s > MOST_SIMULATED_S:
                 self._fail(TimeoutError(f"not done after {MOST_SIMULATED_S:g} simulated seconds"))
         return passed_s
 
-    def _advance_stage(self) -> None:
+    def _due_s(self) -> float | None:
+        """When time alone changes something."""
+        times = (self._mishaps.next_s, next_timer(self.state))
+        return min((at_s for at_s in times if at_s is not None), default=None)
+
+    def _let_happen(self) -> None:
+        """What goes wrong by now, and what the planner waits for."""
+        for what, name in self._mishaps.due(self.backend.time_s):
+            if what is Mishap.DIES:
+                self._working[name].cancel()
+                self._handle(events.WorkerDisconnected, robot=name, incarnation=INCARNATION)
+            elif what is Mishap.UNREGISTERED:
+                self._handle(events.RobotUnregistered, robot=name)
+            else:
+                self.backend.put(name, self.mission.entry.moves[name].to)
+        due_s = next_timer(self.state)
+        if due_s is not None and due_s <= self.backend.time_s:
+            self._handle(events.TimerFired)
+
+    def _observe_conduct(self) -> None:
+        """Note which stages have come to be, and what holds that never should."""
         stages, ground_truth = self.mission.stages, self.ground_truth()
         while self.stage < len(stages) and all(
             ground_truth.satisfies(one) for one in stages[self.stage]
         ):
             self.stage += 1
+        for one in self.mission.never:
+            if ground_truth.satisfies(one):
+                self._broken[f"it was so on the way: {one.text}"] = None
+        for one in self.mission.always:
+            if not ground_truth.satisfies(one):
+                self._broken[f"it was not so on the way: {one.text}"] = None
+
+    @property
+    def misconduct(self) -> tuple[str, ...]:
+        """What should have held all the time and did not, as sentences."""
+        return tuple(self._broken)
 
     def _fail(self, error: Exception) -> None:
         if not self._ended.done():
@@ -195,13 +252,18 @@ class FleetRun:
     # --- what the planner receives ---------------------------------------------------------------
 
     def _introduce(self) -> None:
-        policy = Policy(interpreter=self._interpreter is not None)
+        policy = Policy(
+            interpreter=self._interpreter is not None,
+            skill_phrases=phrases_of(self.mission.skills),
+        )
         self._handle(
             events.PlannerStarted,
             epoch=1,
             incarnation=INCARNATION,
             policy=policy,
-            skills=load_all_skills(),
+            skills=self.mission.skills,
+            logic=LOGIC,
+            lineage=INCARNATION,
         )
         for place in self._places.values():
             self._world.apply(Change(PLACE, PlaceAddress(place.place), place, ""))
@@ -219,7 +281,12 @@ class FleetRun:
         for thing, place in self.mission.believed_places().items():
             self._put_fact(Fact(subject=thing, relation=AT, value=place, source="person"))
         for thing, surface in self.mission.believed_supports().items():
-            self._put_fact(Fact(subject=thing, relation=ON, value=surface, source="person"))
+            below = self.backend.things.get(surface)
+            inside = below is not None and not below.is_a(Feature.SUPPORTS)
+            relation = AT if inside else ON
+            self._put_fact(Fact(subject=thing, relation=relation, value=surface, source="person"))
+        for fact in self.mission.believed_states():
+            self._put_fact(fact)
         for number, text in enumerate(self.mission.entry.statements, 1):
             self._handle(
                 events.StatementPut, statement=Statement(statement=f"statement_{number}", text=text)
@@ -250,10 +317,6 @@ class FleetRun:
             entry.outstanding() for entry in entries
         )
 
-    def goals_ended(self) -> bool:
-        """Whether every goal has come to an end, good or bad."""
-        return all(s.state in ENDED_GOALS for s in self.state.goal_states.values())
-
     def _handle(self, kind: type[Event], **fields: Any) -> None:
         """One event into the core; what it causes follows, until there is nothing left to do."""
         self._pending.append(kind(**self._at(), **fields))
@@ -282,6 +345,12 @@ class FleetRun:
         elif isinstance(effect, Publish) and effect.key is ORDER:
             payload: Any = effect.payload
             self._robots[payload.robot].order(payload)
+        elif isinstance(effect, Publish) and isinstance(effect.payload, GoalStatus):
+            self.goals[effect.payload.goal] = effect.payload
+        elif isinstance(effect, Publish) and isinstance(effect.payload, PlanStatus):
+            self._plans[effect.payload.plan] = effect.payload
+        elif isinstance(effect, Publish) and isinstance(effect.payload, Answer):
+            self._answers[effect.payload.request] = effect.payload
         elif isinstance(effect, Publish) and effect.key is FACT:
             self._world.apply(Change(FACT, effect.address, effect.payload, ""))
 
@@ -290,9 +359,9 @@ class FleetRun:
         if self.counts.revisions >= MOST_REVISIONS:
             self._fail(TimeoutError(f"not done after {MOST_REVISIONS} revisions"))
             return
-        began_s = time.perf_counter()
+        began_s = time.process_time()
         made = run_planning_job(effect.given, self._composition)
-        self.counts.planning_s += time.perf_counter() - began_s
+        self.counts.planning_s += time.process_time() - began_s
         self.counts.revisions += 1
         if isinstance(made, events.PlanningSucceeded):
             making = made.plan.making
@@ -305,10 +374,10 @@ class FleetRun:
 
     def _interpret(self, effect: Interpret) -> None:
         assert self._interpreter is not None
-        began_s = time.perf_counter()
+        began_s = time.process_time()
         given = effect.given
         read = self._interpreter.interpret(given.text, given.vocabulary, given.skills)
-        self.counts.planning_s += time.perf_counter() - began_s
+        self.counts.planning_s += time.process_time() - began_s
         answer: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
         answer |= self._at()
         self._pending.append(events.GoalInterpreted(goal=given.goal, text=given.text, **answer))

@@ -1,8 +1,9 @@
 """Plans of small scenes beside the least makespan there is.
 
-`python -m benchmarks.planning.small_scenes [--scenes 20] [--seed 1] [--limit 60]`: a handful of
-things to be brought from room to room by hands and carriers (or hands alone), planned and allocated
-as the planner does it, and the least makespan by CP-SAT beside it.
+`python -m benchmarks.planning.small_scenes [--scenes 20] [--seed 1] [--seeds 1] [--limit 60]`: a
+handful of things to be brought from room to room by hands and carriers (or hands alone), planned
+and allocated as the planner does it, and the least makespan by CP-SAT beside it. With several
+seeds, a row for each.
 """
 
 from __future__ import annotations
@@ -140,24 +141,33 @@ class Compared:
         return self.planned_s / self.optimum.makespan_s
 
 
+def compared(made: Scene, parts: Composition, limit_s: float) -> Compared:
+    """A scene's plan beside the optimum, for which CP-SAT has so long."""
+    least = least_makespan(made.world, made.goals, UNLOADING_S, limit_s)
+    return Compared(made.name, planned_s(made, parts), least)
+
+
 def main() -> None:
     """Print the tables."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--scenes", type=int, default=20)
-    options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--seed", type=int, default=1, help="the first")
+    options.add_argument("--seeds", type=int, default=1, help="how many")
     options.add_argument("--limit", type=float, default=60.0, help="of CP-SAT for a scene, s")
     chosen = options.parse_args()
     console, parts = Console(width=120), compose()
     for carriers in (True, False):
-        rows = [
-            Compared(
-                made.name,
-                planned_s(made, parts),
-                least_makespan(made.world, made.goals, UNLOADING_S, chosen.limit),
-            )
-            for made in scenes(chosen.scenes, chosen.seed, carriers)
-        ]
-        console.print(_table(rows, "with carriers" if carriers else "hands only"))
+        title = "with carriers" if carriers else "hands only"
+        by_seed = {
+            seed: [
+                compared(made, parts, chosen.limit)
+                for made in scenes(chosen.scenes, seed, carriers)
+            ]
+            for seed in range(chosen.seed, chosen.seed + chosen.seeds)
+        }
+        console.print(
+            _table(by_seed[chosen.seed], title) if chosen.seeds == 1 else _summary(by_seed, title)
+        )
 
 
 def _table(rows: list[Compared], title: str) -> Table:
@@ -172,6 +182,17 @@ def _table(rows: list[Compared], title: str) -> Table:
     if ratios:
         table.add_row("mean", "", "", "", f"{mean(ratios):.3f}")
         table.add_row("worst", "", "", "", f"{max(ratios):.3f}")
+    return table
+
+
+def _summary(by_seed: dict[int, list[Compared]], title: str) -> Table:
+    table = Table("seed", "scenes", "planned", "proven", "mean", "worst", title=title)
+    everything = [row for rows in by_seed.values() for row in rows]
+    for name, rows in (*by_seed.items(), ("all", everything)):
+        ratios = [row.ratio for row in rows if row.ratio is not None]
+        proven = sum(row.optimum is not None and row.optimum.proven for row in rows)
+        numbers = (f"{mean(ratios):.3f}", f"{max(ratios):.3f}") if ratios else ("", "")
+        table.add_row(str(name), str(len(rows)), str(len(ratios)), str(proven), *numbers)
     return table
 
 

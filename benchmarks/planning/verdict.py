@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 import msgspec
 
+from benchmarks.planning.expectations import GroundTruth
 from benchmarks.planning.fleet_run import FleetRun
 from benchmarks.planning.missions import Mission
 from benchmarks.planning.simulated_time import SimulatedLoop, run
 from fleet.planners import LlmInterpreter
 from fleet.service.composition import Composition
+from keyexpr_schema.facts import IS_OPEN
 from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.simulation import Truth
+from sim.states import ThingStates
 
 
 class MissionResult(msgspec.Struct, frozen=True, kw_only=True):
     """How one mission went. `faults` lists what should be so and is not; empty is success.
 
-    `planning_s` is wall time; `makespan_s` simulated. `tasks` counts the tasks that robots began.
+    `planning_s` is CPU time; `makespan_s` simulated. `tasks` counts the tasks that robots began.
     """
 
     mission: str
@@ -88,23 +92,51 @@ def _faults(mission: Mission, fleet: FleetRun) -> Iterator[str]:
             yield f"not so: {expected.text}"
     for number, stage in enumerate(mission.stages[fleet.stage :], fleet.stage + 1):
         yield f"stage {number} never came to be: {', '.join(expected.text for expected in stage)}"
-    named = {
-        subject
-        for expected in (*mission.final, *(e for stage in mission.stages for e in stage))
-        if expected.form != "known"
-        for subject in expected.subjects
-    }
-    for thing in ground_truth.objects:
-        if thing not in named and ground_truth.place_of(thing) != mission.start_of(thing):
-            yield f"moved for no reason: {thing} is in {ground_truth.place_of(thing) or 'a hand'}"
-    reached = [s.state is GoalState.REACHED for s in fleet.state.goal_states.values()]
+    yield from fleet.misconduct
+    yield from _changed_for_no_reason(mission, ground_truth)
+    reached = [s.state is GoalState.REACHED for s in fleet.goals.values()]
     if outcome == "done":
-        if not all(reached):
+        if len(reached) < len(mission.goals) or not all(reached):
             yield "the planner does not say that every goal is reached"
         return
     if all(reached):
         yield f"it should be {outcome}, and the planner says that every goal is reached"
-    if not fleet.refusals():
+    reasons = " ".join(fleet.refusals()).lower()
+    if not reasons:
         yield f"it should be {outcome} with a reason, and there is none"
+    elif missing := [word for word in mission.entry.says if word.lower() not in reasons]:
+        yield f"the reasons do not say {', '.join(missing)}"
     if outcome == "refused" and fleet.counts.tasks:
         yield f"it should be refused, and robots began {fleet.counts.tasks} tasks"
+
+
+def _changed_for_no_reason(mission: Mission, ground_truth: GroundTruth) -> Iterator[str]:
+    """Things that lie elsewhere, and states that are otherwise, that no phrase speaks of."""
+    phrases = (*mission.final, *(e for stage in mission.stages for e in stage))
+    named = {s for e in phrases if e.form != "known" for s in e.subjects}
+    named |= {*mission.entry.may_change, *mission.entry.moves}
+    before = ThingStates(mission.existing_world())
+    for thing, now in ground_truth.objects.items():
+        if thing in named:
+            continue
+        place = ground_truth.place_of(thing)
+        if thing in mission.world.object_entries and (place, now.support) != (
+            mission.start_of(thing),
+            mission.start_carrier(thing),
+        ):
+            if place is None:
+                yield f"moved for no reason: {thing} is in a hand"
+            elif not _carried_along(ground_truth, now, named):
+                yield f"moved for no reason: {thing} is at {now.support} in {place}"
+        for state, value in now.states.items():
+            # Doors may be left open.
+            if state != IS_OPEN and value != before.get(thing, state):
+                yield f"changed for no reason: {state}({thing}) is {value}"
+
+
+def _carried_along(ground_truth: GroundTruth, thing: Truth, named: Collection[str]) -> bool:
+    """Whether what it is on or in was to be moved."""
+    below = ground_truth.objects.get(thing.support or "")
+    return below is not None and (
+        below.object in named or _carried_along(ground_truth, below, named)
+    )

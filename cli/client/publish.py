@@ -23,7 +23,7 @@ from keyexpr_schema.keyspace import (
     SIM_SCENE,
     STATEMENT,
 )
-from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress, Precedence
 from keyexpr_schema.payloads.world import (
     Fact,
     FactAddress,
@@ -127,6 +127,7 @@ async def put_goal(
     speaker: str | None = None,
     always: Sequence[Condition] = (),
     never: Sequence[Condition] = (),
+    sometime_before: Sequence[Precedence] = (),
 ) -> Goal:
     """Store a goal, confirmed, after all that were given before it; due `within_s` from now [s].
 
@@ -157,6 +158,7 @@ async def put_goal(
             speaker=speaker,
             always=tuple(always),
             never=tuple(never),
+            sometime_before=tuple(sometime_before),
         )
         address = GoalAddress(spec.goal)
         if spec.goal not in stored and await session.create(GOAL_SPEC, address, spec):

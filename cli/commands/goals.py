@@ -51,6 +51,14 @@ async def add(
         list[str] | None,
         typer.Option("--never", metavar="CONDITION", help="What must not hold; repeatable."),
     ] = None,
+    before: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--before",
+            metavar="'CONDITION before CONDITION'",
+            help="What must have held before something else may; repeatable.",
+        ),
+    ] = None,
     plan: Annotated[
         bool, typer.Option("--plan", help="Have it planned and carried out at once.")
     ] = False,
@@ -65,7 +73,7 @@ async def add(
     from cli.client.presence import planner_alive
     from cli.client.publish import put_goal
     from cli.errors import NotRunning, Refused
-    from cli.plans.worlds import parse_condition
+    from cli.plans.worlds import parse_condition, parse_precedence
     from cli.views.goals import GoalRow
     from keyexpr_schema.keyspace import GOAL_STATUS
     from keyexpr_schema.payloads.goals import GoalState
@@ -77,8 +85,11 @@ async def add(
                 "no planner is running, so the goal was not stored; start one with "
                 "`robotctl planner`, or leave --plan out"
             )
-        constraints = [[parse_condition(row) for row in rows or ()] for rows in (always, never)]
-        spec = await put_goal(session, text, name, priority, within_s, speaker, *constraints)
+        kept, avoided = ([parse_condition(row) for row in rows or ()] for rows in (always, never))
+        in_order = [parse_precedence(row) for row in before or ()]
+        spec = await put_goal(
+            session, text, name, priority, within_s, speaker, kept, avoided, in_order
+        )
         if not (wait or plan) and not await planner_alive(session):
             call.show(
                 GoalRow(goal=spec.goal, spec=spec, status=None),

@@ -62,11 +62,13 @@ async def show(
     def draw() -> RenderableType:
         from rich.console import Group
 
+        from cli.views.programs import program_lines
         from cli.views.tasks import reports_table, tasks_table
 
         parts: list[RenderableType] = [tasks_table([record])]
         if reports:
             parts += ["", reports_table(reports)]
+        parts += program_lines(record, reports)
         return Group(*parts)
 
     call.show({"task": record, "orders": orders, "reports": reports}, draw)
@@ -89,7 +91,11 @@ async def add(
         str | None, typer.Option("--robot", help="Who shall do it; else it is allocated.")
     ] = None,
 ) -> None:
-    """Add a task to a plan; the planner checks it like any other."""
+    """Add a task to a plan; the planner checks it like any other.
+
+    With `do robot=hsr text="bring cup 1 to the hallway"` a sentence for a robot: it is carried out
+    by a program.
+    """
     from cli.client.planner_requests import (
         ask_planner,
         check_plan,
@@ -100,6 +106,7 @@ async def add(
     from cli.errors import check_known
     from keyexpr_schema.keyspace import PLAN_SPEC
     from keyexpr_schema.payloads.plans import PlanAddress
+    from keyexpr_schema.payloads.programs import DO
     from keyexpr_schema.payloads.requests import Control, ControlRequest
 
     given = parse_args(args or [])
@@ -112,7 +119,7 @@ async def add(
             await check_robot(session, robot)
         can = await planner_status(session)
         if can is not None and can.skills:
-            check_known("skill", skill, can.skills)
+            check_known("skill", skill, (DO, *can.skills))
         answer = await ask_planner(
             session,
             ControlRequest(

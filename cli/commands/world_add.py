@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cli.command import Call
+
+if TYPE_CHECKING:
+    from keyexpr_schema.transport.session import Session
 
 _GOES_WITH = {
     "--id": ("a sentence",),
@@ -100,7 +103,7 @@ async def add(
     from cli.client.planner_requests import statement_status
     from cli.client.publish import put_fact, put_statement
     from cli.client.world import put_object, put_place
-    from cli.errors import BadArgument
+    from cli.errors import BadArgument, Refused
     from cli.views.text import statement_means
 
     _check_options(
@@ -148,11 +151,17 @@ async def add(
             )
             call.show(room, lambda: f"stored place {room.place}: “{room.label}”")
         elif fact:
+            await _check_declared(session, *words)
             stated = await put_fact(session, *words)
             call.show(stated, lambda: f"stored {stated.literal}")
         else:
             statement = await put_statement(session, " ".join(words), name)
             status = await statement_status(session, statement.statement)
+            if status is not None and not status.facts:
+                raise Refused(
+                    f"statement {statement.statement} is kept as it was said, “{statement.text}”"
+                    f"{statement_means(status)}"
+                )
             call.show(
                 {"statement": statement, "status": status},
                 lambda: (
@@ -160,6 +169,24 @@ async def add(
                     f"{statement_means(status)}"
                 ),
             )
+
+
+async def _check_declared(session: Session, relation: str, subject: str, written: str) -> None:
+    """Hold a fact against what the skill files here declare of its relation.
+
+    Raises:
+        BadArgument: they declare it for other things, or other values.
+    """
+    from cli.errors import BadArgument
+    from cli.plans.worlds import world_of_fleet
+    from fleet.core.model.declarations import misfit
+    from fleet.service.skill_models import load_all_skills
+    from keyexpr_schema.facts import FactKey, Literal, parse_value
+
+    world = await world_of_fleet(session, load_all_skills(), only_connected=False)
+    wrong = misfit(Literal(FactKey(relation, subject), parse_value(written)), world)
+    if wrong is not None:
+        raise BadArgument(wrong)
 
 
 def _check_options(

@@ -76,6 +76,7 @@ class Demo:
                 strategy=asked.strategy or default.strategy,
                 planner=asked.planner or default.planner,
                 allocator=asked.allocator or default.allocator,
+                programs=self.options.programs,
             ),
             PLAN_S,
         )
@@ -134,7 +135,8 @@ class Demo:
             thing: fact.value for (relation, thing), fact in view.facts.items() if relation == AT
         }
         objects = {thing.object: thing for thing in object_payloads(self.mission.world)}
-        verdicts = goal_verdicts(self._statuses(), view.truths, places, beliefs, objects)
+        wholes = {name: entry.part_of for name, entry in self.mission.world.place_entries.items()}
+        verdicts = goal_verdicts(self._statuses(), view.truths, places, beliefs, objects, wholes)
         records = list(view.tasks.values())
         makespan_s, busy_s, idle_s = times(records, robots)
         recording = self.options.out / RECORDING

@@ -12,7 +12,7 @@ from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import AT, HOLDING, NOTHING, parse_literal
 from keyexpr_schema.keyspace import FACT, OBJECT, PLACE, ROBOT_SPEC
-from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.goals import Condition, Precedence
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact
 
@@ -87,6 +87,21 @@ def parse_condition(written: str) -> Condition:
         )
     (relation, subject), value = literal
     return Condition(relation=relation, subject=subject, value=value)
+
+
+def parse_precedence(written: str) -> Precedence:
+    """`at cup_1 sink before at cup_1 table`: if ever the second holds, the first did before.
+
+    Raises:
+        BadArgument: it is not that.
+    """
+    first, between, then = written.partition(" before ")
+    if not between:
+        raise BadArgument(
+            "what must hold before something else is 'CONDITION before CONDITION', such as "
+            f"'is_open fridge false before at cup_1 hallway'; got {written!r}"
+        )
+    return Precedence(first=parse_condition(first), then=parse_condition(then))
 
 
 def parse_fact(written: str) -> Fact:

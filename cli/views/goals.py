@@ -57,6 +57,11 @@ def goal_page(row: GoalRow) -> Group:
         if row.spec.speaker is not None:
             lines.append(Text(f"said by     {row.spec.speaker}"))
         lines.append(Text(f"priority    {row.spec.priority}"))
+        rows = (("always", row.spec.always), ("never", row.spec.never))
+        lines += [Text(f"{word:<12}{each}") for word, all_ in rows for each in all_]
+        for each in row.spec.sometime_before:
+            done = "  (it has)" if status and each.first in status.passed else ""
+            lines.append(Text(f"in order    {each}{done}"))
         if row.spec.due_s is not None:
             lines.append(Text(f"due         {seconds(row.spec.due_s)} on the fleet's clock"))
     if status is None:

@@ -12,6 +12,7 @@ from dataclasses import replace as changed
 import msgspec
 from msgspec.structs import replace
 
+from fleet.core.model.preconditions import action_of
 from fleet.core.model.skills import SkillModel, Skills
 from fleet.core.model.world import Hopeless, WorldModel
 from fleet.core.plan_entry import PlanningJob
@@ -113,6 +114,7 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
                 # What must hold until it is reached need not any longer.
                 always=() if goal.goal in reached else goal.always,
                 never=() if goal.goal in reached else goal.never,
+                sometime_before=state.goal_states[goal.goal].still_in_order(goal),
             )
             for goal in goals
         ),
@@ -164,8 +166,9 @@ def _searched(records: Iterable[TaskRecord], skills: Skills) -> tuple[str, ...]:
         dict.fromkeys(
             literal.variable.subject
             for record in records
-            if record.state is TaskState.SUCCEEDED and record.skill in skills
-            for literal in skills[record.skill].ground(record.args).after
+            if record.state is TaskState.SUCCEEDED
+            and (action := action_of(record, skills)) is not None
+            for literal in action.after
             if literal.variable.relation == SEARCHED
         )
     )

@@ -10,6 +10,7 @@ import msgspec
 from keyexpr_schema.facts import FactKey
 from keyexpr_schema.ids import actor_arg
 from keyexpr_schema.payloads.plans import Task
+from keyexpr_schema.payloads.programs import Program
 
 
 class ReplanScope(Enum):
@@ -79,6 +80,7 @@ class TaskAdded(_Wish, frozen=True, kw_only=True):
     args: dict[str, str]
     after: tuple[str, ...] = ()
     robot: str | None = None
+    program: Program | None = None
 
     @property
     def goals(self) -> tuple[str, ...]:
@@ -99,6 +101,7 @@ class TaskAdded(_Wish, frozen=True, kw_only=True):
             args={"robot": actor_arg(f"x{number}"), **self.args},
             actor=f"x{number}",
             after=self.after,
+            program=self.program,
         )
 
 

@@ -23,7 +23,7 @@ from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
-LOGIC = 3
+LOGIC = 4
 """Counts up whenever the core comes to handle an event otherwise than before."""
 
 

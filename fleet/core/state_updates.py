@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from fleet.core.belief_updates import touched_carriers
 from fleet.core.indexes.fleet_index import (
     UNPLANNED,
+    constrained_subjects,
     in_set,
     priority_of,
     subjects_of,
@@ -23,7 +24,13 @@ from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.state import State
 from fleet.core.table import Table
-from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.goals import (
+    ENDED_GOALS,
+    Condition,
+    Goal,
+    GoalState,
+    GoalStatus,
+)
 from keyexpr_schema.payloads.plans import Plan, PlanState, Violation
 from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
@@ -46,6 +53,7 @@ def set_goal(state: State, status: GoalStatus) -> State:
 
 def set_spec(state: State, goal: Goal) -> State:
     """Keep what somebody wants; plans for it may get another priority."""
+    state = _constraints_changed(state, goal.goal, goal)
     state = replace(state, goals=state.goals.set(goal.goal, goal))
     active = state.index.active
     for plan in state.index.plans_of.get(goal.goal, ()):
@@ -53,8 +61,19 @@ def set_spec(state: State, goal: Goal) -> State:
     return replace(state, index=replace(state.index, active=active))
 
 
+def _constraints_changed(state: State, goal: str, spec: Goal | None) -> State:
+    about = state.index.goals_watching
+    was, now = constrained_subjects(state.goals.get(goal)), constrained_subjects(spec)
+    for subject in was ^ now:
+        about = in_set(about, subject, goal, subject in now)
+    if about is state.index.goals_watching:
+        return state
+    return replace(state, index=replace(state.index, goals_watching=about))
+
+
 def forget_goal(state: State, goal: str) -> State:
     """Drop a goal."""
+    state = _constraints_changed(state, goal, None)
     state = replace(state, goals=state.goals.without(goal))
     return _goal_changed(state, goal, state.goal_states.without(goal))
 
@@ -137,6 +156,7 @@ def without_goal(state: State, plan: Plan, goal: str) -> Plan:
         conditions=conditions_of(state, rest),
         always=tuple(dict.fromkeys(row for spec in specs for row in spec.always)),
         never=tuple(dict.fromkeys(row for spec in specs for row in spec.never)),
+        sometime_before=tuple(dict.fromkeys(row for spec in specs for row in spec.sometime_before)),
     )
 
 

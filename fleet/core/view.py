@@ -111,4 +111,5 @@ def order_of(entry: PlanEntry | None, task: str, epoch: int) -> Order | None:
         cancelled=entry.cancelling or entry.ended or record.task in entry.unwanted,
         planner=entry.lineage,
         serial=record.serial,
+        program=record.program,
     )

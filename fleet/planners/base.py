@@ -10,7 +10,7 @@ from math import inf
 from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.core.model.world import WorldModel
 from fleet.jobshop.time_budget import TimeBudget
-from keyexpr_schema.payloads.goals import Condition, Goal
+from keyexpr_schema.payloads.goals import Condition, Goal, Precedence
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 BIG_DAG, PER_GOAL, MONOLITHIC = "big-dag", "per-goal", "monolithic"
@@ -45,6 +45,11 @@ class PlanningProblem:
     def never(self) -> tuple[Condition, ...]:
         """What must not hold at any time."""
         return tuple(dict.fromkeys(row for goal in self.goals for row in goal.never))
+
+    @property
+    def sometime_before(self) -> tuple[Precedence, ...]:
+        """What must hold before something else may."""
+        return tuple(dict.fromkeys(row for goal in self.goals for row in goal.sometime_before))
 
     @property
     def not_in_time(self) -> str:

@@ -12,11 +12,13 @@ from fleet.core.model.formulas.abstraction import reads
 from fleet.core.model.formulas.effects import Guarded, instances
 from fleet.core.model.formulas.evaluation import expanded
 from fleet.core.model.formulas.nodes import Holds
+from fleet.core.model.preconditions import made_true
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import TaskGraph
-from fleet.core.model.world import WorldModel, capacity
+from fleet.core.model.world import WorldModel, capacity, condition_holds
 from keyexpr_schema.facts import AT, FactKey, Value
 from keyexpr_schema.ids import actor_arg, bare_name
+from keyexpr_schema.payloads.goals import Precedence
 from keyexpr_schema.payloads.plans import Task
 
 
@@ -75,6 +77,7 @@ def deordered(
     one_actor_each: bool = False,
     *,
     world: WorldModel | None = None,
+    in_order: Sequence[Precedence] = (),
 ) -> tuple[tuple[Task, ...], dict[str, str]]:
     """Tasks that do what the sequences do, in a partial order, and the actors that are pinned.
 
@@ -82,7 +85,7 @@ def deordered(
     overwrites, and for its robots' earlier tasks in the same sequence (deordering by causal links).
     Each robot becomes a new actor in every sequence, or with `one_actor_each` one in all of them.
     Without a `world`, only what is written in preconditions is known to be read, and not what that
-    is read off.
+    is read off. What makes true what is second `in_order` also waits for what made the first so.
     """
     rows: dict[str, tuple[str, Action, dict[str, str]]] = {}
     pins: dict[str, str] = {}
@@ -106,7 +109,11 @@ def deordered(
                 lifted[robot] = actor_arg(actors[role])
             rows[f"t{first_task + len(rows)}"] = goal, action, lifted
     touched = _Touched([action for _, action, _ in rows.values()], world)
-    reduced = TaskGraph(_dependencies(rows, touched)).reduced()
+    after = _dependencies(rows, touched)
+    if in_order and world is not None:
+        for task, first in _in_order(rows, in_order, world):
+            after[task].add(first)
+    reduced = TaskGraph(after).reduced()
     tasks = tuple(
         Task(
             task=task,
@@ -144,6 +151,27 @@ def _dependencies(
             writer[variable], readers[variable] = task, set()
         after[task] = befores
     return after
+
+
+def _in_order(
+    rows: Mapping[str, tuple[str, Action, Mapping[str, str]]],
+    in_order: Sequence[Precedence],
+    world: WorldModel,
+) -> Iterator[tuple[str, str]]:
+    """Tasks that make true what is second, each with the one that first made the first so."""
+    facts = dict(world.facts)
+    passed: dict[Precedence, str] = {}
+    in_order = [row for row in in_order if not world.holds(row.first)]
+    held = [world.holds(row.then) for row in in_order]
+    for task, (_, action, _) in rows.items():
+        facts.update(made_true(action, facts, world))
+        for number, row in enumerate(in_order):
+            holds = condition_holds(facts, row.then, world)
+            if holds and not held[number] and row in passed:
+                yield task, passed[row]
+            held[number] = holds
+            if row not in passed and condition_holds(facts, row.first, world):
+                passed[row] = task
 
 
 class _Touched:

@@ -88,6 +88,7 @@ def _beside(plan: Plan, other: Plan) -> Plan:
         seeks=tuple(dict.fromkeys([*plan.seeks, *other.seeks])),
         always=tuple(dict.fromkeys([*plan.always, *other.always])),
         never=tuple(dict.fromkeys([*plan.never, *other.never])),
+        sometime_before=tuple(dict.fromkeys([*plan.sometime_before, *other.sometime_before])),
     )
 
 
@@ -107,6 +108,9 @@ def _for_goals(plan: Plan, goals: Iterable[Goal]) -> Plan:
         conditions=tuple(dict.fromkeys(conditions)),
         always=tuple(dict.fromkeys(row for goal in wanted for row in goal.always)),
         never=tuple(dict.fromkeys(row for goal in wanted for row in goal.never)),
+        sometime_before=tuple(
+            dict.fromkeys(row for goal in wanted for row in goal.sometime_before)
+        ),
     )
 
 
@@ -116,7 +120,12 @@ def _broken_goals(invalid: InvalidPlan, goals: Iterable[Goal]) -> frozenset[str]
     goal_of = {task.task: task.goal for task in plan.tasks}
     wants: dict[Condition, list[str]] = {}
     for goal in goals:
-        for condition in (*goal.conditions, *goal.always, *goal.never):
+        for condition in (
+            *goal.conditions,
+            *goal.always,
+            *goal.never,
+            *(row.then for row in goal.sometime_before),
+        ):
             wants.setdefault(condition, []).append(goal.goal)
     if invalid.graph is None:
         return frozenset()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from keyexpr_schema.facts import Value, render_value
+from keyexpr_schema.facts import FactKey, Literal, Value, render_value
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
 
@@ -36,8 +36,23 @@ class Condition(Payload, frozen=True, kw_only=True):
         """Whom the condition may hold for."""
         return self.any_of or (self.subject,)
 
+    @property
+    def literals(self) -> tuple[Literal, ...]:
+        """That it holds, for each of those whom it may hold for."""
+        return tuple(Literal(FactKey(self.relation, s), self.value) for s in self.subjects)
+
     def __str__(self) -> str:
         return f"{self.relation}({' or '.join(self.subjects)}) = {render_value(self.value)}"
+
+
+class Precedence(Payload, frozen=True, kw_only=True):
+    """If ever `then` holds, `first` held strictly before: PDDL3's (sometime-before then first)."""
+
+    first: Condition
+    then: Condition
+
+    def __str__(self) -> str:
+        return f"{self.first} before {self.then}"
 
 
 class Goal(Payload, frozen=True, kw_only=True):
@@ -47,7 +62,8 @@ class Goal(Payload, frozen=True, kw_only=True):
     the fleet's clock [s]; plans are made so that goals are as little late as can be. `said_s` is
     when it was said, on the same clock; 0: it does not say. The same words said again later, after
     the goal was deleted, are another wish. `speaker` is the person who says it: "me" in the text.
-    `always` must hold all the time until it is reached, and of `never` nothing may.
+    Until it is reached `always` must hold all the time, of `never` nothing may, and of each
+    `sometime_before` one condition only after the other held, from when it is planned on.
     """
 
     goal: Id
@@ -61,6 +77,13 @@ class Goal(Payload, frozen=True, kw_only=True):
     speaker: Id | None = None
     always: tuple[Condition, ...] = ()
     never: tuple[Condition, ...] = ()
+    sometime_before: tuple[Precedence, ...] = ()
+
+    @property
+    def constraints(self) -> tuple[Condition, ...]:
+        """All conditions that say what may hold on the way."""
+        in_order = (each for row in self.sometime_before for each in (row.first, row.then))
+        return (*self.always, *self.never, *in_order)
 
 
 class GoalState(str, Enum):
@@ -89,7 +112,8 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     A goal that says "first …, then …" has several `stages`, reached one after the other;
     `conditions` are those of the stage that it is at, `stage` counts from 0. `note` is a sentence
     about words of the goal that are no part of what must hold: remarks that ask for nothing, and
-    what it takes for granted against what is believed.
+    what it takes for granted against what is believed. `passed` are conditions that had to hold
+    `sometime_before` others, and have.
 
     Times: when the planner first heard of the goal as it is, and since when it stands so, each on
     the fleet's clock [s] and (`wall`) in Unix time [s].
@@ -103,7 +127,14 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     plan: Id | None = None
     reason: str | None = None
     note: str | None = None
+    passed: tuple[Condition, ...] = ()
     given_s: float | None = None
     given_wall_s: float | None = None
     time_s: float = 0.0
     wall_time_s: float | None = None
+
+    def still_in_order(self, goal: Goal) -> tuple[Precedence, ...]:
+        """What of the goal has to hold before something else may, and has not yet."""
+        if self.state in ENDED_GOALS:
+            return ()
+        return tuple(row for row in goal.sometime_before if row.first not in self.passed)

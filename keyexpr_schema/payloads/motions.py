@@ -96,9 +96,13 @@ class MotionState(str, Enum):
 
 
 class MotionOutcome(Payload, frozen=True, kw_only=True):
-    """How a motion stands or ended. `reason` is a sentence where it failed or was stopped."""
+    """How a motion stands or ended. `reason` is a sentence where it failed or was stopped.
+
+    `blocked_by` is a thing that is in the way, and would not be if it were closed.
+    """
 
     state: MotionState
     senses: Senses
     reason: str | None = None
     detections: tuple[Detection, ...] = ()
+    blocked_by: Id | None = None

@@ -6,7 +6,8 @@ from enum import Enum
 
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
-from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.goals import Condition, Precedence
+from keyexpr_schema.payloads.programs import Program
 
 
 class PlanAddress(Address, frozen=True):
@@ -16,7 +17,7 @@ class PlanAddress(Address, frozen=True):
 
 
 class Task(Payload, frozen=True, kw_only=True):
-    """One skill call.
+    """One skill call, or, with the skill `do` and a `program`, a sentence for a robot.
 
     `args` maps parameter names of the skill to ids; `?a1` names the actor `a1`.
     `after` lists tasks that must have succeeded before this one starts.
@@ -29,6 +30,7 @@ class Task(Payload, frozen=True, kw_only=True):
     after: tuple[Id, ...] = ()
     goal: Id | None = None
     duration_s: float = 0.0
+    program: Program | None = None
 
 
 class Making(Payload, frozen=True, kw_only=True):
@@ -63,7 +65,8 @@ class Plan(Payload, frozen=True, kw_only=True):
 
     `revision` counts replans of the same plan from 1. `made_by` names planner and strategy.
     `conditions` are the facts that hold when the plan is done, goal by goal; `always` hold
-    before and after each of its tasks, and `never` at no such time.
+    before and after each of its tasks, and `never` at no such time. What of `sometime_before` is
+    second holds at no such time before which the first never did.
     `pins` maps actors to the robot that they must be; every other actor is free to allocate.
     """
 
@@ -80,8 +83,16 @@ class Plan(Payload, frozen=True, kw_only=True):
     making: Making = Making()
     seeks: tuple[Id, ...] = ()
     """Objects that this plan only looks for; once one is found, a new revision goes on."""
+    programs: bool = False
+    """Whether what an actor does in a row by itself is one task, carried out as a program."""
     always: tuple[Condition, ...] = ()
     never: tuple[Condition, ...] = ()
+    sometime_before: tuple[Precedence, ...] = ()
+
+    @property
+    def is_constrained(self) -> bool:
+        """Whether it matters what holds on the way."""
+        return bool(self.always or self.never or self.sometime_before)
 
     @property
     def actors(self) -> tuple[str, ...]:

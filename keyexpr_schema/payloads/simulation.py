@@ -21,6 +21,12 @@ class SimAddress(Address, frozen=True):
     """The simulated world; there is one to a realm."""
 
 
+class SimAliveAddress(Address, frozen=True):
+    """One run of a simulated world."""
+
+    incarnation: str
+
+
 class SimRobotAddress(Address, frozen=True):
     """One simulated robot."""
 

@@ -6,6 +6,7 @@ from enum import Enum
 
 from keyexpr_schema.ids import Id
 from keyexpr_schema.key import Address, Payload
+from keyexpr_schema.payloads.programs import Program, ProgramTrace
 from keyexpr_schema.payloads.world import Fact
 
 
@@ -95,6 +96,10 @@ class TaskRecord(Payload, frozen=True, kw_only=True):
     ordered_s: float | None = None
     started_s: float | None = None
     ended_s: float | None = None
+    program: Program | None = None
+    """Of a sentence for the robot (`do`), what it means and the program that does it."""
+    trace: ProgramTrace | None = None
+    """What the program did in the latest attempt that has ended."""
 
 
 class Order(Payload, frozen=True, kw_only=True):
@@ -124,6 +129,8 @@ class Order(Payload, frozen=True, kw_only=True):
     cancelled: bool = False
     planner: Id | None = None
     serial: int = 0
+    program: Program | None = None
+    """With one, the order is carried out by running it; `skill` is then `do`."""
 
 
 class ReportState(str, Enum):
@@ -166,3 +173,5 @@ class Report(Payload, frozen=True, kw_only=True):
     ended_s: float | None = None
     planner: Id | None = None
     fence: int = 0
+    program: ProgramTrace | None = None
+    """Of an order with a program: what it did, and why it ended."""

@@ -177,7 +177,8 @@ class Object(Payload, frozen=True, kw_only=True):
     up. `features` (`Feature`, or any other word) say what can be done with it. `part_of` is the
     thing that it is a fixed part of, as a drawer is of its cabinet. `room` is how many things there
     can be on it or in it at once (`None`: no limit). `properties` are numbers and words that skill
-    files may compare, e.g. `size_l`.
+    files may compare, e.g. `size_l`. `blocked_by` are things that, while they are open, are in the
+    way of hands at it and at what is on or in it: of a drawer, those above it.
     """
 
     object: Id
@@ -194,6 +195,7 @@ class Object(Payload, frozen=True, kw_only=True):
     part_of: Id | None = None
     room: float | None = None
     properties: dict[str, Value] = {}
+    blocked_by: tuple[Id, ...] = ()
 
     def is_a(self, word: str) -> bool:
         """Whether a kind, category or feature is true of it. A person, or a fixed part of another

@@ -154,6 +154,17 @@ class Fixture:
         """What opens `thing`."""
         return next((mover for mover in self.movers if mover.thing == thing), None)
 
+    def drawers_above(self, thing: str) -> tuple[str, ...]:
+        """Those that keep hands, which come from above, from a drawer while they are open."""
+        mover = self.mover(thing)
+        if mover is None:
+            return ()
+        return tuple(
+            other.thing
+            for other in self.movers
+            if other.joint == "slide" and other.handle_m[2] > mover.handle_m[2]
+        )
+
     @property
     def all_carriers(self) -> tuple[Carrier, ...]:
         """Those that stay, and those that move with a door or a drawer (as they are closed)."""

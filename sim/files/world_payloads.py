@@ -25,6 +25,7 @@ def place_payloads(world: WorldFile) -> tuple[Place, ...]:
             region_m=entry.region_m,
             surfaces=world.surfaces(name),
             travel_m=travel[name],
+            part_of=entry.part_of,
         )
         for name, entry in world.place_entries.items()
     )
@@ -112,6 +113,7 @@ def _parts(world: WorldFile, fixture: Fixture) -> list[Object]:
                 home=entry.place,
                 features=features_of(fixture, name),
                 part_of=fixture.name,
+                blocked_by=fixture.drawers_above(name),
             )
         )
     return found

@@ -142,6 +142,7 @@ class KinematicBackend(Backend):
         self._count += 1
         me.motion, me.number, me.seen = motion, self._count, ()
         me.state, me.reason, me.failure, me.route = MotionState.RUNNING, None, None, None
+        me.blocked_by = None
         me.begun_s = self.time_s
         nth = me.counts[motion.kind] = me.counts.get(motion.kind, 0) + 1
         kind = motion.kind.value
@@ -206,7 +207,11 @@ class KinematicBackend(Backend):
         if me.state is None:
             return None
         return MotionOutcome(
-            state=me.state, senses=self._senses(robot), reason=me.reason, detections=me.seen
+            state=me.state,
+            senses=self._senses(robot),
+            reason=me.reason,
+            detections=me.seen,
+            blocked_by=me.blocked_by,
         )
 
     def _senses(self, robot: str) -> Senses:
@@ -237,6 +242,8 @@ class KinematicBackend(Backend):
             now_s,
             {name: state.pose(robot, now_s) for name, robot in state.robots.items()},
             {name: state.point(thing, now_s) for name, thing in state.objects.items()},
+            self.world.fixtures,
+            state.opening,
         )
 
 

@@ -1,13 +1,17 @@
-"""What a viewer draws of a world without physics: boxes, a cylinder a robot, the objects."""
+"""What a viewer draws of a world without physics: boxes, a cylinder a robot, the objects.
+
+Doors and drawers stand as the states of what they open say: open, or closed.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from keyexpr_schema.payloads.motions import PointM
 from keyexpr_schema.payloads.robots import PoseMRad
 from keyexpr_schema.payloads.simulation import Body, Frame, QuaternionWxyz, Scene, Shape, ShapeKind
+from sim.files.fixtures import Fixture, Fixtures, Mover, Panel
 from sim.files.solids import walls
 from sim.files.world_schema import WorldFile
 
@@ -26,20 +30,10 @@ def draw_scene(world: WorldFile, robots: tuple[str, ...]) -> Scene:
         bodies.append(_body(solid.name, None, ShapeKind.BOX, size, _WALL))
         fixed[solid.name] = ((*solid.center_m, 0.0), _turned(solid.yaw_rad))
     for fixture in world.fixtures.by_name.values():
-        # Doors and drawers are drawn closed.
-        panels = (*fixture.panels, *(p for mover in fixture.movers for p in mover.panels))
-        shapes = tuple(
-            Shape(
-                kind=ShapeKind(panel.shape),
-                size_m=panel.half_m,
-                point_m=panel.center_m,
-                quaternion_wxyz=_UPRIGHT,
-                rgba=fixture.colour(panel),
-            )
-            for panel in panels
-        )
-        bodies.append(Body(body=fixture.name, owner=None, shapes=shapes))
+        bodies.append(_panels(fixture.name, fixture, fixture.panels))
         fixed[fixture.name] = ((*fixture.center_m, 0.0), _turned(fixture.yaw_rad))
+        for mover in fixture.movers:
+            bodies.append(_panels(_mover(fixture, mover), fixture, mover.panels))
     bodies += [_body(name, name, ShapeKind.CYLINDER, _ROBOT_SIZE_M, _ROBOT) for name in robots]
     for name, entry in world.object_entries.items():
         kind = world.kind_of(name)
@@ -56,14 +50,44 @@ def draw_scene(world: WorldFile, robots: tuple[str, ...]) -> Scene:
 
 
 def draw_frame(
-    time_s: float, robots: Mapping[str, PoseMRad], objects: Mapping[str, PointM]
+    time_s: float,
+    robots: Mapping[str, PoseMRad],
+    objects: Mapping[str, PointM],
+    fixtures: Fixtures,
+    opening: Callable[[str], float],
 ) -> Frame:
-    """Where robots and objects are; every body's origin is at the middle of its base."""
+    """Where robots and objects are, every body's origin at the middle of its base; and where doors
+    and drawers are, by how far things are open (0 to 1)."""
     poses: dict[str, tuple[PointM, QuaternionWxyz]] = {
         name: ((x, y, 0.0), _turned(yaw)) for name, (x, y, yaw) in robots.items()
     }
     poses |= {name: (point, _UPRIGHT) for name, point in objects.items()}
+    for thing, (fixture, mover) in fixtures.movers.items():
+        share = opening(thing)
+        turn = share * mover.open_at * mover.axis[2] if mover.joint == "hinge" else 0.0
+        origin = fixtures.moved_m(thing, (0.0, 0.0, 0.0), share)
+        poses[_mover(fixture, mover)] = (origin, _turned(fixture.yaw_rad + turn))
     return Frame(time_s=time_s, poses=poses)
+
+
+def _mover(fixture: Fixture, mover: Mover) -> str:
+    """What the body of a door or drawer is called."""
+    return f"{fixture.name}/{mover.thing}"
+
+
+def _panels(name: str, fixture: Fixture, panels: Iterable[Panel]) -> Body:
+    """A body in the fixture's frame."""
+    shapes = tuple(
+        Shape(
+            kind=ShapeKind(panel.shape),
+            size_m=panel.half_m,
+            point_m=panel.center_m,
+            quaternion_wxyz=_UPRIGHT,
+            rgba=fixture.colour(panel),
+        )
+        for panel in panels
+    )
+    return Body(body=name, owner=None, shapes=shapes)
 
 
 def _body(

@@ -49,6 +49,9 @@ class KinematicState(Whereabouts):
             return f"{me.name} has no hand"
         if me.holding is not None:
             return f"the hand is not empty: it holds {me.holding}"
+        kept = self._kept_from(me, motion.object)
+        if kept is not None:
+            return kept
         point = self.thing_point(motion.object, time_s)
         if math.dist(point[:2], me.pose[:2]) > self.reach_m(point):
             return f"{motion.object} is out of reach: drive up to it first"
@@ -65,9 +68,9 @@ class KinematicState(Whereabouts):
             return f"{me.holding} cannot be put on or in itself"
         if self.states.get(target, IS_OPEN) is False:
             return f"{target} is closed: open it first"
-        shut = self.shut_in(target)
-        if shut is not None:
-            return f"{target} is in {shut}, which is closed: open it first"
+        kept = self._kept_from(me, target)
+        if kept is not None:
+            return kept
         there = self.contents(target)
         room = self.things[target].room
         if room is not None and len(there) >= room:
@@ -79,6 +82,16 @@ class KinematicState(Whereabouts):
         thing.offset_m, thing.support, me.holding = self.slot(target, there), target, None
         return None
 
+    def _kept_from(self, me: KinematicRobot, thing: str) -> str | None:
+        """Why a hand does not get to a thing wherever it is; `None` if it does."""
+        shut = self.shut_in(thing)
+        if shut is not None:
+            return f"{thing} is in {shut}, which is closed: open it first"
+        me.blocked_by = self.in_the_way(thing)
+        if me.blocked_by is None:
+            return None
+        return f"{me.blocked_by}, which is open, is in the way of {thing}"
+
     def _root_name(self, thing: str) -> str:
         return self.root(self.objects[thing]).name if thing in self.objects else thing
 
@@ -86,10 +99,9 @@ class KinematicState(Whereabouts):
         place = self.world.place_at(*me.pose[:2])
 
         def see(name: str, kind: str, point: PointM, support: str) -> None:
-            if (
-                math.dist(point[:2], me.pose[:2]) > me.capabilities.get("see", 0.0)
-                or self.world.place_at(*point[:2]) != place
-            ):
+            if math.dist(point[:2], me.pose[:2]) > me.capabilities.get(
+                "see", 0.0
+            ) or not self._in_sight(place, self.world.place_at(*point[:2])):
                 return
             found.append(
                 Detection(
@@ -104,12 +116,18 @@ class KinematicState(Whereabouts):
 
         found: list[Detection] = []
         for thing in self.objects.values():
-            if self.held_by(self.root(thing)) is None and self.shut_in(thing.name) is None:
+            hidden = self.shut_in(thing.name) or self.in_the_way(thing.name)
+            if self.held_by(self.root(thing)) is None and hidden is None:
                 see(thing.name, thing.kind, self.point(thing, time_s), thing.support)
         for name in self.noticed:
             point = self.world.fixtures.face_m(name, self.opening(name))
             see(name, self.things[name].kind, point, FLOOR)
         return tuple(found)
+
+    def _in_sight(self, place: str | None, other: str | None) -> bool:
+        """Whether one sees from one place into another: from a room into its parts, and back."""
+        around, others = self.world.places_around(place), self.world.places_around(other)
+        return place == other or place in others or other in around
 
     def _grasp(self, me: KinematicRobot, motion: Motion, time_s: float) -> str | None:
         assert motion.object is not None and motion.point_m is not None
@@ -122,9 +140,9 @@ class KinematicState(Whereabouts):
             return f"the hand already holds {me.holding}"
         if thing.mass_kg > payload_kg:
             return f"{thing.name} is too heavy: {thing.mass_kg:g} kg of at most {payload_kg:g} kg"
-        shut = self.shut_in(thing.name)
-        if shut is not None:
-            return f"{thing.name} is in {shut}, which is closed: open it first"
+        kept = self._kept_from(me, thing.name)
+        if kept is not None:
+            return kept
         point = self.point(thing, time_s)
         if holder is not None or math.dist(point, motion.point_m) > MISS_M:
             return f"{thing.name} is not there; the hand closed on nothing"

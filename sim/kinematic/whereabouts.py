@@ -19,7 +19,7 @@ from sim.states import ThingStates
 REACH_M = 1.2
 """How far from a robot's centre its hand gets, sideways; generous, as stances here are coarse."""
 
-REACH_IN_M = 2.0
+REACH_IN_M = 2.4
 """The same at furniture whose doors and drawers take up the floor before it."""
 
 SLOT_M = 0.12
@@ -48,6 +48,7 @@ class KinematicRobot:
     state: MotionState | None = None
     reason: str | None = None
     seen: tuple[Detection, ...] = ()
+    blocked_by: str | None = None
 
 
 @dataclass
@@ -144,6 +145,17 @@ class Whereabouts:
             if self.states.get(thing, IS_OPEN) is False:
                 return thing
         return None
+
+    def in_the_way(self, thing: str) -> str | None:
+        """What is open, and keeps hands from a thing or from what it is on or in."""
+        while True:
+            others = self.things[thing].blocked_by if thing in self.things else ()
+            for other in others:
+                if self.states.get(other, IS_OPEN) is True:
+                    return other
+            if thing not in self.objects:
+                return None
+            thing = self.objects[thing].support
 
     def root(self, thing: KinematicObject) -> KinematicObject:
         """The object that carries it, and whatever carries that, up to one that no object does."""

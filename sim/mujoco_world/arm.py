@@ -144,7 +144,7 @@ class Arm:
     def obstacle(self, values: Sequence[float]) -> str | None:
         """What the robot would touch with these joint values (not objects), or `None`.
 
-        Walls and furniture by their names, another robot by its own.
+        Furniture, its doors and drawers by their names, another robot by its own.
         """
         import mujoco
 
@@ -160,7 +160,7 @@ class Arm:
             other = str(model.body(bodies[1 - roots.index(self._robot_root)]).name)
             kind, _, name = other.partition("/")
             if kind != "object" and other != "floor":
-                return name if kind == "furniture" else kind
+                return name.rpartition("/")[2] if kind == "furniture" else kind
         return None
 
     def obstacle_between(self, start: Sequence[float], end: Sequence[float]) -> str | None:

@@ -172,7 +172,9 @@ class MujocoBackend(Backend):
             self._end(robot, run, MotionState.SUCCEEDED, None, stop.value)
             return
         except MotionFailed as error:
-            self._end(robot, run, MotionState.FAILED, str(error))
+            ajar = self._mechanisms.is_ajar(error.blocked_by)
+            blocker = error.blocked_by if ajar else None
+            self._end(robot, run, MotionState.FAILED, str(error), blocked_by=blocker)
             return
         if self.time_s - run.began_s >= run.motion.timeout_s:
             reason = (
@@ -188,16 +190,28 @@ class MujocoBackend(Backend):
         state: MotionState,
         reason: str | None,
         detections: tuple[Detection, ...] = (),
+        blocked_by: str | None = None,
     ) -> None:
         run.steps.close()
         self._context.navigator.cancel(robot)
+        self._note_stance(run, state)
         self._bodies[robot].freeze()
         run.ended = MotionOutcome(
             state=state,
             senses=self._senses(robot),
             reason=reason,
             detections=detections,
+            blocked_by=blocked_by,
         )
+
+    def _note_stance(self, run: MotionRun, state: MotionState) -> None:
+        """Remember from where a hand did not get to a point, until one has got to one."""
+        robot, point = run.robot, run.motion.point_m
+        if run.motion.kind in (MotionKind.GRASP, MotionKind.RELEASE) and point is not None:
+            if state is MotionState.SUCCEEDED:
+                robot.in_vain.clear()
+            elif state is MotionState.FAILED:
+                robot.in_vain.append((point, robot.pose()[:2]))
 
     def _steer(self, robot: str, body: RobotBody) -> None:
         """Follow the navigator, unless the arm is out or the motion drives the base itself."""

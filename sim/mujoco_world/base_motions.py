@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from keyexpr_schema.payloads.motions import Detection, PointM
-from sim.errors import NoPath, NoStance
+from sim.errors import NoWay
 from sim.mujoco_world.base_controllers import wrap
 from sim.mujoco_world.motion import MotionContext, MotionFailed, MotionRun, Step, Steps, stow
 
@@ -16,6 +16,9 @@ REACH_MARGIN_M = 0.015
 
 STRETCHED_M = 0.03
 """An arm within this of its reach is stretched out."""
+
+SAME_POINT_M = 0.1
+"""Where the hand could not get to a point this near, the next try stands elsewhere."""
 
 BESIDE_M = (0.15, 0.6)
 """How far from its own rim a robot without a hand stops before a point."""
@@ -32,7 +35,7 @@ def go_to(context: MotionContext, run: MotionRun) -> Steps:
     run.phase = f"driving to {place}"
     yield from navigate(context, run, lambda: context.navigator.go_to_place(run.robot.name, place))
     x, y, _ = run.robot.pose()
-    if context.world.place_at(x, y) != place:
+    if place not in context.world.places_around(context.world.place_at(x, y)):
         raise MotionFailed(f"it stopped at ({x:.2f}, {y:.2f}), which is not in {place}")
     return ()
 
@@ -50,8 +53,11 @@ def approach(context: MotionContext, run: MotionRun) -> Steps:
         run.guest_of = host
         yield
     reach = reach_to_m(context, run, point) if host is None else BESIDE_ROBOT_M
+    in_vain = [at for other, at in run.robot.in_vain if math.dist(other, point) < SAME_POINT_M]
     yield from navigate(
-        context, run, lambda: context.navigator.approach(run.robot.name, point, reach)
+        context,
+        run,
+        lambda: context.navigator.approach(run.robot.name, point, reach, in_vain=in_vain),
     )
     return ()
 
@@ -132,8 +138,8 @@ def navigate(context: MotionContext, run: MotionRun, ask: Callable[[], None]) ->
     """Have the navigator bring the robot somewhere, and wait until it stands there."""
     try:
         ask()
-    except (NoStance, NoPath) as error:
-        raise MotionFailed(str(error)) from None
+    except NoWay as error:
+        raise MotionFailed(str(error), error.blocked_by) from None
     yield
     while True:
         leg = context.legs.get(run.robot.name)

@@ -21,6 +21,7 @@ from sim.mujoco_world.motion import (
     MotionRun,
     Step,
     Steps,
+    check_way,
     drive_straight,
     face,
     move_arm,
@@ -53,7 +54,7 @@ RELEASE_OPENING_M = 0.025
 CLEARANCE_M = 0.005
 
 BASKET_OPENING_M = 0.012
-"""In a basket the fingers open only this much, so as not to push against its walls."""
+"""In a basket or drawer the fingers open only this much, so as not to push against its walls."""
 
 ROOM_M = 0.38
 """So far from where it reaches in under a roof a robot unfolds its arm."""
@@ -93,7 +94,7 @@ def grasp(context: MotionContext, run: MotionRun) -> Steps:
     path = reach_down(arm, target, context.observer.opening_rad(name), hovers)
     robot.grip_above_base_m = grip_m
     opening_m = gripper.entry.open_m
-    if run.motion.robot is not None:
+    if run.motion.robot is not None or context.observer.rim_m(point) is not None:
         opening_m = _grip_width_m(context, name) / 2 + BASKET_OPENING_M
     try:
         gripper.open(opening_m)
@@ -200,6 +201,8 @@ def reach_in(
     robot = run.robot
     start = robot.pose()
     back = behind(start, back_m)
+    run.phase = "standing back"
+    check_way(context, run, [start[:2], back[:2]])
     run.phase = "waiting for room to stand back"
     while not context.navigator.reserve(robot.name, [back[:2], start[:2]]):
         yield
@@ -336,7 +339,9 @@ def reach_down(
                     return Reach(above=above, at=at)
                 touched = hit
     if touched is not None:
-        raise MotionFailed(f"the arm would touch {touched}: approach the point from another side")
+        raise MotionFailed(
+            f"the arm would touch {touched}: approach the point from another side", touched
+        )
     raise MotionFailed(
         f"the hand cannot get to ({x:.2f}, {y:.2f}, {z:.2f}) from where the robot stands"
     )

@@ -168,10 +168,11 @@ def in_the_way(
     """What a straight drive would run into, walls and furniture as well as robots."""
     robot = run.robot
     room = robot.description.clearance_m
+    standing = context.standing()
     for step in range(11):
         share = step / 10
         x, y = (a + share * (b - a) for a, b in zip(start, goal, strict=True))
-        for solid in context.solids:
+        for solid in standing:
             if solid.distance_m(x, y) < room:
                 return solid.name
         for other in context.robots.values():

@@ -87,6 +87,10 @@ class Mechanisms:
         """Whether something is open; what does not open is."""
         return thing not in self._joints or self.opening(thing) > OPEN_SHARE
 
+    def is_ajar(self, thing: str | None) -> bool:
+        """Whether something opens, and stands open so far that it is in the way."""
+        return thing is not None and thing in self._joints and self.opening(thing) > AJAR_SHARE
+
     def handle_m(self, thing: str) -> PointM:
         """Where the middle of a handle is now, world frame."""
         x, y, z = (float(v) for v in self._data.site_xpos[self._handles[thing]])
@@ -112,10 +116,9 @@ class Mechanisms:
         """The doors and drawers that stand open, as upright boxes on the floor."""
         found = []
         for thing, (fixture, mover) in self._world.fixtures.movers.items():
-            opening = self.opening(thing)
-            if opening <= AJAR_SHARE:
+            if not self.is_ajar(thing):
                 continue
-            value = opening * mover.open_at
+            value = self.opening(thing) * mover.open_at
             turn = fixture.yaw_rad
             if mover.joint == "hinge":
                 turn += value * mover.axis[2]

@@ -7,9 +7,10 @@ on the way, or by raising `MotionFailed`. Nothing in it waits for wall time, so 
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Collection, Generator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 
 from keyexpr_schema.payloads.motions import Detection, Motion, MotionOutcome
 from keyexpr_schema.payloads.robots import PoseMRad
@@ -39,9 +40,19 @@ NEAR_M = 0.02
 
 HELD_UP_S = 5.0
 
+WAY_STEP_M = 0.05
+"""So close to each other it is looked whether something stands on a way."""
+
 
 class MotionFailed(Exception):
-    """A motion fails. The message is one sentence for a person."""
+    """A motion fails. The message is one sentence for a person.
+
+    `blocked_by` is what was in the way; if it is open, it could be closed.
+    """
+
+    def __init__(self, sentence: str, blocked_by: str | None = None) -> None:
+        super().__init__(sentence)
+        self.blocked_by = blocked_by
 
 
 @dataclass
@@ -59,6 +70,10 @@ class MotionContext:
     def solids(self) -> tuple[Solid, ...]:
         """What stands on the floor."""
         return solids(self.world)
+
+    def standing(self) -> tuple[Solid, ...]:
+        """What stands on the floor now, doors and drawers that are open among it."""
+        return (*self.solids, *self.mechanisms.obstacles())
 
 
 @dataclass
@@ -80,6 +95,27 @@ class MotionRun:
     manual: bool = False
     handling: bool = False
     guest_of: str | None = None
+
+
+def check_way(
+    context: MotionContext,
+    run: MotionRun,
+    way: Sequence[tuple[float, float]],
+    *,
+    but: Collection[str] = (),
+) -> None:
+    """Raises `MotionFailed` where the base, driving along `way`, would run into something other
+    than `but`."""
+    radius = run.robot.description.radius_m
+    others = [solid for solid in context.standing() if solid.name not in but]
+    for (x1, y1), (x2, y2) in pairwise(way):
+        steps = max(1, math.ceil(math.dist((x1, y1), (x2, y2)) / WAY_STEP_M))
+        for k in range(steps + 1):
+            x, y = x1 + (x2 - x1) * k / steps, y1 + (y2 - y1) * k / steps
+            for solid in others:
+                if solid.distance_m(x, y) < radius:
+                    sentence = f"{solid.name} is in the way of {run.robot.name} {run.phase}"
+                    raise MotionFailed(sentence, solid.name)
 
 
 def wait(seconds: float) -> Step:

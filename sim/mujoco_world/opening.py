@@ -22,6 +22,7 @@ from sim.mujoco_world.motion import (
     MotionRun,
     Step,
     Steps,
+    check_way,
     face,
     move_arm,
     stow,
@@ -35,6 +36,7 @@ STUCK_S = 4.0
 """A handle that has not come to where it was pulled this long after is stuck."""
 NEAR_SHARE = 0.08
 SAMPLES = 8
+DOOR_GAP_M = 0.02
 BACK_M = 0.22
 """So far from a handle a robot unfolds its arm, and folds it again."""
 
@@ -80,10 +82,16 @@ def _swing(context: MotionContext, run: MotionRun, goal: float) -> Step:
     x, y, _ = robot.pose()
     way = _handle_way(context, thing, goal)
     base = [(x + hx - point[0], y + hy - point[1]) for hx, hy in way]
-    _check_room(context, run, fixture.name, base)
-    run.phase = "waiting for room to move the door"
     ends = [behind((*base[k], fixture.inward_rad), BACK_M)[:2] for k in (0, -1)]
-    while not context.navigator.reserve(robot.name, [ends[0], *base, ends[1]]):
+    whole = [ends[0], *base, ends[1]]
+    run.phase = f"moving the door of {thing}"
+    check_way(context, run, whole, but=(fixture.name, *(m.thing for m in fixture.movers)))
+    if min(Clearance(context.world, context.solids).at(whole)) < robot.description.radius_m:
+        raise MotionFailed(f"{fixture.name} itself is in the way of who moves its door")
+    _check_door(context, thing, goal)
+    run.phase = "waiting for room to move the door"
+    # The door must not hit anybody, either.
+    while not context.navigator.reserve(robot.name, [*whole, *reversed(way)]):
         yield
     gripper.open()
     yield from wait(0.6)
@@ -116,18 +124,21 @@ def _handle_way(context: MotionContext, thing: str, goal: float) -> list[tuple[f
     return found
 
 
-def _check_room(
-    context: MotionContext, run: MotionRun, name: str, way: list[tuple[float, float]]
-) -> None:
-    """Raises `MotionFailed` where the base would run into something on its way."""
-    radius = run.robot.description.radius_m
-    others = [solid for solid in context.solids if solid.name != name]
-    for x, y in way:
-        for solid in others:
-            if solid.distance_m(x, y) < radius:
-                raise MotionFailed(f"{solid.name} is in the way of who moves the door of {name}")
-    if min(Clearance(context.world, context.solids).at(way)) < radius:
-        raise MotionFailed(f"{name} itself is in the way of who moves its door")
+def _check_door(context: MotionContext, thing: str, goal: float) -> None:
+    """Raises `MotionFailed` where a door or drawer would run into another that is open."""
+    fixture, mover = context.world.fixtures.movers[thing]
+    own = {other.thing for other in fixture.movers}
+    others = [solid for solid in context.mechanisms.obstacles() if solid.name not in own]
+    (x, y, z), (half_x, _, _) = mover.panels[0].center_m, mover.panels[0].half_m
+    edge = [(x + share * half_x, y, z) for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+    now = context.mechanisms.opening(thing)
+    for k in range(SAMPLES + 1):
+        share = now + (goal - now) * k / SAMPLES
+        for point in (*edge, mover.handle_m):
+            at = context.world.fixtures.moved_m(thing, point, share)
+            for solid in others:
+                if solid.distance_m(at[0], at[1]) < DOOR_GAP_M:
+                    raise MotionFailed(f"{solid.name} is in the way of {thing}", solid.name)
 
 
 def _pull(context: MotionContext, run: MotionRun, goal: float) -> Step:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from keyexpr_schema.payloads.motions import PointM
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from sim.errors import BadFile
+from sim.files.furniture_schema import PointXY
 from sim.mujoco_world.arm import Arm, Gripper
 from sim.mujoco_world.base_controllers import PERIOD_S, make_drive
 from sim.mujoco_world.description import RobotModel
@@ -37,6 +39,8 @@ class RobotBody:
         """How far above the held object's base the hand took it."""
         self.way_out: PoseMRad | None = None
         """Where to drive before the arm is folded, when it reaches in under a roof."""
+        self.in_vain: list[tuple[PointM, PointXY]] = []
+        """Points that the hand did not get to, each with where the robot stood."""
         self._untouched_s = 0.0
         about = found.description
         try:

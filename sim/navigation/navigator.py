@@ -133,9 +133,12 @@ class Navigator:
         point_m: tuple[float, float, float],
         reach_m: tuple[float, float],
         heading_rad: float | None = None,
+        in_vain: Sequence[tuple[float, float]] = (),
     ) -> None:
         """Let `robot` stand facing `point_m`, its centre between `reach_m` (min, max) away from it,
         and itself turned to `heading_rad` if that is given.
+
+        It stands elsewhere than it has been `in_vain`, if there is a stance.
 
         If all such stances are taken, it waits for one for `PATIENCE_S`, then its leg has failed.
 
@@ -146,15 +149,11 @@ class Navigator:
         self.cancel(robot)
         traveller = self._robots[robot]
         what = f"({point_m[0]:.2f}, {point_m[1]:.2f})"
-        docks = self._spots.stances(point_m, traveller.radius_m, reach_m, heading_rad)
-        if not docks:
-            why = self._spots.why_not(point_m, traveller.radius_m, reach_m)
-            raise NoStance(f"{robot} does not get to {what}: {why}")
         part = self._lattice.parts[traveller.frontier]
-        docks = [dock for dock in docks if self._lattice.parts[dock.node] == part]
-        if not docks:
-            raise NoPath(f"there is no way to {what} from where {robot} stands")
-        self._tasks[robot] = _Task(what, docks=tuple(docks))
+        failed = f"{robot} does not get to {what}"
+        reach = (point_m, traveller.radius_m, reach_m, heading_rad)
+        docks = self._spots.docks(*reach, part, in_vain, failed)
+        self._tasks[robot] = _Task(what, docks=docks)
 
     def reaches(
         self, robot: str, point_m: tuple[float, float, float], reach_m: tuple[float, float]
@@ -306,7 +305,7 @@ class Navigator:
             traveller.parked is not None
             and not traveller.leaving
             and name not in self._lingers
-            and self._world.place_at(x, y) == task.place
+            and task.place in self._world.places_around(self._world.place_at(x, y))
             and here in self._spots.waiting[task.place]
         ):
             self._arrive(name)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.errors import NoPath, NoStance
 from sim.files.solids import Solid, barriers, reserves, solids
 from sim.files.world_schema import LARGEST_RADIUS_M, WorldFile
 from sim.navigation.clearance import Clearance
@@ -28,6 +29,9 @@ FAR_M = 3.0
 
 ASKEW_M = 0.6
 """What facing furniture askew counts for, a radian: neighbours' handles are in the arm's way."""
+
+OTHER_STANCE_M = 0.06
+"""One from which an arm may get where it does not from another is so far from that."""
 
 DOCK_M = 1.3
 """Longest straight way from the lattice to a stance."""
@@ -79,7 +83,7 @@ class Spots:
             name: tuple(
                 node
                 for node, place in enumerate(places)
-                if place == name and not self.by_door[node]
+                if name in world.places_around(place) and not self.by_door[node]
             )
             for name in world.place_entries
         }
@@ -138,9 +142,11 @@ class Spots:
         ordered = near[clear][np.argsort(gaps[near[clear]], kind="stable")]
         return [int(node) for node in ordered]
 
-    def ways_out(self, point_m: tuple[float, float], radius_m: float) -> list[int]:
-        """As `ways_in`, and clear of what stands there for the time being."""
-        opened = self.obstacles()
+    def ways_out(
+        self, point_m: tuple[float, float], radius_m: float, opened: Sequence[Solid] | None = None
+    ) -> list[int]:
+        """As `ways_in`, and clear of what stands `opened`; if not given, for the time being."""
+        opened = self.obstacles() if opened is None else opened
         return [
             node
             for node in self.ways_in(point_m, radius_m)
@@ -153,13 +159,16 @@ class Spots:
         radius_m: float,
         reach_m: tuple[float, float],
         heading_rad: float | None = None,
+        opened: Sequence[Solid] | None = None,
     ) -> list[Dock]:
         """Where a robot can stand facing a point with it within reach, ahead of any traffic.
 
         The reach counts from the robot's centre. There is no wall between stance and point.
         `heading_rad`: it has to face that way; in furniture that is open at its front only, it
-        faces the back.
+        faces the back. `opened` is what stands there for the time being, if not as it does now.
+        A stance is found once for each part of the lattice that it can be entered from.
         """
+        opened = self.obstacles() if opened is None else opened
         low, high = reach_m
         x, y, z = point_m
         middle = (low + high) / 2
@@ -179,16 +188,53 @@ class Spots:
         found: list[Dock] = []
         for k in np.flatnonzero(good):
             stance = (float(points[k, 0]), float(points[k, 1]))
-            ways = self.ways_out(stance, radius_m + 0.03)
-            if ways:
-                dock = self.dock(
-                    stance, ways[0], radius_m, math.atan2(y - stance[1], x - stance[0])
-                )
+            parts: set[int] = set()
+            for way in self.ways_out(stance, radius_m + 0.03, opened):
+                if self.lattice.parts[way] in parts:
+                    continue
+                parts.add(self.lattice.parts[way])
+                dock = self.dock(stance, way, radius_m, math.atan2(y - stance[1], x - stance[0]))
                 off = 2.0 * abs(float(d[k]) - middle) + 0.2 * len(dock.owned)
                 if front is not None:
                     off += ASKEW_M * abs(math.remainder(dock.yaw_rad - front, math.tau))
                 found.append(Dock(dock.node, stance, dock.yaw_rad, dock.owned, dock.cost_m + off))
         return found
+
+    def docks(
+        self,
+        point_m: tuple[float, float, float],
+        radius_m: float,
+        reach_m: tuple[float, float],
+        heading_rad: float | None,
+        part: int,
+        in_vain: Sequence[tuple[float, float]],
+        failed: str,
+    ) -> tuple[Dock, ...]:
+        """The stances that can be entered from a part of the lattice; none that it has been
+        `in_vain`, if there are others. What is raised begins with `failed`.
+
+        Raises:
+            NoStance: there is no free floor at that distance, or what is open takes it up.
+            NoPath: there is, and no way to it.
+        """
+
+        def found(opened: Sequence[Solid] | None) -> list[Dock]:
+            docks = self.stances(point_m, radius_m, reach_m, heading_rad, opened)
+            return [dock for dock in docks if self.lattice.parts[dock.node] == part]
+
+        if docks := found(None):
+            gaps = ((min(math.dist(dock.point_m, at) for at in in_vain), dock) for dock in docks)
+            others = [dock for gap, dock in gaps if gap > OTHER_STANCE_M] if in_vain else docks
+            return tuple(others or docks)
+        standing = sorted(self.obstacles(), key=lambda solid: solid.distance_m(*point_m[:2]))
+        if standing and found(()):
+            names = dict.fromkeys(solid.name for solid in standing)
+            alone = (n for n in names if found([solid for solid in standing if solid.name != n]))
+            blocker = next(alone, standing[0].name)
+            raise NoStance(f"{failed}: {blocker}, which is open, is in the way", blocker)
+        if self.stances(point_m, radius_m, reach_m, heading_rad):
+            raise NoPath(f"{failed}: there is no way there from where it stands")
+        raise NoStance(f"{failed}: {self.why_not(point_m, radius_m, reach_m)}")
 
     def _heading_into(self, point_m: tuple[float, float, float]) -> float | None:
         """How to face a point in furniture under whose roof one gets from the front only."""

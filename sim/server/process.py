@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import asyncio
-from contextlib import suppress
+import secrets
+from asyncio import FIRST_COMPLETED
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING
 
-from keyexpr_schema.keyspace import SIM_CLOCK, SIM_SCENE
+from keyexpr_schema.keyspace import SIM_ALIVE
+from keyexpr_schema.payloads.simulation import SimAliveAddress
 from keyexpr_schema.signals import run_until_signal
 from keyexpr_schema.transport.session import Session, SessionConfig, open_session
 from sim.backend import Backend
 from sim.errors import SimError, WorldRuns
 from sim.files.mission_file import Mission, load_mission
 from sim.server.sim_server import SimServer
+from workers.only_run import OnlyRun
 
 if TYPE_CHECKING:
     from sim.kinematic.backend import MotionModel
 
 BACKENDS = ("mujoco", "kinematic")
-CLOCK_S = 0.6
-"""How long to listen for another world's clock [s, wall]; it ticks twenty times a second."""
 
 
 def run_simulation(
@@ -55,12 +58,11 @@ def run_simulation(
     world = make_backend(loaded, backend, seed=seed, speed=speed, motion_model=motion_model)
 
     async def serve() -> None:
-        async with open_session(config) as session:
-            await ensure_single_world(session)
+        async with open_session(config) as session, only_world(session) as giving_way:
             server = SimServer(session, world, speed)
             serving = asyncio.create_task(server.run())
             ready = asyncio.create_task(server.ready())
-            await asyncio.wait({serving, ready}, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait({serving, ready}, return_when=FIRST_COMPLETED)
             ready.cancel()
             print(  # noqa: T201
                 f"world {loaded.world.world} running: "
@@ -68,29 +70,37 @@ def run_simulation(
                 f"{_count(len(loaded.world.object_entries), 'object')}",
                 flush=True,
             )
-            await serving
+            ended, _ = await asyncio.wait({serving, giving_way}, return_when=FIRST_COMPLETED)
+            serving.cancel()
+            await asyncio.gather(serving, return_exceptions=True)
+            await ended.pop()
 
     run_until_signal(serve())
 
 
-async def ensure_single_world(session: Session) -> None:
-    """Return when no other simulation is heard; where none ever was, at once.
-
-    Two that start at the same moment in a new realm do not hear each other here.
+@asynccontextmanager
+async def only_world(session: Session) -> AsyncIterator[asyncio.Task[None]]:
+    """Be the simulated world of the realm; yields what ends if another one is before this one.
 
     Raises:
         WorldRuns: one is. Both would move a robot of the same name for each call of its worker.
     """
-    if not await session.list(SIM_SCENE):
-        return
-    async with session.watch(SIM_CLOCK) as watch:
-        with suppress(TimeoutError):
-            async with asyncio.timeout(CLOCK_S):
-                await anext(watch)
-                raise WorldRuns(
-                    f"a simulated world runs in realm {session.config.realm} already: end that "
-                    "one, or use another --realm"
-                )
+
+    def taken(others: str) -> WorldRuns:
+        return WorldRuns(
+            f"a simulated world runs in realm {session.config.realm} already ({others}): end that "
+            "one, or use another --realm"
+        )
+
+    own = SimAliveAddress(f"i{secrets.token_hex(6)}")
+    async with OnlyRun(session, SIM_ALIVE, own, taken).connected() as only:
+        await only.settled()
+        giving_way = asyncio.create_task(only.give_way())
+        try:
+            yield giving_way
+        finally:
+            giving_way.cancel()
+            await asyncio.gather(giving_way, return_exceptions=True)
 
 
 def make_backend(

@@ -40,9 +40,8 @@ NOT_WRITTEN = {
     "diagnostic": Component.PLANNER,
 }
 NOT_READ = {
-    # A worker that comes back looks up what it reported last; a simulation, whether one runs.
+    # A worker that comes back looks up what it reported last.
     "report": Component.OWN_WORKER,
-    "sim_clock": Component.SIMULATION,
 }
 """What the table allows, and this mission has no need of."""
 

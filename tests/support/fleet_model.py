@@ -17,6 +17,7 @@ from fleet.core import events
 from fleet.core.effects import Archive, Effect, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import Event, decode_event, encode_event
 from fleet.core.indexes.plan_index import OUTSTANDING
+from fleet.core.model.programs import program_action
 from fleet.core.model.skills import SkillModel
 from fleet.core.plan_entry import PlanEntry, PlanOutcome
 from fleet.core.planning_input import PlanningInput
@@ -288,7 +289,12 @@ class FleetModel:
 
     def facts_after(self, order: Order) -> tuple[Fact, ...]:
         """The facts that hold once the order has been carried out."""
-        action = self._skills[order.skill].ground(order.args)
+        if order.program is None:
+            action = self._skills[order.skill].ground(order.args)
+        else:
+            whole = program_action(order.program, order.args, self._skills)
+            assert whole is not None
+            action = whole
         return tuple(
             Fact(
                 subject=literal.variable.subject,

@@ -19,7 +19,7 @@ from fleet.core.model.world import WorldModel, condition_holds
 from fleet.planners.deordering import ActionSequence, deordered
 from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.ids import actor_arg
-from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.goals import Condition, Precedence
 from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.world import Object, Place
 from tests.support.household import manipulator
@@ -172,7 +172,7 @@ POSSIBLE = _possible()
 @st.composite
 def kitchen_plans(draw: st.DrawFn) -> tuple[Plan, WorldModel]:
     """A plan whose actors are the robots of `ALLOCATION`, right or a little wrong, and a world.
-    Some of the plans keep or avoid something all the time.
+    Some of the plans keep or avoid something all the time, or until something else has held.
     """
     start = draw(st.sampled_from(STARTS))
     facts: dict[FactKey, Value] = {**WORLD.facts, **start}
@@ -200,6 +200,7 @@ def kitchen_plans(draw: st.DrawFn) -> tuple[Plan, WorldModel]:
         tasks=tuple(tasks),
         always=_constraint(draw, states, True),
         never=_constraint(draw, states, False),
+        sometime_before=_precedence(draw, states),
     )
     return made, WORLD.with_facts(start)
 
@@ -216,6 +217,21 @@ def _constraint(
         if all(condition_holds(facts, goal, WORLD) is wanted for facts in states)
     ]
     return (draw(st.sampled_from(kept if kept and draw(st.integers(0, 3)) else GOALS)),)
+
+
+def _precedence(draw: st.DrawFn, states: list[Mapping[FactKey, Value]]) -> tuple[Precedence, ...]:
+    """Now and then something that comes to hold, mostly after what has to hold before it."""
+    if draw(st.integers(0, 3)):
+        return ()
+    since = {
+        goal: next((n for n, facts in enumerate(states) if condition_holds(facts, goal, WORLD)), -1)
+        for goal in GOALS
+    }
+    later = [goal for goal in GOALS if since[goal] > 0]
+    then = draw(st.sampled_from(later or GOALS))
+    earlier = [goal for goal in GOALS if 0 <= since[goal] < since[then]]
+    first = draw(st.sampled_from(earlier if earlier and draw(st.integers(0, 3)) else GOALS))
+    return (Precedence(first=first, then=then),)
 
 
 def _lifted(walk: list[Action], world: WorldModel) -> tuple[Task, ...]:

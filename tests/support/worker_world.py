@@ -15,6 +15,7 @@ from msgspec.structs import replace
 
 from keyexpr_schema.keyspace import FACT, OBJECT, ORDER, PLACE, REPORT, ROBOT_SPEC
 from keyexpr_schema.payloads.motions import Motion, MotionOutcome, MotionState, Senses
+from keyexpr_schema.payloads.programs import DO, Program
 from keyexpr_schema.payloads.robots import RobotAddress
 from keyexpr_schema.payloads.tasks import FINAL_REPORTS, Order, OrderAddress, Report, ReportState
 from keyexpr_schema.payloads.world import Fact, FactAddress, ObjectAddress, PlaceAddress
@@ -128,6 +129,7 @@ class Planner:
         cancelled: bool = False,
         planner: str | None = None,
         serial: int = 0,
+        program: Program | None = None,
         **args: str,
     ) -> Order:
         """Give an order, as a planner would."""
@@ -144,9 +146,17 @@ class Planner:
             cancelled=cancelled,
             planner=planner,
             serial=serial,
+            program=program,
         )
         await self.session.confirm(ORDER, OrderAddress(robot, "p", task), order)
         return order
+
+    async def programmed(
+        self, robot: str, code: str, *, task: str = "t1", deadline_s: float = 600.0
+    ) -> Order:
+        """Order a program."""
+        program = Program(text="a sentence", code=code)
+        return await self.order(robot, task, DO, deadline_s=deadline_s, program=program)
 
     async def report(
         self, order: Order, *states: ReportState, newer_than: Report | None = None

@@ -20,6 +20,7 @@ import msgspec
 
 from keyexpr_schema.data_folder import usable_folder
 from keyexpr_schema.key import Payload
+from keyexpr_schema.payloads.programs import ProgramCall
 from keyexpr_schema.payloads.tasks import Order, Report
 from keyexpr_schema.payloads.world import Fact
 from workers.errors import JournalBusy, JournalUnreadable
@@ -33,6 +34,7 @@ from workers.orders.fencing import (
 )
 from workers.orders.journal_file import VERSION, prepare_tables
 
+_IS_ATTEMPT = "planner=? AND plan=? AND task=? AND attempt=?"
 _KINDS: dict[str, type[Payload]] = {"fact": Fact, "report": Report}
 
 
@@ -42,6 +44,13 @@ class Unsent:
 
     number: int
     payload: Fact | Report
+
+
+class FinishedCall(msgspec.Struct, frozen=True, kw_only=True):
+    """A call of a program that has ended, and the facts that it brought."""
+
+    call: ProgramCall
+    facts: tuple[Fact, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -151,9 +160,34 @@ class Journal:
             self._write(Attempt(order=order, phase=Phase.STARTED))
             self._send(report)
 
+    def called(self, order: Order, finished: FinishedCall) -> None:
+        """A call of the attempt's program has ended; its facts wait to be sent."""
+        with self._transaction():
+            self._connection.execute(
+                "INSERT INTO call VALUES (?, ?, ?, ?, ?, ?)",
+                (
+                    *_row_of(AttemptName.of(order)),
+                    finished.call.number,
+                    msgspec.json.encode(finished),
+                ),
+            )
+            for fact in finished.facts:
+                self._send(fact)
+
+    def calls(self, order: Order) -> tuple[FinishedCall, ...]:
+        """The calls of the attempt's program that have ended, in their order."""
+        rows = self._connection.execute(
+            f"SELECT finished FROM call WHERE {_IS_ATTEMPT} ORDER BY number",
+            _row_of(AttemptName.of(order)),
+        )
+        return tuple(msgspec.json.decode(row, type=FinishedCall) for (row,) in rows)
+
     def ended(self, order: Order, report: Report) -> None:
         """The attempt has ended; its facts, then its report, wait to be sent."""
         with self._transaction():
+            self._connection.execute(
+                f"DELETE FROM call WHERE {_IS_ATTEMPT}", _row_of(AttemptName.of(order))
+            )
             self._write(Attempt(order, Phase.ENDED, report, self._wall_s()))
             for fact in report.facts:
                 self._send(fact)

@@ -21,6 +21,11 @@ CREATE TABLE IF NOT EXISTS attempt (
     ended_at REAL,                    -- Unix seconds
     UNIQUE (planner, plan, task, attempt)
 );
+CREATE TABLE IF NOT EXISTS call (       -- of programs under way: the calls that have ended
+    planner TEXT NOT NULL, plan TEXT NOT NULL, task TEXT NOT NULL, attempt INTEGER NOT NULL,
+    number INTEGER NOT NULL, finished BLOB NOT NULL,
+    PRIMARY KEY (planner, plan, task, attempt, number)
+) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS outbox (
     number INTEGER PRIMARY KEY AUTOINCREMENT,
     kind TEXT NOT NULL,               -- 'fact' or 'report'

@@ -52,6 +52,8 @@ class OrderQueue:
         self._running: AttemptName | None = None
         self._standing: dict[OrderAddress, AttemptName] = {}
         """What the orders that stand on their keys are about."""
+        self._withdrawn: set[AttemptName] = set()
+        """Attempts of an earlier run of the worker that were cancelled before they went on."""
         self._all_standing_known = False
         self._log = logging.getLogger(f"robotfleet.worker.{robot}")
 
@@ -64,6 +66,16 @@ class OrderQueue:
             await self._queued.wait()
         self._running = self._queue.popleft()
         return self._journal.ledger.attempts[self._running].order
+
+    def resume(self, order: Order) -> bool:
+        """Whether an attempt that an earlier run of the worker had begun may go on: its order still
+        stands. It is then the one that `cancelled` is about."""
+        name = AttemptName.of(order)
+        if name in self._withdrawn or self._standing.get(OrderAddress.of(order)) != name:
+            return False
+        self._running = name
+        self.cancelled.clear()
+        return True
 
     async def receive(self, address: OrderAddress, order: Order | None) -> None:
         """Take in what stands on an order's key; `None`: nothing any more."""
@@ -148,6 +160,8 @@ class OrderQueue:
             self._queue.remove(name)
             order = self._journal.ledger.attempts[name].order
             self._end_unstarted(order, f"{why} before it started")
+        else:
+            self._withdrawn.add(name)
 
     def _end_unstarted(self, order: Order, reason: str) -> None:
         report = make_report(order, self._incarnation, ReportState.CANCELLED, reason=reason)

@@ -19,25 +19,16 @@ LEAST_LOOKS = 2
 @skill("pick", parameters={"object": ParameterKind.OBJECT, "place": ParameterKind.PLACE})
 async def pick(ctx: SkillContext, object: str, place: str) -> None:
     """Take an object into the hand."""
-    held = await ctx.holding()
-    if held == object:
-        return  # an earlier try went as far as the grasp
-    if held is not None:
-        raise SkillFailed(
-            f"{ctx.robot} holds {held} already, one hand cannot take {object} too", retryable=False
-        )
+    if not await ctx.has_hand_for(object):
+        return
     await ctx.be_in(place)
     seen = await _find(ctx, object, place)
-    await ctx.do(MotionKind.APPROACH, point_m=seen.point_m)
+    await ctx.do(MotionKind.APPROACH, object=object, point_m=seen.point_m)
     # From close by the point is known better than from across the room.
     near = next((d for d in await ctx.look() if d.object == object), seen)
     await ctx.do(MotionKind.GRASP, object=object, point_m=near.point_m)
     await ctx.do(MotionKind.STOW)
-    if await ctx.holding() != object:
-        ctx.observe(AT, object, None)
-        raise SkillFailed(f"{object} was grasped in {place} but slipped out of the hand")
-    ctx.observe(HOLDING, ctx.robot, object)
-    ctx.observe(AT, object, ctx.robot)
+    ctx.observe_taken(object, await ctx.holding(), f"in {place}")
 
 
 async def _find(ctx: SkillContext, object: str, place: str) -> Detection:
@@ -51,7 +42,8 @@ async def _find(ctx: SkillContext, object: str, place: str) -> Detection:
                     seen |= await look_at(ctx, container)
             if (found := seen.get(object)) is not None:
                 where = ctx.world.whereabouts(found)
-                if ctx.world.place_of(where) in (place, None):
+                at = ctx.world.place_of(where)
+                if at is None or ctx.world.within(at, place):
                     return found
                 raise SkillFailed(
                     f"{object} is at {where}, not in {place}",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from keyexpr_schema.facts import AT, HOLDING
 from keyexpr_schema.payloads.motions import MotionKind
 from workers.errors import SkillFailed
 from workers.skill_context import SkillContext
@@ -20,13 +19,8 @@ from workers.skills.place_on_robot import stand_beside
 )
 async def pick_from_robot(ctx: SkillContext, object: str, carrier: str, place: str) -> None:
     """Take an object out of the basket of a robot that stands in the same place."""
-    held = await ctx.holding()
-    if held == object:
-        return  # an earlier try went as far as the grasp
-    if held is not None:
-        raise SkillFailed(
-            f"{ctx.robot} holds {held} already, one hand cannot take {object} too", retryable=False
-        )
+    if not await ctx.has_hand_for(object):
+        return
     await ctx.be_in(place)
     point = await stand_beside(ctx, carrier, place)
     seen = next((d for d in await ctx.look() if d.object == object), None)
@@ -40,8 +34,4 @@ async def pick_from_robot(ctx: SkillContext, object: str, carrier: str, place: s
         point = seen.point_m
     await ctx.do(MotionKind.GRASP, object=object, robot=carrier, point_m=point)
     await ctx.do(MotionKind.STOW)
-    if await ctx.holding() != object:
-        ctx.observe(AT, object, None)
-        raise SkillFailed(f"{object} was grasped at {carrier} but slipped out of the hand")
-    ctx.observe(HOLDING, ctx.robot, object)
-    ctx.observe(AT, object, ctx.robot)
+    ctx.observe_taken(object, await ctx.holding(), f"at {carrier}")

@@ -13,7 +13,7 @@ from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel, condition_holds
 from keyexpr_schema.facts import FactKey, Literal, Value
 from keyexpr_schema.ids import actor_arg
-from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.goals import Condition, Precedence
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 
@@ -56,6 +56,8 @@ class PlanGoals:
             yield from self._at_any_time(condition, wanted=True)
         for condition in self._plan.never:
             yield from self._at_any_time(condition, wanted=False)
+        for row in self._plan.sometime_before:
+            yield from self._in_order(row)
 
     def _at_any_time(self, condition: Condition, wanted: bool) -> Iterator[Violation]:
         formula = _formula_of(condition)
@@ -76,6 +78,24 @@ class PlanGoals:
                 f"tasks: say which of {listed(failure.after)} come first"
             )
         yield Violation(code="constraint-violated", sentence=sentence, condition=condition)
+
+    def _in_order(self, row: Precedence) -> Iterator[Violation]:
+        try:
+            failure = self._states.failure_of_order(
+                _formula_of(row.first), _formula_of(row.then), aboard=True
+            )
+        except Undecided:
+            return
+        if failure is None:
+            return
+        when = f"after {listed(failure.after)}" if failure.after else "at the start"
+        sentence = f"{row.first} must hold before {row.then} does, and need not have {when}"
+        if failure.open:
+            sentence = (
+                f"{row.first} must hold before {row.then} does, and whether it does depends on the "
+                f"order of too many tasks: say which of {listed(failure.after)} come first"
+            )
+        yield Violation(code="constraint-violated", sentence=sentence, condition=row.then)
 
     def _final_facts(self, requirements: Mapping[str, Requirement]) -> dict[FactKey, Value]:
         """Every variable at the end; unknown where the order of its last writers is open."""

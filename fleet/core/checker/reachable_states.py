@@ -106,6 +106,41 @@ class ReachableStates:
                 return found
         return None
 
+    def failure_of_order(
+        self, first: Formula, then: Formula, *, aboard: bool = False
+    ) -> Failure | None:
+        """Where `then` holds and `first` never did before, in some order of the tasks.
+
+        Raises:
+            Undecided: it depends on which robots actors will be.
+        """
+        first, then = (expanded(formula, self._world) for formula in (first, then))
+        may, _ = outcomes(then, self._ever, self._world, aboard=aboard)
+        if not may:
+            return None
+        read = reads(then, self._ever, self._world, aboard=aboard)
+        read |= reads(first, self._ever, self._world, aboard=aboard)
+        variables = sorted(self._closure(read))
+        mask = 0
+        for variable in variables:
+            mask |= self._writers.mask(variable)
+        stepped = self._stepping(variables)
+
+        def holds(formula: Formula, state: State) -> bool:
+            known = dict(zip(variables, state, strict=False))
+            return evaluate(formula, known.get, self._world, aboard=aboard)
+
+        def after(name: str, state: State) -> State:
+            # Behind the values stands whether `first` has held in a state before this one.
+            *values, passed = state
+            return (*stepped(name, tuple(values)), passed or holds(first, state))
+
+        start = (*(self._start(variable) for variable in variables), False)
+        for done, state in self._explore(mask, start, after):
+            if not state[-1] and holds(then, state):
+                return Failure(then, self._graph.named(done))
+        return self._too_many(then, mask) if self._gave_up else None
+
     def _part(self, part: Formula, task: str | None, aboard: bool) -> Failure | None:
         seen: dict[FactKey, tuple[int, bool]] = {}
 

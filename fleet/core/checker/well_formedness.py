@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 
-from fleet.core.model.parameter_types import BASE_TYPES, ROBOT, ParameterType
+from msgspec.structs import replace
+
+from fleet.core.model.parameter_types import BASE_TYPES, ROBOT, ParameterType, parse_type
+from fleet.core.model.programs import ROBOT_ARGUMENT, TEXT_ARGUMENT, program_action
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.ids import actor_arg, actor_in
 from keyexpr_schema.payloads.plans import Plan, Task, Violation
+from keyexpr_schema.payloads.programs import DO, Program
 
 
 class _Malformed(Exception):
@@ -48,7 +52,28 @@ class PlanForm:
     def _report(self, code: str, sentence: str, task: str | None = None) -> None:
         self.violations.append(Violation(code=code, sentence=sentence, task=task))
 
+    def _program(self, task: Task, program: Program) -> Action:
+        """A task with a program: each call of it is checked like a task."""
+        if task.skill != DO or set(task.args) != {ROBOT_ARGUMENT, TEXT_ARGUMENT}:
+            raise _Malformed(
+                "wrong-arguments",
+                f"a task with a program is called {DO} and takes {ROBOT_ARGUMENT} and "
+                f"{TEXT_ARGUMENT}, not {task.skill} with {', '.join(task.args) or 'nothing'}",
+            )
+        if not program.code:
+            raise _Malformed("no-program", f"nobody has written a program for {program.text!r}")
+        for step in program.steps:
+            own = {n: task.args[ROBOT] if v == ROBOT else v for n, v in step.args.items()}
+            self._action(replace(task, skill=step.skill, args=own, program=None))
+        robot = self._bound(task, ROBOT_ARGUMENT, parse_type(ROBOT))
+        action = program_action(program, {**task.args, ROBOT_ARGUMENT: robot}, self._world.skills)
+        if action is None:
+            raise _Malformed("unknown-skill", "its program calls a skill that nobody knows")
+        return action
+
     def _action(self, task: Task) -> Action:
+        if task.program is not None:
+            return self._program(task, task.program)
         skill = self._world.skills.get(task.skill)
         if skill is None:
             raise _Malformed(

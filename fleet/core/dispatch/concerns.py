@@ -15,6 +15,9 @@ from fleet.core.state import State
 from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
+WATCHED_SINCE_LOGIC = 4
+"""Since then, what must always, never, or not yet hold is looked at when it may have changed."""
+
 
 @dataclass
 class Concerns:
@@ -77,6 +80,8 @@ class Concerns:
             self.tasks[plan].update(index.graph.successors.get(task, ()))
             if record.goal is not None and record.goal not in index.goal_open:
                 self.goals[plan].add(record.goal)
+        if state.logic >= WATCHED_SINCE_LOGIC and entry.plan.is_constrained:
+            self.goals[plan].update(entry.plan.goals)
         if index.unfinished == 0 or index.broken or entry.cancelling:
             self.plans.add(plan)
         if task in entry.unwanted:  # what is about the same facts may start now
@@ -93,5 +98,7 @@ class Concerns:
         concerned = (subject,) if subject in state.places else carried_by(index, subject)
         for about in concerned:
             self._goals(state, index.goals_about.get(about, ()))
+            if state.logic >= WATCHED_SINCE_LOGIC:
+                self._goals(state, index.goals_watching.get(about, ()))
         if key.relation == AT:
             self.plans.update(p for p in index.active if subject in state.plans[p].plan.seeks)

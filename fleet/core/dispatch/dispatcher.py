@@ -6,12 +6,13 @@ from collections.abc import Iterable
 
 from msgspec.structs import replace
 
-from fleet.core.dispatch.concerns import Concerns
+from fleet.core.dispatch.concerns import WATCHED_SINCE_LOGIC, Concerns
 from fleet.core.dispatch.deadlock import break_deadlock
 from fleet.core.dispatch.delays import next_lateness, react_to_delays
 from fleet.core.dispatch.lost_robots import give_up_work_of_lost_robots, lost, next_loss
 from fleet.core.dispatch.ready_tasks import by_priority, may_order, order_ready
 from fleet.core.dispatch.replan_triggers import unforeseen
+from fleet.core.dispatch.trajectory import broken, with_passed
 from fleet.core.handlers.goals import next_stage
 from fleet.core.handlers.requests import plan_waiting_goals
 from fleet.core.indexes.touches import UNTOUCHED
@@ -61,10 +62,14 @@ def _look_at(state: State, concerns: Concerns) -> State:
     if robots:
         concerned.update(state.index.active)
     for plan in by_priority(state, concerned):
-        entry, whole = state.plans[plan], plan in concerns.plans
+        whole = plan in concerns.plans
+        watched = state.plans[plan].plan.goals if whole else sorted(concerns.goals.get(plan, ()))
+        state = with_passed(state, watched)
+        entry = state.plans[plan]
         if may_order(state, entry):
-            goals = entry.plan.goals if whole else sorted(concerns.goals.get(plan, ()))
-            state = _mark_reached(state, entry, goals)
+            state = _mark_reached(state, entry, watched)
+            if not whole and state.logic >= WATCHED_SINCE_LOGIC:
+                state = _keep_constraints(state, state.plans[plan], watched)
             if whole or plan in concerns.teams:
                 state = _end_or_replan(state, state.plans[plan])
             entry = state.plans[plan]
@@ -85,6 +90,13 @@ def _end_or_replan(state: State, entry: PlanEntry) -> State:
     if entry.index.broken:
         return give_up(state, entry, "a task of the plan was cancelled or failed")
     return state
+
+
+def _keep_constraints(state: State, entry: PlanEntry, goals: Iterable[str]) -> State:
+    if entry.job is not None or entry.replan is not None:
+        return state
+    changed = broken(state, entry, goals)
+    return state if changed is None else set_entry(state, changed)
 
 
 def _cancel_or_make_again(state: State, entry: PlanEntry) -> State:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from fleet.core.belief_updates import ONE_VARIABLE_SINCE_LOGIC
+from fleet.core.dispatch.trajectory import broken
 from fleet.core.indexes.fleet_index import carried_by
 from fleet.core.indexes.plan_index import OUTSTANDING
 from fleet.core.model.derived import holds
@@ -128,27 +129,9 @@ def unforeseen(state: State, entry: PlanEntry) -> PlanEntry | None:
     """The entry with what has come up that the plan does not provide for, if anything has."""
     return (
         _found_or_not_done(state, entry)
-        or _constraint_broken(state, entry)
+        or broken(state, entry, entry.plan.goals)
         or _new_robots(state, entry)
     )
-
-
-def _constraint_broken(state: State, entry: PlanEntry) -> PlanEntry | None:
-    """With what must always, or never, hold and is otherwise: no plan for those goals is left."""
-    if not (entry.plan.always or entry.plan.never):
-        return None
-    world = state.world()
-    for goal in entry.plan.goals:
-        status, spec = state.goal_states.get(goal), state.goals.get(goal)
-        if spec is None or status is None or status.state is GoalState.REACHED:
-            continue
-        for rows, wanted in ((spec.always, True), (spec.never, False)):
-            for condition in rows:
-                if world.holds(condition) is not wanted:
-                    often, does = ("always", "does not") if wanted else ("never", "does now")
-                    sentence = f"{condition} must {often} hold, and {does}"
-                    return entry.to_replan(ReplanScope.REPAIR, sentence, goals=(goal,))
-    return None
 
 
 def _found_or_not_done(state: State, entry: PlanEntry) -> PlanEntry | None:

@@ -11,6 +11,7 @@ from fleet.core.belief_updates import conclude
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.indexes.fact_views import FactValues
 from fleet.core.indexes.touches import Part, Touch
+from fleet.core.model.declarations import misfit, relations_of
 from fleet.core.model.derived import holds
 from fleet.core.over import goal_taken_back
 from fleet.core.plan_entry import PlanEntry
@@ -27,7 +28,7 @@ from fleet.core.state_updates import (
 from fleet.errors import NotUnderstood
 from fleet.language import Reading, WantedGoal, read_goal
 from keyexpr_schema.facts import AT, IN, NOTHING, ON, SEARCHED, Value
-from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.world import Fact
 
 
@@ -183,10 +184,10 @@ def _understand(
         reading = _reading(state, goal)
         stages = reading.stages
         for condition in (condition for stage in stages for condition in stage):
-            for name in condition.subjects:
-                _check_name(state, name)
-            if condition.value not in _words(state, condition.relation):
-                _check_name(state, condition.value)
+            _check_condition(state, condition)
+        for condition in goal.constraints:
+            _check_relation(state, condition)
+            _check_condition(state, condition)
     except NotUnderstood as error:
         return replace(status, state=GoalState.REJECTED, reason=str(error)), None
     status = replace(status, conditions=stages[0], stages=stages, note=_note(state, reading))
@@ -229,6 +230,25 @@ def _presume(state: State, goal: str, reading: Reading) -> State:
             source = f"{PLANNER_SOURCE}:{goal}"
             state = conclude(state, Fact.of(literal, source, state.time_s))
     return state
+
+
+def _check_condition(state: State, condition: Condition) -> None:
+    for name in condition.subjects:
+        _check_name(state, name)
+    for literal in condition.literals:
+        if (wrong := misfit(literal, state.world())) is not None:
+            raise NotUnderstood(wrong)
+    if condition.value not in _words(state, condition.relation):
+        _check_name(state, condition.value)
+
+
+def _check_relation(state: State, condition: Condition) -> None:
+    known = relations_of(state.world())
+    if condition.relation not in known:
+        raise NotUnderstood(
+            f"{condition}: {condition.relation!r} is no relation that skills or facts speak of; "
+            f"those are {', '.join(sorted(known))}"
+        )
 
 
 def _words(state: State, relation: str) -> tuple[str, ...]:

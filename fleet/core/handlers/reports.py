@@ -24,7 +24,7 @@ from fleet.core.state_updates import (
     touch,
     without_goal,
 )
-from keyexpr_schema.payloads.goals import GoalState
+from keyexpr_schema.payloads.goals import Condition, GoalState
 from keyexpr_schema.payloads.system import LARGEST_EPOCH
 from keyexpr_schema.payloads.tasks import Report, ReportState, TaskRecord, TaskState
 from keyexpr_schema.payloads.world import Fact
@@ -82,6 +82,7 @@ def _ended(record: TaskRecord, report: Report, to: TaskState) -> TaskRecord:
         reason=report.reason,
         started_s=record.started_s if report.started_s is None else report.started_s,
         ended_s=report.ended_s,
+        trace=report.program,
     )
 
 
@@ -91,6 +92,7 @@ def _again(record: TaskRecord, report: Report) -> TaskRecord:
         state=TaskState.WAITING,
         tries=(*record.tries, *report.tries),
         reason=report.reason,
+        trace=report.program,
     )
 
 
@@ -103,16 +105,27 @@ def _succeeded(
     state = _learned(state, record, report, action)
     world = before.world()
     for literal in made_true(action, world.facts, world) if action is not None else ():
+        if record.program is not None and literal.value is None:
+            continue  # what a program leaves open, its calls have told
         fact = Fact.of(literal, PLANNER_SOURCE, report.ended_s or state.time_s)
         fact = as_written(state, fact)
         if fact.key not in reported:
             state = conclude(state, replace(fact, value=known_finer(state, fact.literal)))
+    if (unmet := _not_as_wanted(state, record)) is not None:
+        return _failed(state, entry, record, replace(report, reason=f"{unmet} does not hold"))
     state = set_record(state, entry, _ended(record, report, TaskState.SUCCEEDED))
     if record.task in entry.unwanted:
         entry = state.plans[entry.plan.plan]
         if (again := _wanted_again(entry, record)) is not None:
             state = set_record(state, entry, again)
     return state
+
+
+def _not_as_wanted(state: State, record: TaskRecord) -> Condition | None:
+    """What a sentence for a robot wanted, and its program has not brought about."""
+    stages = () if record.program is None else record.program.stages
+    world = state.world()
+    return next((c for c in (stages[-1] if stages else ()) if not world.holds(c)), None)
 
 
 def _wanted_again(entry: PlanEntry, done: TaskRecord) -> TaskRecord | None:
@@ -132,6 +145,7 @@ def _learned(state: State, record: TaskRecord, report: Report, action: Action | 
     if (
         spec is None
         or action is None
+        or record.program is not None
         or record.way_s is None
         or report.started_s is None
         or report.ended_s is None
@@ -149,6 +163,7 @@ def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) 
     if entry.ended or record.task in entry.unwanted:
         return set_record(state, entry, record)
     reason = f"{record.task} ({record.skill}) failed: {report.reason}"
+    entry = _with_another_program(entry, record, report)
     entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=(record.goal,))
     if not report.retryable and (call := _hopeless(state, record, report)) is not None:
         entry = replace(entry, hopeless=(*entry.hopeless, call))
@@ -163,6 +178,19 @@ def _failed(state: State, entry: PlanEntry, record: TaskRecord, report: Report) 
             state = mark_goals(state, (record.goal,), GoalState.FAILED, entry.plan.plan, sentence)
             entry = replace(entry, plan=without_goal(state, entry.plan, record.goal))
     return set_record(state, entry, record)
+
+
+def _with_another_program(entry: PlanEntry, record: TaskRecord, report: Report) -> PlanEntry:
+    """With the sentence as a wish again, if that could help: its program is then written anew, for
+    what is known now."""
+    wish = entry.added.get(record.actor)
+    if record.program is None or wish is None or not report.retryable:
+        return entry
+    count = entry.failures.get(record.program.text, 0) + 1
+    entry = replace(entry, failures=entry.failures.set(record.program.text, count))
+    if count >= MAX_FAILURES:
+        return entry
+    return entry.wishing(replace(wish, request=None, after=(), robot=record.robot))
 
 
 def _hopeless(state: State, record: TaskRecord, report: Report) -> Hopeless | None:

@@ -22,8 +22,11 @@ from fleet.core.state_updates import (
     set_entry,
     touch,
 )
+from fleet.errors import NotUnderstood
+from fleet.language import read_goal
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
+from keyexpr_schema.payloads.programs import DO, Program
 from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest, ReplanRequest
 
 _NUMBERED = re.compile("plan-([1-9][0-9]{0,14})")
@@ -87,6 +90,7 @@ def _start_planning(state: State, ask: PlanRequest) -> State:
         made_by=ask.planner,
         allocator=ask.allocator,
         autostart=ask.start,
+        programs=ask.programs,
     )
     job = PlanningJob.of(state.jobs + 1, plan, ask.planner)
     job = replace(job, request=ask.request, dry_run=ask.dry_run)
@@ -263,6 +267,9 @@ def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State | st
         if before not in entry.records:
             tasks = ", ".join(entry.records) or "no tasks"
             return f"the new task cannot wait for {before}: plan {ask.plan} has {tasks}"
+    if ask.skill == DO:
+        wish = _sentence(state, ask)
+        return wish if isinstance(wish, str) else set_entry(state, entry.wishing(wish))
     if "robot" in ask.args:
         robot = ask.args["robot"]
         return (
@@ -273,6 +280,29 @@ def _add_task(state: State, entry: PlanEntry, ask: ControlRequest) -> State | st
         request=ask.request, skill=ask.skill, args=ask.args, after=ask.after, robot=ask.robot
     )
     return set_entry(state, entry.wishing(wish))
+
+
+def _sentence(state: State, ask: ControlRequest) -> TaskAdded | str:
+    """A sentence for a robot as a task, or why it is none. Its program is written by the planning
+    job that checks it."""
+    args = dict(ask.args)
+    robot, text = args.pop("robot", ask.robot), args.pop("text", None)
+    if args or not text:
+        return f'{DO} takes text="a sentence" and, if one robot shall do it, robot=NAME'
+    if robot is not None and robot not in state.robots:
+        return f"there is no robot {robot}; known are {', '.join(sorted(state.robots)) or 'none'}"
+    try:
+        stages = read_goal(text, state.vocabulary()).stages
+    except NotUnderstood as error:
+        return f"{text!r}: {error}"
+    return TaskAdded(
+        request=ask.request,
+        skill=DO,
+        args={"text": text},
+        after=ask.after,
+        robot=robot,
+        program=Program(text=text, stages=stages),
+    )
 
 
 _CONTROLS = {

@@ -8,6 +8,7 @@ from fleet.core import events
 from fleet.core.belief_updates import as_written, conclude, known_finer
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.indexes.touches import Part, Touch
+from fleet.core.model.declarations import misfit
 from fleet.core.state import State
 from fleet.core.state_updates import (
     touch,
@@ -58,7 +59,10 @@ def understand_again(state: State) -> State:
 def _read_statement(state: State, statement: Statement) -> State:
     name, said_s = statement.statement, statement.said_s
     try:
-        read = statement_facts(statement.text, state.vocabulary())
+        read = tuple(statement_facts(statement.text, state.vocabulary()))
+        for literal in read:
+            if (wrong := misfit(literal, state.world())) is not None:
+                raise NotUnderstood(wrong)
     except NotUnderstood as error:
         status = StatementStatus(statement=name, reason=str(error), said_s=said_s)
         return _set_status(state, status)

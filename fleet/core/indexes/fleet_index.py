@@ -51,6 +51,7 @@ class FleetIndex(msgspec.Struct, frozen=True, eq=False):
     said_on: immutables.Map[str, Variables] = immutables.Map()
     parts: Sets = immutables.Map()
     goals_about: Sets = immutables.Map()
+    goals_watching: Sets = immutables.Map()
     plans_of: immutables.Map[str, tuple[str, ...]] = immutables.Map()
     in_state: immutables.Map[GoalState, Names] = immutables.Map()
     job_of: immutables.Map[int, str] = immutables.Map()
@@ -102,6 +103,12 @@ def carried_by(index: FleetIndex, name: str) -> Iterator[str]:
             more = [name for name in found.get(carrier, EMPTY) if name not in seen]
             seen.update(more)
             open_.extend(more)
+
+
+def constrained_subjects(goal: Goal | None) -> frozenset[str]:
+    """What must always, never, or not yet hold for a goal is about."""
+    rows = () if goal is None else goal.constraints
+    return frozenset(subject for condition in rows for subject in condition.subjects)
 
 
 def subjects_of(status: GoalStatus | None) -> frozenset[str]:
@@ -168,6 +175,10 @@ def index_of(
         if (rest := rest_in(fact)) is not None:
             said_on = in_set(said_on, rest, fact.key, True)
     goals_about: Sets = immutables.Map()
+    goals_watching: Sets = immutables.Map()
+    for name, spec in goals.items():
+        for subject in constrained_subjects(spec):
+            goals_watching = in_set(goals_watching, subject, name, True)
     in_state: immutables.Map[GoalState, Names] = immutables.Map()
     for goal, status in goal_states.items():
         if status.state in UNPLANNED:
@@ -181,6 +192,7 @@ def index_of(
         said_on=said_on,
         parts=parts,
         goals_about=goals_about,
+        goals_watching=goals_watching,
         plans_of=immutables.Map({goal: tuple(names) for goal, names in plans_of.items()}),
         in_state=in_state,
         job_of=immutables.Map({e.job.job: p for p, e in plans.items() if e.job is not None}),

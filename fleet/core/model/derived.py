@@ -6,7 +6,8 @@ or a person. All else is read off that, and never stored:
 - `at(x) = p` holds for all that carries x: its carrier, what carries or has that as a part, and so
   on, up to the outermost place. What a hand holds is at that robot or person, and nowhere else.
 - `on(x) = c` and `in(x) = c`: its carrier is the thing c, or a part of it.
-- `reachable(x)`: nothing that carries it, however indirectly, is closed.
+- `reachable(x)`: nothing that carries it, however indirectly, is closed, and nothing that is in the
+  way of it or of what carries it is open.
 - `located(x)`, `held(x)`: something carries it; a robot's hand does.
 
 What a skill needs to be `at` a place is not in a robot's basket: it would have to be taken out
@@ -20,6 +21,7 @@ from typing import Protocol
 
 from keyexpr_schema.facts import (
     AT,
+    BLOCKED_BY,
     HELD,
     HOLDING,
     IN,
@@ -85,18 +87,26 @@ def carriers(
 ) -> Iterator[str]:
     """What carries it, the direct carrier first, the outermost place last. It ends at a hand, and
     unless `aboard` at any robot."""
-    seen, here = {subject}, _carrier(subject, value_of, world)
+    seen, here = {subject}, carrier_of(subject, value_of, world)
     while here is not None and here not in seen:
         yield here
+        if not carries_on(here, subject, value_of, world, aboard=aboard):
+            return
         seen.add(here)
-        if is_robot(here, world) and not aboard:
-            return
-        if is_hand(here, subject, value_of, world):
-            return
-        subject, here = here, _carrier(here, value_of, world)
+        subject, here = here, carrier_of(here, value_of, world)
 
 
-def _carrier(name: str, value_of: ValueOf, world: Inventory) -> str | None:
+def carries_on(
+    carrier: str, carried: str, value_of: ValueOf, world: Inventory, *, aboard: bool
+) -> bool:
+    """Whether what carries the direct `carrier` of something carries that, too: see `carriers`."""
+    if is_robot(carrier, world) and not aboard:
+        return False
+    return not is_hand(carrier, carried, value_of, world)
+
+
+def carrier_of(name: str, value_of: ValueOf, world: Inventory) -> str | None:
+    """What carries it directly, as far as it is known."""
     if (whole := _part_of(name, world)) is not None:
         return whole
     if name in world.places:
@@ -153,7 +163,7 @@ def holds(literal: Literal, value_of: ValueOf, world: Inventory, *, aboard: bool
 
 def is_located(subject: str, value_of: ValueOf, world: Inventory) -> bool:
     """Whether it is known what carries it."""
-    return _carrier(subject, value_of, world) is not None
+    return carrier_of(subject, value_of, world) is not None
 
 
 def _holder(subject: str, value_of: ValueOf, world: Inventory) -> str | None:
@@ -183,8 +193,28 @@ def is_closed(name: str, value_of: ValueOf, world: Inventory) -> bool:
 
 
 def _reachable(subject: str, value_of: ValueOf, world: Inventory) -> bool:
-    around = carriers(subject, value_of, world, aboard=True)
-    return not any(is_closed(carrier, value_of, world) for carrier in around)
+    chain = [subject, *carriers(subject, value_of, world, aboard=True)]
+    if any(is_closed(carrier, value_of, world) for carrier in chain[1:]):
+        return False
+    # What is in the way at a cabinet's top is not at its drawers.
+    wholes = {whole for name in chain if (whole := _part_of(name, world)) is not None}
+    return not any(
+        thing not in chain and value_of(FactKey(IS_OPEN, thing)) is True
+        for name in chain
+        if name not in wholes
+        for thing in _in_the_way(name, lambda key: (value_of(key),), world)
+    )
+
+
+def _in_the_way(name: str, values_of: ValuesOf, world: Inventory) -> Iterator[str]:
+    """What hands at a thing meet while it is open."""
+    thing = world.objects.get(name)
+    if thing is None:
+        return
+    yield from thing.blocked_by
+    if not thing.movable:
+        found = (value for value in values_of(FactKey(BLOCKED_BY, name)) if value != name)
+        yield from (value for value in found if isinstance(value, str))
 
 
 def read_by(
@@ -207,12 +237,15 @@ def read_by(
             str(value) for key in around if key.relation == AT for value in values_of(key)
         }
         wholes = {whole for name in opened for whole in _wholes(name, world)}
+        things = {name for name in opened | wholes if name in world.objects}
+        for name in (*things, subject):
+            around |= {FactKey(IS_OPEN, other) for other in _in_the_way(name, values_of, world)}
+            if name in world.objects and not world.objects[name].movable:
+                around.add(FactKey(BLOCKED_BY, name))
         return around | {
             FactKey(IS_OPEN, name)
-            for name in opened | wholes
-            if name != subject
-            and name in world.objects
-            and world.objects[name].is_a(Feature.OPENABLE)
+            for name in things
+            if name != subject and world.objects[name].is_a(Feature.OPENABLE)
         }
     if relation in _GOOD_FOR and isinstance(wanted, str) and _carries(wanted, world):
         return {where}

@@ -10,10 +10,12 @@ from fleet.core.model.formulas.effects import Guarded, carried_out, instances
 from fleet.core.model.formulas.evaluation import conjuncts, evaluate, expanded
 from fleet.core.model.formulas.nodes import Formula, Holds, Variable, atoms
 from fleet.core.model.formulas.text import formula_text
+from fleet.core.model.programs import program_action
 from fleet.core.model.skills import Action, Skills
 from fleet.core.model.world import WorldModel, condition_holds, known_value, room_left
 from keyexpr_schema.facts import FactKey, Literal, Value, render_value
-from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.goals import Precedence
+from keyexpr_schema.payloads.plans import Plan
 from keyexpr_schema.payloads.tasks import TaskRecord
 
 ANY = "$"
@@ -22,6 +24,8 @@ ANY = "$"
 
 def action_of(record: TaskRecord, skills: Skills) -> Action | None:
     """The task as a ground action; `None` if the planner was started without that skill."""
+    if record.program is not None:
+        return program_action(record.program, record.args, skills)
     skill = skills.get(record.skill)
     if skill is None or set(skill.parameters) != set(record.args):
         return None
@@ -87,16 +91,17 @@ def made_true(
 
 
 def first_broken(
-    action: Action, always: Iterable[Condition], never: Iterable[Condition], world: WorldModel
+    action: Action, plan: Plan, in_order: Iterable[Precedence], world: WorldModel
 ) -> str | None:
-    """The first condition that would not always, or once, hold if the action were done now, as a
-    phrase, or `None`."""
-    facts: Mapping[FactKey, Value] | None = None
-    for condition, wanted in (*((c, True) for c in always), *((c, False) for c in never)):
-        if facts is None:
-            facts = {**world.facts, **dict(made_true(action, world.facts, world))}
+    """What the plan keeps or avoids and would be otherwise if the action were done now, or would
+    hold too early of what is still `in_order`, as a phrase, or `None`."""
+    facts = {**world.facts, **dict(made_true(action, world.facts, world))}
+    for condition, wanted in (*((c, True) for c in plan.always), *((c, False) for c in plan.never)):
         if condition_holds(facts, condition, world) is not wanted:
             return f"{condition} would {'not ' if wanted else ''}hold then"
+    for row in in_order:
+        if condition_holds(facts, row.then, world) and not world.holds(row.first):
+            return f"{row.then} would hold then, and {row.first} has not yet"
     return None
 
 

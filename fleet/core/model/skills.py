@@ -85,6 +85,8 @@ class SkillModel:
     """Effects that depend on what holds, or change numbers."""
     relations: Mapping[str, RelationType] = field(default_factory=dict)
     """Those of the relations it speaks of whose types are declared."""
+    uses: tuple[str, ...] = ()
+    """Skills that its robot must have for it, where it is a program and no skill of its own."""
     says: tuple[str, ...] = ()
     """Frames in which people ask for it: `cut {food} [up] [with {tool}]`."""
     state_words: tuple[StateWord, ...] = ()

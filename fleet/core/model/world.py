@@ -142,8 +142,10 @@ class WorldModel:
         """Why `robot` cannot stand for a robot `parameter` of the action, or `None` if it can."""
         spec = self.robots[robot]
         skill = action.skill
-        if parameter == skill.actor_parameter and skill.name not in spec.skills:
-            return f"{robot} does not have the skill {skill.name}"
+        if parameter == skill.actor_parameter:
+            for name in skill.uses or (skill.name,):
+                if name not in spec.skills:
+                    return f"{robot} does not have the skill {name}"
         if self.hopeless and parameter == skill.actor_parameter:
             call = call_of(skill.name, {**action.args, parameter: robot})
             if (known := self._hopeless.get(call)) is not None:

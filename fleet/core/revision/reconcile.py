@@ -182,6 +182,7 @@ def _record(
         behind=tuple(names.get(b, b) for b in event.extra_after.get(made_as, ())),
         goal=task.goal,
         duration_s=event.durations_s.get(made_as, task.duration_s),
+        program=task.program,
     )
     if known is None:
         return record

@@ -83,6 +83,7 @@ def _plan(
         allocator=problem.allocator,
         always=problem.always,
         never=problem.never,
+        sometime_before=problem.sometime_before,
     )
 
 

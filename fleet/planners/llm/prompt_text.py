@@ -130,6 +130,8 @@ def _features(thing: Object) -> dict[str, Any]:
         told["features"] = list(thing.features)
     if thing.part_of is not None:
         told["part_of"] = thing.part_of
+    if thing.blocked_by:
+        told["blocked_while_open_by"] = list(thing.blocked_by)
     if thing.room is not None:
         told["room"] = thing.room
     return told

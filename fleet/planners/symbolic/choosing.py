@@ -1,28 +1,36 @@
 """Chooses one action sequence for each subgoal, as the strategy says, by the plans they lead to.
 
 Plans are compared by what they take with a quick allocation; the few best with the best allocation
-there is, if they are small. In the end carriers that go the same way are made one.
+there is, if they are small. Of many goals, the work that sequences are for robots of each kind
+decides first (`workloads`), and a few changes of that choice are compared as plans. In the end
+carriers that go the same way are made one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, cycle, product
+from functools import cached_property
+from itertools import product
 from math import inf, prod
 
 from fleet.core.actors import carried_at_end
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
 from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, PlanningProblem
 from fleet.planners.deordering import ActionSequence, deordered
-from fleet.planners.symbolic.action_sequences import UNLOADING_S, Exploration
-from fleet.planners.symbolic.joint_trips import joined
+from fleet.planners.symbolic.action_sequences import Exploration
+from fleet.planners.symbolic.flat_list import Team, in_one_list
+from fleet.planners.symbolic.joint_trips import Pair, Trips
+from fleet.planners.symbolic.roles import Roles
+from fleet.planners.symbolic.workloads import Balance, Workloads, balanced, unloading_s
 from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
 from fleet.scheduling.quick_allocation import quick_allocation
 from keyexpr_schema.payloads.plans import Plan
 
 MAX_COMBINATIONS = 256
 """Up to this many combinations are all compared; beyond, one sequence is changed at a time."""
+MOST_CHANGES = 32
+"""Of those changes, how many are compared as plans: those that spread the work best."""
 MOST_REFINED, REFINING_NODES = 12, 3000
 """Of those, how many of the most promising get a better allocation, and how long it is sought."""
 MOST_JOINED = 24
@@ -79,12 +87,12 @@ def _allocated(
 
 
 def _cost(schedule: PlanSchedule, checked: CheckedPlan) -> Cost:
-    unloading_s = UNLOADING_S * len(carried_at_end(checked))
-    return round(schedule.makespan_s + unloading_s, 3), sum(schedule.durations_s.values())
+    left_s = unloading_s(checked.world) * len(carried_at_end(checked))
+    return round(schedule.makespan_s + left_s, 3), sum(schedule.durations_s.values())
 
 
-def _promise(found: _Candidate | NoPlan) -> Cost:
-    return (-inf, -inf) if isinstance(found, NoPlan) else found.cost
+def _by_cost(candidate: _Candidate) -> Cost:
+    return candidate.cost
 
 
 class _Best:
@@ -121,10 +129,27 @@ class _Choosing:
     problem: PlanningProblem
     explored: Exploration | None
 
+    @cached_property
+    def roles(self) -> Roles:
+        """Of all sequences."""
+        return Roles(self.problem.world)
+
+    @cached_property
+    def workloads(self) -> Workloads:
+        """Of all sequences."""
+        return Workloads(self.problem.world, self.roles)
+
+    @cached_property
+    def trips(self) -> Trips:
+        """Of all sequences."""
+        return Trips(self.problem.world)
+
     def made(self, options: Sequence[Choice]) -> CheckedPlan | NoPlan:
         """The plan that the problem's strategy leads to."""
         if self.problem.strategy == MONOLITHIC:
             best = self._best([alternatives[:1] for alternatives in options])
+            if isinstance(best, NoPlan) and not self.problem.budget.over:
+                best = self._best(options)
         elif self.problem.strategy == PER_GOAL:
             # What is best for each goal alone may not fit together: two may want one helper.
             best = self._each_alone(options) or self._best(options)
@@ -138,6 +163,8 @@ class _Choosing:
 
     def _each_alone(self, options: Sequence[Choice]) -> _Candidate | None:
         """For each goal what is best as if there were no other, if that is a plan in time."""
+        if prod(map(len, options)) > MAX_COMBINATIONS:
+            return self._each_alone_quickly(options)
         alone, choice = replace(self, explored=None), list[Choice]()
         for goal in dict.fromkeys(alternatives[0].goal for alternatives in options):
             mine = [alternatives for alternatives in options if alternatives[0].goal == goal]
@@ -147,6 +174,26 @@ class _Choosing:
             choice += [(sequence,) for sequence in best.choice]
         together = self._best(choice)
         return together if isinstance(together, _Candidate) else None
+
+    def _each_alone_quickly(self, options: Sequence[Choice]) -> _Candidate | None:
+        """The same for many goals: each goal's sequences done by those who can be there first."""
+        choice: list[ActionSequence] = []
+        for goal in dict.fromkeys(alternatives[0].goal for alternatives in options):
+            mine = [alternatives for alternatives in options if alternatives[0].goal == goal]
+            few = prod(map(len, mine)) <= FEW
+            choices: Iterator[Choice] = product(*(mine if few else (row[:1] for row in mine)))
+            choice += min(choices, key=lambda row: self._alone_s(tuple(row)))
+        if Balance(self.workloads, [choice], choice).estimate.crowded:
+            return None
+        together = self._candidate(choice)
+        return together if isinstance(together, _Candidate) else None
+
+    def _alone_s(self, choice: Choice) -> float:
+        """What they take the team as it stands, with the charge for what is left in baskets."""
+        team = Team(self.problem.world, self.roles)
+        loads = sum(len(role.leaves) for each in choice for role in self.roles.of(each))
+        last_s = max(team.take(each)[1] for each in choice)
+        return last_s + unloading_s(self.problem.world) * loads
 
     def _best(self, options: Sequence[Choice]) -> _Candidate | NoPlan:
         """The cheapest candidate: of few combinations the cheapest of all; else from the cheapest
@@ -164,124 +211,153 @@ class _Choosing:
         return best.result
 
     def _one_at_a_time(self, options: Sequence[Choice]) -> _Candidate | NoPlan:
+        cheapest = [alternatives[0] for alternatives in options]
+        balance = balanced(Balance(self.workloads, options, cheapest), options)
         best = _Best()
-        current = [alternatives[0] for alternatives in options]
-        best.improved(self._candidate(current))
-        unchanged = 0
-        for number, alternatives in cycle(enumerate(options)):
-            if unchanged == len(options):
+        best.improved(self._candidate(balance.chosen))
+        if best.found is None or not self.problem.budget.over:
+            best.improved(self._candidate(cheapest))
+        for tried, (number, sequence) in enumerate(_changes(balance, options)):
+            if self.problem.budget.over or (best.found and tried >= MOST_CHANGES):
                 break
-            unchanged += 1
-            for sequence in alternatives:
-                changed = [*current[:number], sequence, *current[number + 1 :]]
-                if self.problem.budget.over:
-                    return best.result
-                if changed != current and best.improved(self._candidate(changed)):
-                    current, unchanged = changed, 1
+            current = best.found.choice if best.found else balance.chosen
+            best.improved(self._candidate([*current[:number], sequence, *current[number + 1 :]]))
         return best.result
 
     def _ranked(self, choices: Iterator[Choice], most_refined: int) -> list[_Candidate | NoPlan]:
-        """All of them, the cheapest first; so many of the cheapest with better allocations."""
-        candidates: list[_Candidate | NoPlan] = []
+        """All that are valid, the cheapest first; so many of the cheapest with better allocations.
+        Before them why another is not valid, if one is not.
+        """
+        candidates: list[_Candidate] = []
+        failures: list[NoPlan] = []
         for choice in choices:
-            candidates.append(self._candidate(choice))
-            if self.problem.budget.over:
-                break
-        candidates.sort(key=_promise)
-        for number, found in enumerate(candidates[:most_refined]):
-            if self.problem.budget.over:
-                break
+            found = self._candidate(choice)
             if isinstance(found, _Candidate):
-                candidates[number] = found.refined()
-        return sorted(candidates, key=_promise)
+                candidates.append(found)
+            else:
+                failures.append(found)
+            if self.problem.budget.over:
+                break
+        candidates.sort(key=_by_cost)
+        for number, candidate in enumerate(candidates[:most_refined]):
+            if self.problem.budget.over:
+                break
+            candidates[number] = candidate.refined()
+        return [*failures[:1], *sorted(candidates, key=_by_cost)]
 
     def _with_joint_trips(self, begin: _Candidate, options: Sequence[Choice]) -> _Candidate:
         """Sequences for two goals joined into one with one carrier, for as long as that helps."""
         best, ways = begin, [list(alternatives) for alternatives in options]
+        if prod(map(len, ways)) > MAX_COMBINATIONS:
+            best = self._many_joined(best, ways)
+            ways = [[sequence] for sequence in best.choice]
         while (joint := self._joint_trip(best, ways)) is not None:
-            (one, other, sequence), best = joint
-            ways[one] = [sequence]
+            (one, other, made), best = joint
+            ways[one] = [made.sequence]
             del ways[other]
         return best
 
+    def _many_joined(self, begin: _Candidate, options: Sequence[Choice]) -> _Candidate:
+        """Of many goals, all pairs of trips at once that are less work as one, if that helps."""
+        pairs = self.trips.pairs(options)
+        made = [(pair.made.sequence,) for pair in pairs]
+        balance = Balance(self.workloads, [*options, *made], begin.choice)
+        joined: set[int] = set()
+        for one, other, trip in pairs:
+            before = balance.estimate
+            if joined.isdisjoint((one, other)):
+                old = balance.choice[one], balance.choice[other]
+                balance.put(one, trip.sequence)
+                balance.put(other, None)
+                if balance.estimate < before:
+                    joined |= {one, other}
+                else:
+                    balance.put(one, old[0])
+                    balance.put(other, old[1])
+        best = _Best(begin)
+        if joined and not self.problem.budget.over:
+            best.improved(self._candidate(balance.chosen))
+        return best.found or begin
+
     def _joint_trip(
         self, begin: _Candidate, ways: Sequence[Choice]
-    ) -> tuple[_Joint, _Candidate] | None:
+    ) -> tuple[Pair, _Candidate] | None:
         """The pair of trips that makes the cheapest plan as one, and that plan, if it is cheaper.
 
         Of many goals it is the first pair that helps, and the others stay as they are.
         """
         best, chosen = _Best(begin), None
-        for joint in self._joinable(ways):
+        for pair in self.trips.pairs(ways)[:MOST_JOINED]:
             if self.problem.budget.over:
                 break
-            one, other, sequence = joint
+            one, other, made = pair
             few = prod(len(row) for k, row in enumerate(ways) if k not in (one, other)) <= FEW
             rest = list(ways) if few else [(each,) for each in begin.choice]
-            rest[one] = (sequence,)
+            rest[one] = (made.sequence,)
             del rest[other]
             for found in self._ranked(product(*rest), MOST_REFINED):
                 if best.improved(found):
-                    chosen = joint
+                    chosen = pair
             if chosen is not None and not few:
                 break
         return None if chosen is None or best.found is None else (chosen, best.found)
 
-    def _joinable(self, ways: Sequence[Choice]) -> list[_Joint]:
-        """Which two sequences can be one, those first that save most of the carriers' ways."""
-        found: list[tuple[float, _Joint]] = []
-        for one, other in combinations(range(len(ways)), 2):
-            if self.problem.budget.over:
-                break
-            for first, second in product(ways[one], ways[other]):
-                made = joined(first, second, self.problem.world)
-                if made is not None and made.saved_s > 0.0:
-                    found.append((made.saved_s, (one, other, made.sequence)))
-        found.sort(key=lambda row: -row[0])
-        return [joint for _, joint in found[:MOST_JOINED]]
-
     def _candidate(self, choice: Choice) -> _Candidate | NoPlan:
-        plan = _plan(self.problem, choice, self.explored)
+        plan = self._plan(choice)
         checked = check_plan(plan, self.problem.world)
         if isinstance(checked, InvalidPlan):
             return NoPlan(checked.violations[0].sentence, checked.violations)
         made = _allocated(choice, checked, quick_allocation(checked))
         return made or NoPlan("there are fewer robots than the plan needs at the same time")
 
+    def _plan(self, choice: Choice) -> Plan:
+        """The plan of these sequences; it promises the conditions of goals that have one."""
+        problem, explored = self.problem, self.explored
+        sequences = [*choice, *(explored.sequences if explored else ())]
+        if problem.strategy == MONOLITHIC:
+            things = {s for goal in problem.goals for c in goal.conditions for s in c.subjects}
+            constrained = bool(problem.always or problem.never or problem.sometime_before)
+            sequences = in_one_list(sequences, problem.world, self.roles, things, constrained)
+        tasks, pins = deordered(
+            sequences,
+            problem.first_task,
+            one_actor_each=problem.strategy == MONOLITHIC,
+            world=problem.world,
+            in_order=problem.sometime_before,
+        )
+        seeks = frozenset(explored.seeks if explored else ())
+        served = frozenset[str]().union(*(sequence.goals for sequence in choice))
+        conditions = tuple(
+            condition
+            for goal in problem.goals
+            for condition in goal.conditions
+            if seeks.isdisjoint(condition.subjects)
+            and (goal.goal in served or problem.world.holds(condition))
+        )
+        return Plan(
+            plan=problem.plan,
+            revision=problem.revision,
+            goals=tuple(goal.goal for goal in problem.goals),
+            conditions=(*conditions, *(explored.conditions if explored else ())),
+            tasks=tasks,
+            pins=pins,
+            strategy=problem.strategy,
+            made_by="symbolic",
+            allocator=problem.allocator,
+            seeks=tuple(explored.seeks) if explored else (),
+            always=problem.always,
+            never=problem.never,
+            sometime_before=problem.sometime_before,
+        )
 
-_Joint = tuple[int, int, ActionSequence]
-"""Two subgoals by number, and one sequence for both."""
 
-
-def _plan(problem: PlanningProblem, choice: Choice, explored: Exploration | None) -> Plan:
-    """The plan of these sequences; it promises the conditions of goals that have one."""
-    sequences = [*choice, *(explored.sequences if explored else ())]
-    tasks, pins = deordered(
-        sequences,
-        problem.first_task,
-        one_actor_each=problem.strategy == MONOLITHIC,
-        world=problem.world,
-    )
-    seeks = frozenset(explored.seeks if explored else ())
-    served = frozenset[str]().union(*(sequence.goals for sequence in choice))
-    conditions = tuple(
-        condition
-        for goal in problem.goals
-        for condition in goal.conditions
-        if seeks.isdisjoint(condition.subjects)
-        and (goal.goal in served or problem.world.holds(condition))
-    )
-    return Plan(
-        plan=problem.plan,
-        revision=problem.revision,
-        goals=tuple(goal.goal for goal in problem.goals),
-        conditions=(*conditions, *(explored.conditions if explored else ())),
-        tasks=tasks,
-        pins=pins,
-        strategy=problem.strategy,
-        made_by="symbolic",
-        allocator=problem.allocator,
-        seeks=tuple(explored.seeks) if explored else (),
-        always=problem.always,
-        never=problem.never,
-    )
+def _changes(balance: Balance, options: Sequence[Choice]) -> Iterator[tuple[int, ActionSequence]]:
+    """Other sequences for single goals, those first that spread the work best."""
+    rows = [
+        (balance.estimate_with(number, sequence), number, place)
+        for number, alternatives in enumerate(options)
+        for place, sequence in enumerate(alternatives)
+        if sequence is not balance.choice[number]
+    ]
+    for _, number, place in sorted(rows):
+        yield number, options[number][place]

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from heapq import nlargest
 from itertools import pairwise
 from math import inf
 from typing import NamedTuple
@@ -21,6 +22,9 @@ from fleet.core.model.skills import Action, SkillModel
 from fleet.core.model.world import WorldModel, capacity
 from fleet.planners.deordering import ActionSequence, Origin
 from keyexpr_schema.facts import AT, FactKey
+
+MOST_PAIRS = 256
+"""Pairs of trips that are joined to see what that saves: those that promise most."""
 
 
 class _Stop(NamedTuple):
@@ -40,9 +44,16 @@ class _Stop(NamedTuple):
 class _Trip:
     """What happens in a sequence, and who carries; the carrier's drives are left out."""
 
+    sequence: ActionSequence
     stops: tuple[_Stop, ...]
     carrier: str
     drive: SkillModel
+
+    @property
+    def ends(self) -> tuple[str, str]:
+        """Where the carrier is first, and last."""
+        places = [stop.at for stop in self.stops if stop.at is not None]
+        return places[0], places[-1]
 
 
 class Joined(NamedTuple):
@@ -55,7 +66,70 @@ class Joined(NamedTuple):
 def joined(first: ActionSequence, second: ActionSequence, world: WorldModel) -> Joined | None:
     """Both with the carrier of one of them; `None` if there is none, or no basket takes it all."""
     one, other = _trip(first, world), _trip(second, world)
-    if one is None or other is None or one.drive is not other.drive:
+    return None if one is None or other is None else _as_one(one, other, world)
+
+
+class Pair(NamedTuple):
+    """Two subgoals by number, and one sequence for both."""
+
+    one: int
+    other: int
+    made: Joined
+
+
+class Trips:
+    """Finds trips that can be one; what a sequence is as a trip is worked out once."""
+
+    def __init__(self, world: WorldModel) -> None:
+        self._world = world
+        self._known: dict[int, tuple[ActionSequence, _Trip | None]] = {}
+
+    def pairs(self, options: Sequence[Sequence[ActionSequence]]) -> list[Pair]:
+        """Two trips for two of the subgoals that drive less as one, those first that save most.
+
+        Of very many, only those are looked at that promise most by where they begin and end.
+        """
+        rows = [
+            (number, trip)
+            for number, alternatives in enumerate(options)
+            for sequence in alternatives
+            if (trip := self._trip(sequence)) is not None
+        ]
+        found: list[tuple[float, int, int, int, int, Joined]] = []
+        for _, i, j in nlargest(MOST_PAIRS, self._promises(rows)):
+            (one, here), (other, there) = rows[i], rows[j]
+            made = _as_one(here, there, self._world)
+            if made is not None and made.saved_s > 0.0:
+                found.append((-made.saved_s, one, other, i, j, made))
+        found.sort(key=lambda row: row[:-1])
+        return [Pair(one, other, made) for _, one, other, _, _, made in found]
+
+    def _trip(self, sequence: ActionSequence) -> _Trip | None:
+        if id(sequence) not in self._known:
+            self._known[id(sequence)] = sequence, _trip(sequence, self._world)
+        return self._known[id(sequence)][1]
+
+    def _promises(self, rows: Sequence[tuple[int, _Trip]]) -> Iterator[tuple[float, int, int]]:
+        """The shorter way, which both have in common at best, without the ways between their ends;
+        and which two those are."""
+        if not rows:
+            return
+        ends = [trip.ends for _, trip in rows]
+        places = sorted({place for pair in ends for place in pair})
+        number = {place: i for i, place in enumerate(places)}
+        leg_s = [[_leg_s(a, b, rows[0][1].carrier, self._world) for b in places] for a in places]
+        firsts, lasts = ([number[pair[k]] for pair in ends] for k in (0, 1))
+        ways_s = [_way_s(trip, self._world) for _, trip in rows]
+        for i, (subgoal, _) in enumerate(rows):
+            begin_s, end_s, way_s = leg_s[firsts[i]], leg_s[lasts[i]], ways_s[i]
+            for j in range(i + 1, len(rows)):
+                if rows[j][0] != subgoal:
+                    shorter_s = way_s if way_s < ways_s[j] else ways_s[j]
+                    yield shorter_s - begin_s[firsts[j]] - end_s[lasts[j]], i, j
+
+
+def _as_one(one: _Trip, other: _Trip, world: WorldModel) -> Joined | None:
+    if one.drive is not other.drive:
         return None
     room, carrier = max((capacity(trip.carrier, world), trip.carrier) for trip in (one, other))
     merged = _shortest(one.stops, _renumbered(other.stops, one.stops), carrier, room, world)
@@ -65,9 +139,9 @@ def joined(first: ActionSequence, second: ActionSequence, world: WorldModel) -> 
     alone_s = sum(_way_s(trip, world) for trip in (one, other))
     rows = list(_with_drives(stops, {one.carrier, other.carrier}, carrier, one.drive))
     sequence = ActionSequence(
-        first.goal,
+        one.sequence.goal,
         tuple(action for action, _ in rows),
-        first.named | second.named,
+        one.sequence.named | other.sequence.named,
         tuple(origin for _, origin in rows),
         frozenset({carrier}),
     )
@@ -102,7 +176,9 @@ def _trip(sequence: ActionSequence, world: WorldModel) -> _Trip | None:
             stops.append(_Stop(action, origin, None, 0))
     if last is not None:
         stops.append(_Stop(None, last[1], last[0], 0))
-    return _Trip(tuple(stops), carrier, drive)
+    if all(stop.at is None for stop in stops):
+        return None
+    return _Trip(sequence, tuple(stops), carrier, drive)
 
 
 def _loads(action: Action, carrier: str) -> int:

@@ -5,7 +5,8 @@ it are sought (for instance one with a helper that carries), and one is chosen a
 
 * `big-dag` chooses for all goals together, by the makespan that they lead to;
 * `per-goal` chooses for each goal alone, as if there were no other, and merges the results;
-* `monolithic` makes one flat list, each goal going on from where the one before left every robot.
+* `monolithic` makes one flat list, each goal going on from where the one before left every robot
+  (`flat_list`).
 
 Where it is not known where a needed object is, the plan looks for it: a search of every place, by
 all robots that can, in parallel. What is found leads to the next revision.
@@ -13,15 +14,17 @@ all robots that can, in parallel. What is found leads to the next revision.
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections import Counter
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from fleet.core.checker.plan_checker import CheckedPlan
-from fleet.core.model.derived import is_located
-from fleet.core.model.world import WorldModel, condition_holds
+from fleet.core.model.world import condition_holds
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, Planner, PlanningProblem
 from fleet.planners.symbolic.action_sequences import (
+    Exploration,
     GaveUp,
     Impossible,
     Subgoal,
@@ -32,7 +35,8 @@ from fleet.planners.symbolic.action_sequences import (
 from fleet.planners.symbolic.choosing import Choice, choose
 from fleet.planners.symbolic.engine.finite_domain import Trajectory
 from fleet.planners.symbolic.engine.instantiation import Facts
-from keyexpr_schema.facts import AT, HELD, IN, ON
+from keyexpr_schema.facts import AT, HOLDING, FactKey
+from keyexpr_schema.payloads.goals import Condition, Precedence
 
 MAX_RESTORATIONS = 2
 """How often what the sequences for later subgoals undid is reached again, where no plan does."""
@@ -48,53 +52,71 @@ class SymbolicPlanner(Planner):
     strategies = (BIG_DAG, PER_GOAL, MONOLITHIC)
 
     def _solve(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
-        return self._one_by_one(problem, ())
+        world, rows = problem.world, problem.sometime_before
+        for row in rows:
+            if world.holds(row.then):
+                return NoPlan(f"{row.first} must hold before {row.then} does, which it does now")
+        wanted = tuple(row for row in rows if _is_wanted(row.then, problem))
+        made = self._one_by_one(problem, (), wanted)
+        if isinstance(made, CheckedPlan) or made.postponed or wanted == rows:
+            return made
+        # What need not hold could not be avoided, so what has to hold before it does so first.
+        return self._one_by_one(problem, (), rows)
 
     def _one_by_one(
-        self, problem: PlanningProblem, first: tuple[Subgoal, ...]
+        self,
+        problem: PlanningProblem,
+        first: tuple[Subgoal, ...],
+        in_order: tuple[Precedence, ...],
+        set_down: bool = True,
     ) -> CheckedPlan | NoPlan:
-        """A search for one condition after the other, beginning with some."""
+        """A search for one condition after the other, beginning with some, when all that has to
+        hold first has; what may then hold is avoided where it is not one of those `in_order`.
+        `set_down` is that of `_Reached`.
+        """
         world = problem.world
         searching = problem.budget.until(SEARCH_SHARE)
-        reached = _Reached(problem, dict(world.facts), searching)
-        unlocated: list[Subgoal] = []
+        reached = _Reached(problem, dict(world.facts), searching, set_down)
+        lost: dict[Subgoal, tuple[str, ...]] = {}
         late: set[str] = set()
-        subgoals = subgoals_in_order(problem, world.facts)
+        if (failed := reached.pass_first(in_order)) is not None:
+            return failed
+        subgoals = subgoals_in_order(problem, reached.facts)
         subgoals.sort(key=lambda subgoal: subgoal not in first)
         for subgoal in subgoals:
-            if _is_of_lost_things(subgoal, reached.facts, world):
-                # Nobody takes anywhere what is nobody knows where: no need to search for a way.
-                unlocated.append(subgoal)
-                continue
             # One that is hard leaves half of the time to those after it.
             share = 1.0 if subgoal is subgoals[-1] else 0.5
             if not searching.over and reached.add(subgoal, share):
                 continue
             if searching.over or isinstance(reached.failure, GaveUp):
                 late.add(subgoal.goal)
-            elif _needs_locating(subgoal, reached.facts, world):
-                unlocated.append(subgoal)
+            elif reached.failure.unlocated:
+                lost[subgoal] = reached.failure.unlocated
             elif reached.options and subgoal not in first:
                 # What was done for others before may be what makes it impossible.
-                return self._one_by_one(problem, (subgoal, *first))
+                return self._one_by_one(problem, (subgoal, *first), in_order, set_down)
             else:
                 refused = NoPlan(_no_way(subgoal, reached.failure, problem))
                 alone = not any(g.goal == subgoal.goal and g.conditions[1:] for g in problem.goals)
-                return refused if alone else self._each_goal_at_once(problem, refused)
+                return refused if alone else self._each_goal_at_once(problem, in_order, refused)
         if late and len(problem.goals) == 1 and isinstance(reached.failure, GaveUp):
             return NoPlan(reached.failure.reason, postponed=True)
         if late:
-            return _in_time(problem, reached.options, unlocated, late)
-        explored = exploration_for(unlocated, problem, searching) if unlocated else None
-        if unlocated and explored is None:
-            if searching.over:
+            return _in_time(problem, reached.options, late | {subgoal.goal for subgoal in lost})
+        explored: Exploration | None = None
+        if lost:
+            seeks = tuple(dict.fromkeys(thing for things in lost.values() for thing in things))
+            first_lost = next(iter(lost))
+            explored = exploration_for(seeks, first_lost.goal, problem, searching)
+            if explored is None and searching.over:
                 return NoPlan(problem.not_in_time, postponed=True)
-            return NoPlan(_not_found(unlocated[0], problem))
+            if explored is None:
+                return NoPlan(_not_found(lost[first_lost], problem))
         made = choose(problem, reached.options, explored)
         for _ in range(MAX_RESTORATIONS):
             if problem.budget.over:
                 break
-            undone = [s for s in subgoals_in_order(problem, reached.facts) if s not in unlocated]
+            undone = [s for s in subgoals_in_order(problem, reached.facts) if s not in lost]
             if isinstance(made, CheckedPlan) or not (undone and all(map(reached.add, undone))):
                 break
             restored = choose(problem, reached.options, explored)
@@ -102,18 +124,27 @@ class SymbolicPlanner(Planner):
         if isinstance(made, NoPlan):
             if problem.budget.over:
                 return replace(made, postponed=True)  # not all choices were looked at
-            if not unlocated and any(goal.conditions[1:] for goal in problem.goals):
-                return self._each_goal_at_once(problem, made)
+            if reached.any_set_down:
+                return self._one_by_one(problem, first, in_order, set_down=False)
+            if problem.strategy != MONOLITHIC and len(problem.goals) > 1:
+                # What one goal leaves in a hand may be what another begins with.
+                in_a_row = choose(replace(problem, strategy=MONOLITHIC), reached.options, explored)
+                if isinstance(in_a_row, CheckedPlan):
+                    return in_a_row
+            if not lost and any(goal.conditions[1:] for goal in problem.goals):
+                return self._each_goal_at_once(problem, in_order, made)
         return made
 
     def _each_goal_at_once(
-        self, problem: PlanningProblem, otherwise: NoPlan
+        self, problem: PlanningProblem, in_order: tuple[Precedence, ...], otherwise: NoPlan
     ) -> CheckedPlan | NoPlan:
         """All conditions of a goal in one search: what one of them leaves in a hand is there for
         the next, and what is undone on the way is made true again. `otherwise` where that is no
         plan either.
         """
         reached = _Reached(problem, dict(problem.world.facts), problem.budget.until(SEARCH_SHARE))
+        if reached.pass_first(in_order) is not None:
+            return otherwise
         for goal in problem.goals:
             if all(condition_holds(reached.facts, c, problem.world) for c in goal.conditions):
                 continue
@@ -130,44 +161,100 @@ class SymbolicPlanner(Planner):
 class _Reached:
     """Action sequences for one subgoal after the other, and the facts after the cheapest of each.
 
-    Robots of a flat list are `settled`: they start from where the sequence before left them.
+    What was delivered in a robot's basket is taken to be `set_down` there, so that the ways for
+    later subgoals do not depend on how it was delivered: another robot may have done it.
     """
 
     problem: PlanningProblem
     facts: Facts
     budget: TimeBudget
+    set_down: bool = True
     options: list[Choice] = field(default_factory=list)
-    settled: set[str] = field(default_factory=set)
+    any_set_down: bool = False
     failure: Impossible | GaveUp = field(default_factory=lambda: Impossible("nothing was sought"))
+    passed: set[Precedence] = field(default_factory=set)
+
+    def pass_first(self, in_order: tuple[Precedence, ...]) -> NoPlan | None:
+        """Reach what has to hold before something else may; why that cannot be done, if it cannot.
+
+        One may have to come before the other: each is sought while of none that is left the second
+        may hold.
+        """
+        problem, left = self.problem, list(in_order)
+        while left:
+            for row in left:
+                goal = next(g.goal for g in problem.goals if row in g.sometime_before)
+                holds = condition_holds(self.facts, row.first, problem.world)
+                if holds or self.add(Subgoal(goal, row.first), 0.5):
+                    self.passed.add(row)
+                    left.remove(row)
+                    break
+            else:
+                reason = _no_way(Subgoal(goal, row.first), self.failure, problem)
+                return NoPlan(reason, postponed=isinstance(self.failure, GaveUp))
+        return None
 
     def add(self, subgoal: Subgoal, share: float = 1.0) -> bool:
         """Find sequences that reach one more subgoal, in a share of what is left of the time;
         whether there are any.
         """
-        settled = frozenset(self.settled)
         budget = self.budget if share == 1.0 else self.budget.part(share)
         problem = self.problem
-        way = Trajectory(problem.always, problem.never)
-        found = alternatives_for(subgoal, self.facts, problem.world, budget, settled, way)
+        too_early = (row.then for row in problem.sometime_before if row not in self.passed)
+        way = Trajectory(problem.always, (*problem.never, *too_early))
+        if problem.strategy == MONOLITHIC:
+            kept = tuple(c for c in self._in_baskets() if c != subgoal.condition)
+            subgoal = replace(subgoal, others=(*subgoal.others, *kept))
+        found = alternatives_for(subgoal, self.facts, problem.world, budget, on_the_way=way)
         if not isinstance(found, tuple):
             self.failure = found
             return False
         sequences, self.facts = found
         self.options.append(sequences)
-        if self.problem.strategy == MONOLITHIC:
-            for action in sequences[0].actions:
-                self.settled.update(action.participants)
+        if self.set_down:
+            self._set_down(subgoal)
         return True
+
+    def _set_down(self, subgoal: Subgoal) -> None:
+        """Take what it is about to be where the robot is that has it in its basket, if no other
+        condition speaks of it."""
+        for thing in subgoal.condition.subjects:
+            robot = str(self.facts.get(FactKey(AT, thing)))
+            place = self.facts.get(FactKey(AT, robot))
+            if (
+                robot in self.problem.world.robots
+                and place in self.problem.world.places
+                and self.facts.get(FactKey(HOLDING, robot)) != thing
+                and self._spoken_of[thing] == 1
+            ):
+                self.facts = {**self.facts, FactKey(AT, thing): place}
+                self.any_set_down = True
+
+    @cached_property
+    def _spoken_of(self) -> Counter[object]:
+        """In how many conditions things occur."""
+        problem = self.problem
+        rows = [c for goal in problem.goals for c in (*goal.conditions, *goal.constraints)]
+        return Counter(name for c in rows for name in (*c.subjects, c.value))
+
+    def _in_baskets(self) -> Iterator[Condition]:
+        """What is reached by something that is in a basket, and undone if its robot drives off."""
+        problem = self.problem
+        for goal in problem.goals:
+            for condition in goal.conditions:
+                carriers = [self.facts.get(FactKey(AT, s)) for s in condition.subjects]
+                if any(robot in problem.world.robots for robot in carriers) and condition_holds(
+                    self.facts, condition, problem.world
+                ):
+                    yield condition
 
 
 def _in_time(
     problem: PlanningProblem,
     options: Sequence[Choice],
-    unlocated: Sequence[Subgoal],
     late: Set[str],
 ) -> CheckedPlan | NoPlan:
     """A plan for those goals for which everything was found before the time was over."""
-    late = late | {subgoal.goal for subgoal in unlocated}
     goals = tuple(goal for goal in problem.goals if goal.goal not in late)
     found = [sequences for sequences in options if sequences[0].goal not in late]
     none = NoPlan(problem.not_in_time, postponed=True)
@@ -178,18 +265,13 @@ def _in_time(
     return made if isinstance(made, CheckedPlan) else none
 
 
-def _needs_locating(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
+def _is_wanted(condition: Condition, problem: PlanningProblem) -> bool:
+    """Whether a goal cannot be reached without it."""
     return any(
-        subject in world.objects and not is_located(subject, facts.get, world)
-        for subject in subgoal.condition.subjects
-    )
-
-
-def _is_of_lost_things(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
-    """Whether it says where things shall be, and of none it is known where it is."""
-    return subgoal.condition.relation in (AT, ON, IN, HELD) and not any(
-        subject not in world.objects or is_located(subject, facts.get, world)
-        for subject in subgoal.condition.subjects
+        (wanted.relation, wanted.value) == (condition.relation, condition.value)
+        and set(wanted.subjects) <= set(condition.subjects)
+        for goal in problem.goals
+        for wanted in goal.conditions
     )
 
 
@@ -197,6 +279,7 @@ def _no_way(subgoal: Subgoal, why: Impossible | GaveUp, problem: PlanningProblem
     world = problem.world
     kept = [f"{condition} must always hold" for condition in problem.always]
     kept += [f"{condition} must never hold" for condition in problem.never]
+    kept += [f"{row.first} must hold before {row.then} does" for row in problem.sometime_before]
     on_the_way = f"; on the way {' and '.join(kept)}" if kept else ""
     failed = (f"; {known.robot} cannot {known.skill}: {known.reason}" for known in world.hopeless)
     return (
@@ -205,8 +288,8 @@ def _no_way(subgoal: Subgoal, why: Impossible | GaveUp, problem: PlanningProblem
     )
 
 
-def _not_found(subgoal: Subgoal, problem: PlanningProblem) -> str:
-    things = " or ".join(subgoal.condition.subjects)
+def _not_found(lost: Sequence[str], problem: PlanningProblem) -> str:
+    things = " or ".join(lost)
     if problem.searched:
         places = ", ".join(sorted(problem.searched))
         return f"nobody knows where {things} is; looked for in {places}, and not found"

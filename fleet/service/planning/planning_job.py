@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from dataclasses import replace as changed
-from typing import Any
+from typing import Any, TypeVar
 
 from msgspec.structs import replace
 
@@ -21,11 +21,13 @@ from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.contradictions import contradictions, reasons_of
 from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
 from fleet.planners.plan_repair import repair_plan
+from fleet.planners.programs.joining import joined
+from fleet.planners.programs.writer import with_programs
 from fleet.service.composition import Composition
 from fleet.service.planning.job_context import context_of, robots_under_way
-from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.plans import Plan
 
+T = TypeVar("T")
 PLANNERS_SHARE = 0.5
 """Of a job's time, how much its planner has; allocating and checking take the rest."""
 ALLOCATED_BY = 0.9
@@ -159,6 +161,7 @@ class _Run:
         )
         if partial is None:
             return None
+        partial = self._as_programs(partial)
         begun = {task.actor for task in partial.plan.tasks} & set(job.begun_actors)
         busy = robots_under_way(self.given, partial.plan, begun)
         allocated = self._allocate(partial.checked, busy)
@@ -173,6 +176,7 @@ class _Run:
         partial = self._plan()
         if isinstance(partial, NoPlan):
             return partial
+        partial = self._as_programs(partial)
         allocated = self._allocate(partial.checked, robots_under_way(self.given, partial.plan))
         if isinstance(allocated, NotAllocated):
             return NoPlan(allocated.violations[0].sentence, allocated.violations)
@@ -191,7 +195,7 @@ class _Run:
             time_s=self.given.time_s,
             wall_time_s=self.given.wall_time_s,
             job=self.given.job.job,
-            plan=replace(partial.plan, tasks=tuple(timed)),
+            plan=replace(partial.plan, tasks=tuple(timed), programs=self.given.job.programs),
             allocation=dict(allocated.allocation),
             sequence=dict(schedule.sequence),
             extra_after=dict(schedule.extra_after),
@@ -225,7 +229,11 @@ class _Run:
     def _plan(self) -> PartialPlan | NoPlan:
         job = self.given.job
         if job.proposal is not None:
-            checked = check_plan(self._with_goal_conditions(job.proposal), self.world)
+            proposed = self._with_goal_conditions(job.proposal)
+            written = with_programs(proposed, self.world, self.feasibility, self.budget)
+            if isinstance(written, NoPlan):
+                return written
+            checked = check_plan(written, self.world)
             if isinstance(checked, InvalidPlan):
                 violations = (*tasks_nobody_can_do(checked), *checked.violations)
                 return NoPlan(violations[0].sentence, violations)
@@ -245,6 +253,12 @@ class _Run:
         sentence = f"goal {first} cannot be planned: {reasons[first]}"
         return changed(plan, reason=sentence, goal_reasons=reasons)
 
+    def _as_programs(self, partial: PartialPlan) -> PartialPlan:
+        """With programs for what actors do in a row, if that is asked for."""
+        if not self.given.job.programs:
+            return partial
+        return changed(partial, checked=joined(partial.checked))
+
     def _problem(self) -> PlanningProblem:
         return _problem(self.given, self.world, self.budget)
 
@@ -259,8 +273,11 @@ class _Run:
             conditions=_both(plan.conditions, (c for g in goals for c in g.conditions)),
             always=_both(plan.always, (c for g in goals for c in g.always)),
             never=_both(plan.never, (c for g in goals for c in g.never)),
+            sometime_before=_both(
+                plan.sometime_before, (row for g in goals for row in g.sometime_before)
+            ),
         )
 
 
-def _both(mine: Iterable[Condition], wanted: Iterable[Condition]) -> tuple[Condition, ...]:
+def _both(mine: Iterable[T], wanted: Iterable[T]) -> tuple[T, ...]:
     return tuple(dict.fromkeys([*mine, *wanted]))

@@ -88,7 +88,7 @@ def test_the_verdict_is_the_worlds_and_not_the_planners() -> None:
     mistaken = replace(mission, final=MISSIONS["simple-02"].final)
     wrong = run_mission(mistaken, PARTS).faults
     assert "not so: cup_2 in living_room" in wrong
-    assert "moved for no reason: cup_1 is in hallway" in wrong
+    assert "moved for no reason: cup_1 is at hallway_table in hallway" in wrong
 
 
 def test_the_same_mission_runs_the_same_way_twice() -> None:

@@ -232,6 +232,23 @@ def test_a_robot_that_cannot_drive_acts_where_it_stands() -> None:
     assert [t.skill for t in plan.tasks if t.skill != "navigate"] == ["pick", "place_on_robot"]
 
 
+@pytest.mark.parametrize("room", ["kitchen", "living_room"])
+def test_robots_that_cannot_drive_are_not_taken_for_one_another(room: str) -> None:
+    fixed = [
+        msgspec.structs.replace(
+            manipulator(name),
+            skills=("pick", "place_on_robot"),
+            capabilities={"see": 4.0, "grip": 1.0, "reach": 1.0},
+        )
+        for name in ("arm_1", "arm_2")
+    ]
+    stand = (fact("arm_1", "at", "kitchen"), fact("arm_2", "at", "living_room"))
+    there = (fact("cup_1", "at", room),)
+    world = home((*fixed, carrier()), cups=1, facts=(*stand, *there))
+    plan = planned(world, at("cup_1", "hallway"))
+    assert [t.skill for t in plan.tasks if t.skill != "navigate"] == ["pick", "place_on_robot"]
+
+
 HEAVY = Object(object="cup_1", kind="cup", label="cup", mass_kg=9.0)
 
 

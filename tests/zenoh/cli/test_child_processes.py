@@ -60,21 +60,38 @@ async def test_a_process_that_cannot_start_says_why(tmp_path: Path) -> None:
     assert str(processes.log("ghost")) in str(error.value)
 
 
-async def test_a_second_simulation_in_a_realm_is_turned_away(tmp_path: Path) -> None:
+@pytest.mark.parametrize("speed", ["1", "max"])  # the clock of one without pace stands still
+async def test_a_second_simulation_in_a_realm_is_turned_away(tmp_path: Path, speed: str) -> None:
     async with make(tmp_path) as processes:
         await processes.start("router")
         await processes.guard(router_up(processes))
         for name in ("sim", "sim-again"):
-            processes.declare(name, "sim", "two-cups", "--backend", "kinematic")
+            processes.declare(name, "sim", "two-cups", "--backend", "kinematic", "--speed", speed)
         await processes.start("sim")
         await until(lambda: "running" in processes.log("sim").read_text())
         await processes.kill("sim")
-        await processes.start("sim")  # the dead one's scene is there still, and keeps nobody out
+        await processes.start("sim")  # what is left of the dead one keeps nobody out
         await until(lambda: processes.log("sim").read_text().count("running") == 2)
         await processes.start("sim-again")
         with pytest.raises(ProcessDied, match=r"sim-again .*a simulated world runs in realm demo"):
             await processes.guard(asyncio.Event().wait())
         assert processes.pid("sim") is not None
+
+
+async def test_of_two_simulations_that_start_at_once_one_stays(tmp_path: Path) -> None:
+    async with make(tmp_path) as processes:
+        await processes.start("router")
+        await processes.guard(router_up(processes))
+        names = ("sim", "sim-as-well")
+        for name in names:
+            processes.declare(name, "sim", "two-cups", "--backend", "kinematic")
+        await asyncio.gather(*(processes.start(name) for name in names))
+        with pytest.raises(ProcessDied, match=r"sim.* .a simulated world runs in realm demo"):
+            await processes.guard(asyncio.Event().wait())
+        stays = [name for name in names if processes.pid(name) is not None]
+        assert len(stays) == 1
+        await until(lambda: "running" in processes.log(stays[0]).read_text())
+        assert processes.pid(stays[0]) is not None
 
 
 async def test_a_killed_process_can_be_started_again(tmp_path: Path) -> None:

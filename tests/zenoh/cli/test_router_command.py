@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from tests.support.polling import DEADLINE_S
 from tests.support.robotctl import Robotctl
 
 FREE = "tcp/127.0.0.1:0"
@@ -57,4 +58,4 @@ async def test_a_second_router_without_a_store_shows_what_the_first_one_keeps(
         assert not (robotctl.folder / ".local").exists()
     finally:
         second.send_signal(signal.SIGINT)
-        second.communicate(timeout=20)
+        second.communicate(timeout=DEADLINE_S)

@@ -138,13 +138,13 @@ async def test_a_statement_tells_how_it_was_read(
 ) -> None:
     async with person(router.endpoint), planner(router.endpoint, tmp_path / "planner"):
         read = await robotctl.soon("world", "add", "Cup 1 is in the hallway.")
-        unread = await robotctl.soon("world", "add", "The weather is fine.", "--json")
+        unread = await robotctl.soon("world", "add", "The weather is fine.")
         page = (await robotctl.soon("world", "list")).out
     assert "understood as at(cup_1) = hallway" in read.out
-    assert unread.code == 0
-    assert unread.data["status"]["facts"] == []
-    assert unread.data["status"]["reason"]
-    assert "not understood: " in page
+    assert unread.code == 1
+    assert unread.err.count("\n") == 1
+    assert "“The weather is fine.”, not understood: 'The weather' is not" in unread.err
+    assert "not understood: 'The weather'" in page  # and it is kept
 
 
 def test_a_planner_that_is_told_nonsense_says_so(robotctl: Robotctl, tmp_path: Path) -> None:

@@ -20,9 +20,11 @@ from fleet.core.model.formulas.nodes import (
 )
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, room_left
+from fleet.jobshop.time_budget import TimeBudget, Watch
 from fleet.planners.symbolic.engine.instantiation import Facts
-from fleet.planners.symbolic.engine.nodes import Nodes, Stands, State, watch_lists
+from fleet.planners.symbolic.engine.nodes import Nodes, Stands, State, merged
 from fleet.planners.symbolic.engine.travel import Moves, Travel
+from fleet.planners.symbolic.engine.watch_lists import watch_lists
 from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 
@@ -66,6 +68,9 @@ class FiniteDomainTask:
     """Operators and a goal over `nodes`, and what holds on the way there.
 
     `impossible` is a part of the goal that no operator touches and that does not hold.
+
+    Raises:
+        OutOfTime: the `budget` was over before it was made.
     """
 
     def __init__(
@@ -78,6 +83,7 @@ class FiniteDomainTask:
         travel: Travel,
         free: Collection[str],
         on_the_way: Trajectory = ANYHOW,
+        budget: TimeBudget | None = None,
     ) -> None:
         self.world = world
         self.goal = goal
@@ -97,8 +103,12 @@ class FiniteDomainTask:
         self.initial = self.nodes.initial
         self.position = self.nodes.position
         written = [self._written(a, of) for a, of in zip(actions, conditional, strict=True)]
-        rows = zip(actions, conditional, written, strict=True)
-        self.operators = [made for row in rows if (made := self._operator(*row))]
+        self.operators: list[Operator] = []
+        watch = Watch(budget)
+        for row in zip(actions, conditional, written, strict=True):
+            watch.look()
+            if (made := self._operator(*row)) is not None:
+                self.operators.append(made)
         self.impossible: Literal | None = None
         self.goal_needs, self.goal_stands = self._goal()
         self._count_rides()
@@ -199,7 +209,7 @@ class FiniteDomainTask:
             return None
         best: Moves | None = None
         for chosen in islice(product(*options), MAX_GOAL_WAYS):
-            stands = _merged((self.goal_stands, *chosen))
+            stands = merged((self.goal_stands, *chosen))
             if stands is None:
                 continue
             moves = {r: place for r, place in stands if self.where(state, r) != place}
@@ -342,21 +352,11 @@ def _each(effect: ConditionalEffect, world: WorldModel) -> Iterator[ConditionalE
         yield ConditionalEffect(literal.variable, literal.value, one.add, one.when)
 
 
-def _merged(parts: Sequence[Stands]) -> Stands | None:
-    """All of them at once; `None` if a robot would have to be in two places."""
-    stands: dict[str, str] = {}
-    for part in parts:
-        for robot, place in part:
-            if stands.setdefault(robot, place) != place:
-                return None
-    return tuple(stands.items())
-
-
 def _compatible(stands: Stands, options: Sequence[Stands]) -> Stands | None:
     """`stands` with the first of the options that does not contradict them."""
     for option in options:
         if not option:
             return stands
-        if (merged := _merged((stands, option))) is not None:
-            return merged
+        if (both := merged((stands, option))) is not None:
+            return both
     return None

@@ -1,19 +1,19 @@
 """Facts of a task, and what is read off them, numbered: the nodes of its states and heuristics.
 
 A *fact* is a variable with a value. A *reading* is a condition on several variables; `Axiom`s say
-which nodes make it hold. A *ride* is that a thing is with a robot and not in its hand. What has too
+which nodes make it hold, other readings among them: a fork in a bowl is in the kitchen if that is.
+A *ride* is that a thing is with a robot and not in its hand. What has too
 many ways to hold to list them is `Opaque`: only ever evaluated.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from fleet.core.model import derived
-from fleet.core.model.formulas.evaluation import evaluate
-from fleet.core.model.formulas.nodes import Formula, Holds, Not
+from fleet.core.model.formulas.evaluation import conjuncts, evaluate
+from fleet.core.model.formulas.nodes import Formula, Holds, Not, Or
 from fleet.core.model.world import WorldModel, known_value
 from fleet.planners.symbolic.engine.instantiation import Facts
 from fleet.planners.symbolic.engine.readings import (
@@ -36,7 +36,7 @@ _ELSEWHERE = "?"
 
 @dataclass(frozen=True, slots=True)
 class Axiom:
-    """Facts and rides that together make a reading hold where these robots stand."""
+    """Facts, rides and readings that make a reading hold where these robots stand."""
 
     needs: tuple[int, ...]
     stands: Stands
@@ -95,7 +95,6 @@ class Nodes:
         self._facts: dict[tuple[int, Value], int] = {}
         self._values: list[list[Value]] = [[] for _ in self.variables]
         self._readings: dict[object, int | bool] = {}
-        self._chains: dict[tuple[str, bool], list[tuple[Assumed, tuple[str, ...]]]] = {}
         self.initial: State = tuple(
             self.fact(v, self._initial(variable)) for v, variable in enumerate(self.variables)
         )
@@ -163,35 +162,84 @@ class Nodes:
 
     def _read(self, literal: Literal, aboard: bool, innermost: bool) -> int | bool:
         (relation, subject), wanted = literal
-        if relation != AT:
+        if relation != AT or not isinstance(wanted, str):
 
             def read(value_of: ValueOf) -> bool:
                 return derived.holds(literal, value_of, self.world, aboard=aboard)
 
             return self._reading(ways(read, self._domain_elsewhere, self.known))
-        places = self.world.places
+        return self._at(subject, wanted, aboard, innermost and wanted in self.world.places)
 
-        def is_there(chain: tuple[str, ...]) -> bool:
-            if innermost and wanted in places:
-                return next((c for c in chain if c in places), None) == wanted
-            return wanted in chain
+    def _at(self, subject: str, wanted: str, aboard: bool, innermost: bool) -> int | bool:
+        """The node for that `wanted` carries something, directly or not: its carrier does, or is
+        what is wanted."""
+        key = AT, subject, wanted, aboard, innermost
+        if key in self._readings:
+            return self._readings[key]
+        if subject in self.position:
+            found = self._at_by_driving(subject, wanted, innermost)
+            self._readings[key] = self._reading(found)
+            return self._readings[key]
+        # What is in what may be a circle, so there is a node before it is known what it needs.
+        self._readings[key] = node = self._new(-1, None)
 
-        return self._reading(
-            (assumed, is_there(chain)) for assumed, chain in self._chain(subject, aboard)
-        )
+        def read(value_of: ValueOf) -> str | bool:
+            carrier = derived.carrier_of(subject, value_of, self.world)
+            if carrier is None or carrier == wanted:
+                return carrier is not None
+            if innermost and carrier in self.world.places:
+                return False
+            carries = derived.carries_on(carrier, subject, value_of, self.world, aboard=aboard)
+            return carrier if carries else False
 
-    def _chain(self, subject: str, aboard: bool) -> list[tuple[Assumed, tuple[str, ...]]]:
-        """Every way in which a thing can be carried, with all that carries it then."""
-        key = subject, aboard
-        if key not in self._chains:
+        rows = [
+            (
+                assumed,
+                self._at(there, wanted, aboard, innermost) if isinstance(there, str) else there,
+            )
+            for assumed, there in ways(read, self._domain, self.known)
+        ]
+        self._readings[key] = self._reading(rows, node)
+        return self._readings[key]
 
-            def read(value_of: ValueOf) -> tuple[str, ...]:
-                return tuple(derived.carriers(subject, value_of, self.world, aboard=aboard))
+    def _at_by_driving(
+        self, robot: str, wanted: str, innermost: bool
+    ) -> Iterator[tuple[Assumed, bool]]:
+        """The places where a robot that can drive is then."""
+        yield {}, False
+        for place in self.world.places:
+            around = () if innermost else derived.carriers(place, self.known, self.world)
+            if wanted in (place, *around) and self.travel.action(robot, place) is not None:
+                yield {FactKey(AT, robot): place}, True
 
-            self._chains[key] = list(ways(read, self._domain, self.known))
-        return self._chains[key]
+    def _one_of(self, formulas: Sequence[Formula]) -> int | bool:
+        """The node for that one of some formulas holds."""
+        rows: dict[tuple[frozenset[int], Stands], None] = {}
+        for formula in formulas:
+            parts = [self.formula(part) for part in conjuncts(formula)]
+            if all(part is True for part in parts):
+                return True
+            if any(part is False for part in parts):
+                continue
+            needs = frozenset(part for part in parts if part is not True)
+            alone = self._alternatives(*needs) if len(needs) == 1 else [(needs, ())]
+            rows |= dict.fromkeys(alone)
+        return self._holding_by(rows)
+
+    def _holding_by(
+        self, rows: Iterable[tuple[frozenset[int], Stands]], node: int | None = None
+    ) -> int | bool:
+        """The node that holds if all the nodes of a row do; false if there are no rows."""
+        if not rows:
+            return False
+        node = self._new(-1, None) if node is None else node
+        self.axioms[node] = [Axiom(tuple(sorted(needs)), stands, node) for needs, stands in rows]
+        return node
 
     def _read_formula(self, formula: Formula) -> int | bool:
+        if isinstance(formula, Or):
+            return self._one_of(formula.of)
+
         def domain(key: FactKey) -> Sequence[Value] | None:
             if key in self._counted:
                 raise TooManyWays
@@ -229,15 +277,23 @@ class Nodes:
         v = self.number.get(key)
         return (_ELSEWHERE,) if v is not None and v < len(self.position) else self._domain(key)
 
-    def _reading(self, found: Iterable[tuple[Assumed, bool]]) -> int | bool:
-        """A node that holds in some of these ways."""
+    def _reading(
+        self, found: Iterable[tuple[Assumed, int | bool]], node: int | None = None
+    ) -> int | bool:
+        """A node that holds in some of these ways: where they lead to true, or to a node that does.
+
+        Its number is `node`, if it has one already.
+        """
         rows: dict[tuple[frozenset[int], Stands], None] = {}
         always, any_way = True, False
         for assumed, holds in found:
             any_way = True
-            if not holds:
+            if holds is not True:
                 always = False
-                continue
+                if holds is False:
+                    continue
+                if not assumed:
+                    return holds
             needs, stands = set[int](), list[tuple[str, str]]()
             for key, value in assumed.items():
                 if key.relation == AT and key.subject in self.position:
@@ -247,12 +303,20 @@ class Nodes:
                     needs.add(ride)
                 elif not self._is_hand_of_ride(key, assumed):
                     needs.add(self.fact(self.number[key], value))
-            rows[frozenset(needs), tuple(sorted(stands))] = None
-        if always or not rows:
-            return always and any_way
-        node = self._new(-1, None)
-        self.axioms[node] = [Axiom(tuple(sorted(needs)), stands, node) for needs, stands in rows]
-        return node
+            for also, there in self._alternatives(holds):
+                rows[also | needs, tuple(sorted((*stands, *there)))] = None
+        if always and any_way:
+            return True
+        return self._holding_by(rows, node)
+
+    def _alternatives(self, holds: int | bool) -> Sequence[tuple[frozenset[int], Stands]]:
+        """What it takes that a node holds: it, or where robots have to be if that is all."""
+        if holds is True:
+            return ((frozenset(), ()),)
+        axioms = self.axioms.get(holds, ())
+        if axioms and not any(axiom.needs for axiom in axioms):
+            return [(frozenset(), axiom.stands) for axiom in axioms]
+        return ((frozenset({holds}), ()),)
 
     def _ride(self, key: FactKey, value: Value, assumed: Assumed) -> int | None:
         """The node for a thing that is with a robot whose hand, as assumed, holds another."""
@@ -303,67 +367,43 @@ class Nodes:
         at = state[self.variable_of[ride.at_robot]] == ride.at_robot
         return at and state[self.variable_of[ride.in_hand]] != ride.in_hand
 
-    def stands_for(self, node: int, state: State) -> Sequence[Stands]:
+    def stands_for(
+        self, node: int, state: State, above: frozenset[int] = frozenset()
+    ) -> Sequence[Stands]:
         """Where robots have to be for a node to hold in a state; none of them if it does not hold
-        wherever they are.
+        wherever they are. It does not hold by itself, nor by what is `above` it.
         """
         variable = self.variable_of[node]
         if variable >= 0:
             return ((),) if state[variable] == node else ()
         axioms = self.axioms.get(node)
         if axioms is not None:
-            return [
-                axiom.stands
-                for axiom in axioms
-                if all(self.stands_for(need, state) for need in axiom.needs)
-            ]
+            found: list[Stands] = []
+            for axiom in axioms:
+                options: list[Stands] = [axiom.stands]
+                for need in axiom.needs:
+                    if need in above or need == node:
+                        options = []
+                    elif options:
+                        needed = self.stands_for(need, state, above | {node})
+                        both = (merged((one, other)) for one in options for other in needed)
+                        options = [stands for stands in both if stands is not None]
+                found += options
+            return found
         opaque = self.opaque.get(node)
         if opaque is not None:
             read = self.values(state)
             holds = evaluate(opaque.formula, read, self.world, aboard=opaque.aboard)
             return ((),) if holds else ()
-        return ((),) if self._rides(self.rides[node], state) else ()
+        ride = self.rides.get(node)
+        return ((),) if ride is not None and self._rides(ride, state) else ()
 
 
-def watch_lists(nodes: Nodes, rows: Sequence[Sequence[int]]) -> dict[int, list[int]]:
-    """Rows by the facts of which one must hold for all the nodes of the row to hold; -1: by none.
-
-    Chosen so that few rows are found by the same fact.
-    """
-    uses: dict[int, int] = defaultdict(int)
-    for row in rows:
-        for need in row:
-            uses[need] += 1
-    found_by: dict[int, list[int]] = defaultdict(list)
-    facts_of = {need: _deciding_facts(nodes, need) for need in uses}
-    for number, row in enumerate(rows):
-        decisive = [need for need in row if facts_of[need]]
-        best = min(decisive, key=lambda need: uses[need], default=None)
-        for fact in (-1,) if best is None else facts_of[best]:
-            found_by[fact].append(number)
-    return found_by
-
-
-def _deciding_facts(nodes: Nodes, node: int) -> list[int]:
-    """Facts of one variable, one of which holds wherever the node does; none if there are none."""
-    if nodes.variable_of[node] >= 0:
-        return [node]
-    if node in nodes.rides:
-        return [nodes.rides[node].at_robot]
-    facts: dict[int, set[int]] = defaultdict(set)
-    axioms = nodes.axioms.get(node, ())
-    for axiom in axioms:
-        for need in axiom.needs:
-            for fact in _deciding_facts(nodes, need):
-                facts[nodes.variable_of[fact]].add(fact)
-    for variable in sorted(facts):
-        if all(
-            any(
-                nodes.variable_of[fact] == variable
-                for need in axiom.needs
-                for fact in _deciding_facts(nodes, need)
-            )
-            for axiom in axioms
-        ):
-            return sorted(facts[variable])
-    return []
+def merged(parts: Sequence[Stands]) -> Stands | None:
+    """All of them at once; `None` if a robot would have to be in two places."""
+    stands: dict[str, str] = {}
+    for part in parts:
+        for robot, place in part:
+            if stands.setdefault(robot, place) != place:
+                return None
+    return tuple(stands.items())

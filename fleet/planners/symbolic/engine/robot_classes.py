@@ -9,6 +9,7 @@ from fleet.core.model.parameter_types import OBJECT
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.planners.symbolic.engine.relevance import related_skills
+from fleet.planners.symbolic.engine.travel import only_drives
 from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -25,7 +26,8 @@ def representatives(
     thorough: bool = False,
 ) -> list[str]:
     """One robot of each kind that is interchangeable now, as many where a skill takes several of
-    the kind, and those that are spoken of.
+    the kind, and those that are spoken of. Robots of which the facts say different things that
+    skills ask for are of different kinds, and so are those at different places that cannot drive.
 
     What a hand holds, if not the subject, only has to be put down, and each thing more would
     multiply the states to be looked at: a few such robots stand for all, unless it may be a tool,
@@ -41,6 +43,7 @@ def representatives(
     together: dict[object, int] = {}
     goal = [Literal(FactKey(c.relation, c.subject), c.value) for c in conditions]
     skills = related_skills(world, goal)
+    asked = _asked_of_robots(skills)
     for robot in world.team:
         spec = world.robots[robot]
         holds = facts.get(FactKey(HOLDING, robot))
@@ -51,12 +54,25 @@ def representatives(
             if full[able] > MAX_FULL_HANDS:
                 continue
         alone = named or robot in world.marked
-        same = kinds.setdefault((able, holds, robot if alone else None), [])
+        drives = any(
+            name in world.skills and only_drives(world.skills[name]) for name in spec.skills
+        )
+        relations = asked - {AT} if drives else asked
+        known = tuple(facts.get(FactKey(relation, robot)) for relation in sorted(relations))
+        same = kinds.setdefault((able, holds, known, robot if alone else None), [])
         if able not in together:
             together[able] = max([1, *(_places_for(skill, spec) for skill in skills)])
         if len(same) < together[able]:
             same.append(robot)
     return sorted(robot for same in kinds.values() for robot in same)
+
+
+def _asked_of_robots(skills: Sequence[SkillModel]) -> frozenset[str]:
+    """The relations that skills ask of their robots, but for what they hold."""
+    plain = (row.variable for skill in skills for row in skill.before)
+    robots = {name for skill in skills for name in skill.robot_parameters}
+    asked = {variable.relation for variable in plain if variable.subject in robots}
+    return frozenset(asked - {HOLDING})
 
 
 def _needs_a_tool(condition: Condition, world: WorldModel) -> bool:

@@ -1,8 +1,9 @@
 """The cheapest sequence of actions for a task: A* (Hart, Nilsson and Raphael 1968), anytime.
 
-First A* with h_max: what it finds is the cheapest. Where that takes long, a greedy search with
-h_add looks for any sequence, and A* goes on, within limits, for a cheaper one. States are estimated
-when it is their turn, not when they are made; what a relaxed plan begins with has its turn first.
+First A* with h_max: what it finds is the cheapest. Where that takes long, A* with h_FF looks for a
+cheap one; where that takes long, too, a greedy search with h_add for any. Then the first goes on,
+within limits, for a cheaper one. States are estimated when it is their turn, not when they are
+made; what a relaxed plan begins with has its turn first.
 """
 
 from __future__ import annotations
@@ -22,6 +23,10 @@ from fleet.planners.symbolic.engine.travel import Moves
 
 FIRST_STATES = 200
 """States that A* looks at before a greedy search is tried."""
+CHEAP_STATES = 1500
+"""States that A* with h_FF looks at before any sequence will do."""
+CHEAP_SHARE = 0.5
+"""Of the time, how much that has at most."""
 IMPROVING_STATES = 600
 """States that A* looks at in all where there is a sequence already."""
 OTHER_STATES = 15
@@ -195,12 +200,16 @@ class Solver:
             return Unreachable()
         if found:
             return found
-        greedy = Search(self.task, Relaxation(self.task, additive=True), charge_s, GREED)
-        any_found = greedy.run(budget, MAX_STATES)
+        by_plan = Relaxation(self.task, additive=True, by_plan=True)
+        cheap = Search(self.task, by_plan, charge_s, 1.0)
+        any_found = cheap.run(budget.part(CHEAP_SHARE), CHEAP_STATES)
+        if any_found is False:
+            greedy = Search(self.task, Relaxation(self.task, additive=True), charge_s, GREED)
+            any_found = greedy.run(budget, MAX_STATES)
+            if any_found is False:
+                return _unfinished(greedy, self.task)
         if any_found is True:
             return Unreachable()
-        if any_found is False:
-            return _unfinished(greedy, self.task)
         spent_s = any_found.cost_s + sum(self._charges(any_found, charge_s))
         better = careful.run(budget, IMPROVING_STATES, spent_s)
         return better if isinstance(better, Solution) else any_found

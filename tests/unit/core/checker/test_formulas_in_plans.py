@@ -14,7 +14,7 @@ from fleet.core.model.skill_file import skills_from_data
 from fleet.core.model.world import WorldModel
 from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.ids import actor_arg
-from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.goals import Condition, Precedence
 from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.world import Object
 from tests.support.household import home, manipulator
@@ -270,3 +270,36 @@ def test_what_must_always_or_never_hold_does_in_every_order() -> None:
     assert (
         at_once.sentence == "reachable(cup_2) = false must always hold, and does not at the start"
     )
+
+
+def test_what_comes_first_does_in_every_order() -> None:
+    inside = {FactKey("at", "cup_1"): "box", FactKey("at", "cup_2"): "box", **OPEN}
+    out = Condition(relation="held", subject="cup_1", value=True)
+    shut_box = Condition(relation="is_open", subject="box", value=False)
+    row = Precedence(first=out, then=shut_box)
+    fetch = task("t1", "fetch", "a1", object="cup_1")
+    shut = task("t2", "shut", "a2", ("t1",), door="box")
+    work = replace(plan(fetch, shut), sometime_before=(row,))
+    assert not check_plan(work, house(inside)).violations
+    loose = replace(plan(fetch, replace(shut, after=())), sometime_before=(row,))
+    found = check_plan(loose, house(inside)).violations
+    (early,) = (each for each in found if each.code == "constraint-violated")
+    assert early.condition == shut_box
+    assert early.sentence == (
+        "held(cup_1) = true must hold before is_open(box) = false does, and need not have after t2"
+    )
+    # Strictly before: not with it, and not if it holds from the start.
+    same = Precedence(first=shut_box, then=shut_box)
+    assert check_plan(replace(work, sometime_before=(same,)), house(inside)).violations
+    is_open = Condition(relation="is_open", subject="box", value=True)
+    (at_once,) = check_plan(
+        replace(work, sometime_before=(Precedence(first=out, then=is_open),)), house(inside)
+    ).violations
+    assert at_once.sentence.endswith("and need not have at the start")
+    # What held before the plan began, and not the other, came first; so did what never comes.
+    for held in (Precedence(first=is_open, then=out), Precedence(first=shut_box, then=out)):
+        found = check_plan(replace(work, sometime_before=(held,)), house(inside)).violations
+        assert bool(found) is (held.first == shut_box)
+    never = Condition(relation="at", subject="cup_2", value="hallway")
+    kept = Precedence(first=shut_box, then=never)
+    assert not check_plan(replace(work, sometime_before=(kept,)), house(inside)).violations

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from fleet.core.model.skill_file import skills_from_data
 from keyexpr_schema.facts import FactKey, Value
-from keyexpr_schema.payloads.goals import Condition, Goal, GoalState
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, Precedence
 from tests.support.fleet_model import FleetModel
 from tests.support.household import SKILLS, at, bring, manipulator
 
@@ -142,3 +142,85 @@ def test_what_is_kept_holds_only_until_the_goal_is_reached() -> None:
     made.plan(bring(2, "hallway"))
     made.finish()
     assert made.goal_state("g2") is GoalState.REACHED
+
+
+def test_what_has_to_hold_before_the_goal_is_made_so_first() -> None:
+    made = model()
+    first = at("cup_1", "living_room")
+    row = Precedence(first=first, then=at("cup_1", "hallway"))
+    made.plan(replace(bring(1, "hallway"), sometime_before=(row,)))
+    seen: list[str] = []
+    while orders := made.orders():
+        made.succeed(orders[0])
+        seen.append(str(value(made, "at", "cup_1")))
+    assert list(dict.fromkeys(seen)) == ["kitchen", "r1", "living_room", "hallway"]
+    assert made.goal_states["g1"].passed == (first,)
+    assert made.goal_state("g1") is GoalState.REACHED
+
+
+def test_what_one_goal_does_waits_for_what_has_to_come_first_in_another() -> None:
+    made = model(robots=2)
+    row = Precedence(first=at("cup_2", "living_room"), then=at("cup_1", "hallway"))
+    made.plan(replace(bring(1, "hallway"), sometime_before=(row,)), bring(2, "living_room"))
+    order = []
+    while orders := made.orders():
+        # Whoever could bring the first cup does so as soon as that may be.
+        done = next((o for o in orders if "cup_1" in o.args.values()), orders[0])
+        made.succeed(done)
+        order.append((done.skill, done.args.get("object")))
+    assert order.index(("place", "cup_2")) < order.index(("place", "cup_1"))
+    assert made.goal_state("g1") is made.goal_state("g2") is GoalState.REACHED
+
+
+def test_what_is_not_wanted_is_avoided_or_comes_later() -> None:
+    made = model()
+    row = Precedence(first=at("cup_2", "hallway"), then=at("r1", "living_room"))
+    made.plan(replace(bring(1, "hallway"), sometime_before=(row,)))
+    assert len(made.plans["plan-1"].plan.tasks) == 4  # as without
+    made.finish()
+    assert made.goal_state("g1") is GoalState.REACHED
+    made.learn("cup_1", "at", "living_room")
+    made.plan(replace(bring(1, "kitchen"), goal="g5", sometime_before=(row,)))
+    order = []
+    while orders := made.orders():
+        made.succeed(orders[0])
+        order.append((orders[0].skill, tuple(orders[0].args.values())))
+    assert ("place", ("r1", "cup_2", "hallway")) in order or any(
+        skill == "place" and "cup_2" in args and "hallway" in args for skill, args in order
+    )
+    assert made.goal_state("g5") is GoalState.REACHED
+
+
+def test_what_has_held_once_need_not_hold_again() -> None:
+    made = model()
+    first = at("cup_2", "living_room")
+    row = Precedence(first=first, then=at("cup_1", "hallway"))
+    made.plan(replace(bring(1, "hallway"), sometime_before=(row,)))
+    while value(made, "at", "cup_2") != "living_room":
+        made.succeed(made.orders()[0])
+    made.learn("cup_2", "at", "kitchen")  # somebody takes it back
+    assert made.goal_states["g1"].passed == (first,)
+    made.finish()
+    assert value(made, "at", "cup_2") == "kitchen"
+    assert made.goal_state("g1") is GoalState.REACHED
+
+
+def test_a_goal_fails_when_something_else_holds_too_early() -> None:
+    made = model()
+    row = Precedence(first=at("cup_1", "hallway"), then=at("cup_2", "living_room"))
+    made.plan(replace(bring(1, "hallway"), sometime_before=(row,)))
+    made.learn("cup_2", "at", "living_room")
+    made.finish()
+    status = made.goal_states["g1"]
+    assert status.state is GoalState.FAILED
+    assert "at(cup_1) = hallway must hold before at(cup_2) = living_room does" in (
+        status.reason or ""
+    )
+
+
+def test_what_is_avoided_is_noticed_though_no_condition_is_about_it() -> None:
+    made = model()
+    made.plan(replace(bring(1, "hallway"), never=(at("cup_2", "living_room"),)))
+    made.learn("cup_2", "at", "living_room")
+    made.finish()
+    assert made.goal_state("g1") is GoalState.FAILED

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from math import prod
 
 import pytest
 
 from fleet.core.checker.well_formedness import PlanForm
 from fleet.core.model.world import WorldModel
-from fleet.planners.symbolic.action_sequences import ALTERNATIVES
+from fleet.jobshop.time_budget import TimeBudget
+from fleet.planners.symbolic.action_sequences import Subgoal, alternatives_for
+from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.plans import Plan
 from tests.support.fleet_model import FleetModel
-from tests.support.household import bring, carrier, manipulator
+from tests.support.household import bring, carrier, home, manipulator
 
 
 def test_every_candidate_is_checked_once_and_the_best_once_more_and_once_allocated(
@@ -28,9 +31,22 @@ def test_every_candidate_is_checked_once_and_the_best_once_more_and_once_allocat
         read(form, plan, world, allocation)
 
     monkeypatch.setattr(PlanForm, "__init__", counted)
-    model = FleetModel((manipulator(), carrier()), cups=2)
-    model.plan(bring(1, "hallway"), bring(2, "living_room"))
+    robots = manipulator(), carrier()
+    model = FleetModel(robots, cups=2)
+    goals = bring(1, "hallway"), bring(2, "living_room")
+    model.plan(*goals)
     assert model.state.plans, model.state
     # The symbolic planner compares every pair of action sequences for two goals; then it tries the
     # order of its choice, and the allocator that of its own.
-    assert checks == {"with actors": ALTERNATIVES**2, "with robots": 2}
+    pairs = prod(_alternatives(goal, home(robots, 2)) for goal in goals)
+    assert pairs > 1
+    assert checks == {"with actors": pairs, "with robots": 2}
+
+
+def _alternatives(goal: Goal, world: WorldModel) -> int:
+    """How many different sequences the planner finds for a goal with one condition."""
+    (condition,) = goal.conditions
+    subgoal = Subgoal(goal.goal, condition)
+    found = alternatives_for(subgoal, dict(world.facts), world, TimeBudget(60.0))
+    assert isinstance(found, tuple)
+    return len(found[0])

@@ -25,6 +25,8 @@ class Segment:
     joint: str = ""
     role: str = ""
     always: bool = False
+    topic: bool = False
+    """Whether it only names what the next part is about."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,7 @@ class Sentence:
     times: tuple[TimePhrase, ...] = ()
     urgent: int = 0
     dangling: bool = False
+    time_words: str = ""
     telegraphic: bool = False
     """Whether it has no articles: "toys in box" are all the toys."""
 
@@ -99,8 +102,15 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
         segments += _segment(begun, joint, role)
         dangling = not _content(begun) and joint in ("then", "and")
         dangling = dangling or bool(begun and "AND" in begun[-1].tags)
+    if len(segments) > 1 and not segments[0].role:  # "that blanket on the couch, fold it"
+        about = any("PRON" in word.tags for word in segments[1].words)
+        plain = not any(word.tags & (_CLAUSAL - {"PREP"}) for word in segments[0].words)
+        segments[0] = replace(segments[0], topic=about and plain)
     telegraphic = not any(word.tags & {"DET", "INDEF"} for word in words)
-    return Sentence(tuple(words), tuple(segments), tuple(times), urgent, dangling, telegraphic)
+    named = " ".join(word.text for word in words if "TIME" in word.tags)
+    return Sentence(
+        tuple(words), tuple(segments), tuple(times), urgent, dangling, named, telegraphic
+    )
 
 
 def _content(words: Sequence[Lexeme]) -> list[Lexeme]:

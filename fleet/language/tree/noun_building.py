@@ -43,7 +43,11 @@ class NounBuilder:
             types = [self.types(item) for item in items]
             if not (all(t & _THINGS for t in types) or all(t & SPOTS for t in types)):
                 return None
-        unknown = sum("UNK" in word.tags for item in items for word in item.head)
+        unknown = sum(
+            "UNK" in word.tags or (len(item.head) == 2 and "ONE" not in item.head[-1].tags)
+            for item in items
+            for word in item.head
+        )
         bare = len(items) > 1 and items[-1].quantity is Quantity.BARE
         strange = bare and any("UNK" in word.tags for word in items[-1].head)
         cost = COSTS["unknown"] * (bool(unknown) + 2 * strange)  # rather a verb that is not known

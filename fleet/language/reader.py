@@ -30,7 +30,7 @@ from keyexpr_schema.payloads.goals import Condition
 
 MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
-MOST_WORDS_TOGETHER = 120
+MOST_WORDS_TOGETHER = 80
 _CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 _READINGS = 12

@@ -78,6 +78,8 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             urgent = urgent or -1
         elif "POLITE" not in word.tags or word.tags & {"NOUN"}:
             kept.append(word)
+    while kept and (kept[0].words == ("but",) or "COMMA" in kept[0].tags):
+        kept.pop(0)  # "no rush, but …"
     segments: list[Segment] = []
     for role, part in _roles(_ordered(_commas(kept))):
         joint, begun = "", list[Lexeme]()
@@ -158,9 +160,15 @@ def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
             first = _commas(words[:i])
             return [*first, then, *rest] if tag == "BEFORE" else [*rest, then, *first]
         ends = [j for j, w in enumerate(rest) if "COMMA" in w.tags]
-        if not ends:
+        verbs = [
+            j
+            for j, w in enumerate(rest)
+            if j > 1 and "VERB" in w.tags and not w.tags & {"NOUN", "ADJ"}
+        ]
+        if not ends and (not verbs or "PEOPLE" in rest[0].tags):
             return list(words)
-        inner, outer = rest[: ends[0]], rest[ends[0] + 1 :]
+        inner = rest[: ends[0]] if ends else rest[: verbs[0]]
+        outer = rest[ends[0] + 1 :] if ends else rest[verbs[0] :]
         return [*outer, then, *inner] if tag == "BEFORE" else [*inner, then, *outer]
     return list(words)
 

@@ -14,7 +14,7 @@ from fleet.language.words.tokens import Phrase, Token, number_of, ordinal_of
 _VERBAL = frozenset({"VERB", "FIN", "PART", "GER", "ADJ"})
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lexeme:
     """A word, or words that stand together as one, with all that it can be.
 

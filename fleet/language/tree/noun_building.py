@@ -30,6 +30,7 @@ class NounBuilder:
 
     def __init__(self, words: Sequence[Lexeme], tagger: Tagger) -> None:
         self.words, self.tagger = words, tagger
+        self._types: dict[tuple[int, int, str], frozenset[EntityType]] = {}
 
     def make_sep(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         """What joins the items of a list."""
@@ -223,6 +224,12 @@ class NounBuilder:
 
     def types(self, noun: Noun) -> frozenset[EntityType]:
         """What the noun can be, as far as its words say it."""
+        key = (noun.first, noun.last, noun.form)
+        if (known := self._types.get(key)) is None:
+            known = self._types[key] = self._types_of(noun)
+        return known
+
+    def _types_of(self, noun: Noun) -> frozenset[EntityType]:
         if noun.form == "basket":
             return frozenset({"robot", "surface", "object"})
         if noun.form == "whatever":

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.command import Call, single
+from cli.commands.plans import ProgramsOption
 from cli.commands.processes import BackendOption, MissionArgument, parse_speed
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ async def demo(
         Path | None,
         typer.Option("--out", metavar="DIR", help="Logs, data, recording; else runs/MISSION-TIME."),
     ] = None,
+    programs: ProgramsOption = False,
     timeout_s: Annotated[
         float, typer.Option("--timeout-s", min=1.0, help="Longest time for the plan, by the wall.")
     ] = 600.0,
@@ -62,6 +64,7 @@ async def demo(
         speed=speed,
         view=view,
         timeout_s=timeout_s,
+        programs=programs,
     )
     summary = await _run(options, ChangePrinter(call.json), call)
 

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 app = group("Make, look at, check, compare, start and cancel plans.")
+ProgramsOption = Annotated[
+    bool, typer.Option("--programs", help="Robots carry out programs of several calls.")
+]
 PlanArgument = Annotated[str, typer.Argument(metavar="PLAN", help="Its name.")]
 
 
@@ -45,6 +48,7 @@ async def create(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only show the plan; leave nothing behind.")
     ] = False,
+    programs: ProgramsOption = False,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -95,6 +99,7 @@ async def create(
                 allocator=allocator,
                 start=not no_start,
                 dry_run=dry_run,
+                programs=programs,
             ),
         )
         view = await snapshot(session, GOAL_SPEC, GOAL_STATUS) if dry_run else FleetView()

@@ -45,6 +45,8 @@ class DemoOptions:
     view: bool = False
     timeout_s: float = 600.0
     apart: bool = False
+    programs: bool = False
+    """Whether the plan is carried out as programs."""
 
     def worker_process(self, robot: str) -> str:
         """The name of the process that is a robot's worker."""

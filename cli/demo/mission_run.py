@@ -76,6 +76,7 @@ class Demo:
                 strategy=asked.strategy or default.strategy,
                 planner=asked.planner or default.planner,
                 allocator=asked.allocator or default.allocator,
+                programs=self.options.programs,
             ),
             PLAN_S,
         )

@@ -38,6 +38,8 @@ class PlanningJob(msgspec.Struct, frozen=True, kw_only=True):
     strategy: str
     planner: str
     allocator: str
+    programs: bool = False
+    """Whether the plan is to be carried out as programs."""
     first_task: int = 1
     proposal: Plan | None = None
     team_number: int = 0
@@ -70,6 +72,7 @@ class PlanningJob(msgspec.Struct, frozen=True, kw_only=True):
             strategy=plan.strategy,
             planner=planner,
             allocator=plan.allocator,
+            programs=plan.programs,
         )
 
     @property

@@ -83,6 +83,8 @@ class Plan(Payload, frozen=True, kw_only=True):
     making: Making = Making()
     seeks: tuple[Id, ...] = ()
     """Objects that this plan only looks for; once one is found, a new revision goes on."""
+    programs: bool = False
+    """Whether what an actor does in a row by itself is one task, carried out as a program."""
     always: tuple[Condition, ...] = ()
     never: tuple[Condition, ...] = ()
     sometime_before: tuple[Precedence, ...] = ()

@@ -29,6 +29,8 @@ class PlanRequest(Payload, frozen=True, kw_only=True):
     allocator: str = "makespan"
     start: bool = True
     dry_run: bool = False
+    programs: bool = False
+    """Robots are to carry out programs, each of several calls, instead of one call an order."""
 
 
 class ReplanRequest(Payload, frozen=True, kw_only=True):

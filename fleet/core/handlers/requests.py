@@ -90,6 +90,7 @@ def _start_planning(state: State, ask: PlanRequest) -> State:
         made_by=ask.planner,
         allocator=ask.allocator,
         autostart=ask.start,
+        programs=ask.programs,
     )
     job = PlanningJob.of(state.jobs + 1, plan, ask.planner)
     job = replace(job, request=ask.request, dry_run=ask.dry_run)

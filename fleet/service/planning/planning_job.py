@@ -21,6 +21,7 @@ from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.contradictions import contradictions, reasons_of
 from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
 from fleet.planners.plan_repair import repair_plan
+from fleet.planners.programs.joining import joined
 from fleet.planners.programs.writer import with_programs
 from fleet.service.composition import Composition
 from fleet.service.planning.job_context import context_of, robots_under_way
@@ -160,6 +161,7 @@ class _Run:
         )
         if partial is None:
             return None
+        partial = self._as_programs(partial)
         begun = {task.actor for task in partial.plan.tasks} & set(job.begun_actors)
         busy = robots_under_way(self.given, partial.plan, begun)
         allocated = self._allocate(partial.checked, busy)
@@ -174,6 +176,7 @@ class _Run:
         partial = self._plan()
         if isinstance(partial, NoPlan):
             return partial
+        partial = self._as_programs(partial)
         allocated = self._allocate(partial.checked, robots_under_way(self.given, partial.plan))
         if isinstance(allocated, NotAllocated):
             return NoPlan(allocated.violations[0].sentence, allocated.violations)
@@ -192,7 +195,7 @@ class _Run:
             time_s=self.given.time_s,
             wall_time_s=self.given.wall_time_s,
             job=self.given.job.job,
-            plan=replace(partial.plan, tasks=tuple(timed)),
+            plan=replace(partial.plan, tasks=tuple(timed), programs=self.given.job.programs),
             allocation=dict(allocated.allocation),
             sequence=dict(schedule.sequence),
             extra_after=dict(schedule.extra_after),
@@ -249,6 +252,12 @@ class _Run:
         first = next(goal.goal for goal in problem.goals if goal.goal in reasons)
         sentence = f"goal {first} cannot be planned: {reasons[first]}"
         return changed(plan, reason=sentence, goal_reasons=reasons)
+
+    def _as_programs(self, partial: PartialPlan) -> PartialPlan:
+        """With programs for what actors do in a row, if that is asked for."""
+        if not self.given.job.programs:
+            return partial
+        return changed(partial, checked=joined(partial.checked))
 
     def _problem(self) -> PlanningProblem:
         return _problem(self.given, self.world, self.budget)

@@ -87,6 +87,8 @@ def order(now: Order, before: Order | None) -> Iterator[Line]:
         attempt = f", attempt {now.attempt}" if now.attempt > 1 else ""
         what = call_text(now.skill, now.args, now.robot)
         yield INFO, f"{now.robot} shall {what} ({now.task}{attempt})"
+        if now.program is not None:
+            yield INFO, f"program of {now.task}:\n{now.program.code.rstrip()}"
         before = None
     if now.cancelled and not (before is not None and before.cancelled):
         yield WARN, f"{now.robot} shall stop {now.task}"
@@ -99,6 +101,18 @@ def tries(now: Report, before: Report | None, what: str) -> Iterator[tuple[float
         if one.reason is not None:
             sentence = f"{now.robot}: {what}, try {one.number} failed: {one.reason}"
             yield one.ended_s, (WARN, sentence)
+
+
+def calls(now: Report, before: Report | None) -> Iterator[tuple[float, Line]]:
+    """Each call of a program that is news: when it ended [s], and what it gave."""
+    known = len(before.program.calls) if before is not None and before.program is not None else 0
+    for one in now.program.calls[known:] if now.program is not None else ():
+        call = f"{one.name}({', '.join(render_value(value) for value in one.args.values())})"
+        gave = f" failed: {one.reason}" if one.reason is not None else ""
+        if one.name == "ask":
+            gave = f" = {render_value(one.result)}"
+        level = INFO if one.reason is None else WARN
+        yield one.ended_s, (level, f"{now.robot}: program line {one.line}: {call}{gave}")
 
 
 def report(now: Report, before: Report | None, what: str) -> Iterator[Line]:

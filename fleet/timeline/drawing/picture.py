@@ -130,7 +130,8 @@ class Picture:
         """Say in the event log what is new in a value; `order` is that of a report, if known."""
         if key == REPORT.name:
             what = _call(value, order)
-            for ended_s, line in event_log.tries(value, before, what):
+            told = (*event_log.calls(value, before), *event_log.tries(value, before, what))
+            for ended_s, line in told:
                 self._log("reports", line, ended_s, None)
             topic, lines = "reports", event_log.report(value, before, what)
         elif key in _SENTENCES:

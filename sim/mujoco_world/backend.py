@@ -86,18 +86,21 @@ class MujocoBackend(Backend):
         super().__init__(world, tuple(spec.robot for spec, _ in robots))
         models = [load_description(spec.model, model_folders.get(spec.robot)) for spec, _ in robots]
         self._model = compile_world(
-            world, [(spec.robot, found) for (spec, _), found in zip(robots, models, strict=True)]
+            world,
+            [(spec.robot, m, start) for (spec, start), m in zip(robots, models, strict=True)],
         )
         self._data = mujoco.MjData(self._model)
         self._bodies = {
             spec.robot: RobotBody(self._model, self._data, spec, found, start)
             for (spec, start), found in zip(robots, models, strict=True)
         }
-        navigator = Navigator(world)
+        fixed = tuple(body.solid() for body in self._bodies.values() if not body.drives)
+        navigator = Navigator(world, fixed)
         for (spec, start), found in zip(robots, models, strict=True):
-            navigator.add_robot(
-                spec.robot, start, found.description.clearance_m, spec.capabilities["drive"]
-            )
+            if self._bodies[spec.robot].drives:
+                navigator.add_robot(
+                    spec.robot, start, found.description.clearance_m, spec.capabilities["drive"]
+                )
         self._mechanisms = Mechanisms(
             self._model, self._data, world, self._bodies, ThingStates(world)
         )
@@ -153,9 +156,9 @@ class MujocoBackend(Backend):
                     pinned.add(robot)
                 if run.guest_of is not None:
                     pinned.add(run.guest_of)
-        for robot in self.robots:
+        poses = {name: body.pose() for name, body in self._bodies.items() if body.drives}
+        for robot in poses:
             context.navigator.pin(robot, robot in pinned)
-        poses = {name: body.pose() for name, body in self._bodies.items()}
         context.legs = context.navigator.tick(self.time_s, poses)
         for robot, run in self._runs.items():
             if run.ended is None:
@@ -193,7 +196,8 @@ class MujocoBackend(Backend):
         blocked_by: str | None = None,
     ) -> None:
         run.steps.close()
-        self._context.navigator.cancel(robot)
+        if run.robot.drives:
+            self._context.navigator.cancel(robot)
         self._note_stance(run, state)
         self._bodies[robot].freeze()
         run.ended = MotionOutcome(

@@ -33,6 +33,9 @@ ASKEW_M = 0.6
 OTHER_STANCE_M = 0.06
 """One from which an arm may get where it does not from another is so far from that."""
 
+STANDS_OFF_M = 0.03
+"""Stances are so much farther than a robot's radius from what stands there."""
+
 DOCK_M = 1.3
 """Longest straight way from the lattice to a stance."""
 
@@ -54,11 +57,13 @@ class Dock:
 class Spots:
     """The places to stop at in one world."""
 
-    def __init__(self, world: WorldFile) -> None:
+    def __init__(self, world: WorldFile, fixed: Sequence[Solid] = ()) -> None:
+        """`fixed` stands there besides what the world file says."""
         self._fixtures = world.fixtures
-        self._clearance = Clearance(world)
+        standing = (*solids(world), *fixed)
+        self._clearance = Clearance(world, standing)
         self._reach = Clearance(world, barriers(world))
-        driven = (*solids(world), *reserves(world))
+        driven = (*standing, *reserves(world))
         self.lattice = lattice = Lattice(world, Clearance(world, driven))
         self.obstacles: Callable[[], Sequence[Solid]] = tuple
         """What stands on the floor for the time being: open doors and drawers."""
@@ -183,13 +188,13 @@ class Spots:
         d, angle = (a.ravel() for a in np.meshgrid(distances, angles, indexing="ij"))
         points = np.stack([x + d * np.cos(angle), y + d * np.sin(angle)], axis=1)
         front = self._front_of(point_m)
-        good = self._clearance.at(points) >= radius_m + 0.03
+        good = self._clearance.at(points) >= radius_m + STANDS_OFF_M
         good &= self._reach.along((x, y), points, above_m=z + 0.02) > 0.0
         found: list[Dock] = []
         for k in np.flatnonzero(good):
             stance = (float(points[k, 0]), float(points[k, 1]))
             parts: set[int] = set()
-            for way in self.ways_out(stance, radius_m + 0.03, opened):
+            for way in self.ways_out(stance, radius_m + STANDS_OFF_M, opened):
                 if self.lattice.parts[way] in parts:
                     continue
                 parts.add(self.lattice.parts[way])

@@ -143,7 +143,7 @@ class KinematicBackend(Backend):
         self._count += 1
         me.motion, me.number, me.seen = motion, self._count, ()
         me.state, me.reason, me.failure, me.route = MotionState.RUNNING, None, None, None
-        me.blocked_by = None
+        me.blocked_by, me.hopeless = None, False
         me.begun_s = self.time_s
         nth = me.counts[motion.kind] = me.counts.get(motion.kind, 0) + 1
         kind = motion.kind.value
@@ -153,6 +153,7 @@ class KinematicBackend(Backend):
         takes_s = self._motion_model.handling_s(motion.kind)
         if motion.kind in DRIVES and "drive" not in me.capabilities:
             me.failure = self._out_of_reach(me, motion)
+            me.hopeless = me.failure is not None
         elif motion.kind in DRIVES:
             me.route = self._route(me, motion)
             if me.route is None:
@@ -239,6 +240,7 @@ class KinematicBackend(Backend):
             reason=me.reason,
             detections=me.seen,
             blocked_by=me.blocked_by,
+            retryable=not me.hopeless,
         )
 
     def _senses(self, robot: str) -> Senses:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from keyexpr_schema.payloads.robots import PoseMRad
@@ -29,8 +29,13 @@ FLOOR_RGBA = (0.86, 0.84, 0.80, 1.0)
 WALL_RGBA = (0.94, 0.93, 0.90, 1.0)
 
 
-def compile_world(world: WorldFile, robots: Sequence[tuple[str, RobotModel, PoseMRad]]) -> Any:
-    """The `mujoco.MjModel` of everything, robots that drive at the origin, others where they start.
+def compile_world(
+    world: WorldFile,
+    robots: Sequence[tuple[str, RobotModel]],
+    starts: Mapping[str, PoseMRad] = {},
+) -> Any:
+    """The `mujoco.MjModel` of everything, robots that drive at the origin, others at their
+    `starts`.
 
     Raises:
         BadFile: MuJoCo refuses a robot's MJCF.
@@ -59,13 +64,14 @@ def compile_world(world: WorldFile, robots: Sequence[tuple[str, RobotModel, Pose
         add_fixture(spec, fixture)
     for name in world.object_entries:
         _add_object(spec.worldbody, world, name)
-    for name, model, (x, y, _) in robots:
+    for name, model in robots:
         try:
             child = mujoco.MjSpec.from_file(str(model.mjcf))
             bodies = [body.name for body in child.bodies if body.name != "world"]
             # Prefixed joints of a planar base keep world axes, as its frame is the world's.
             fixed = isinstance(model.description.base, FixedBase)
-            frame = spec.worldbody.add_frame(pos=(x, y, 0.0) if fixed else (0.0, 0.0, 0.0))
+            x, y, _ = starts[name] if fixed else (0.0, 0.0, 0.0)
+            frame = spec.worldbody.add_frame(pos=(x, y, 0.0))
             spec.attach(child, frame=frame, prefix=f"{name}/")
         except (ValueError, mujoco.FatalError) as error:
             raise BadFile(f"{model.mjcf}: MuJoCo refuses this model: {_line(error)}") from None

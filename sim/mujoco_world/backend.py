@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+import msgspec
+
 from keyexpr_schema.payloads.motions import (
     Detection,
     Motion,
@@ -87,7 +89,8 @@ class MujocoBackend(Backend):
         models = [load_description(spec.model, model_folders.get(spec.robot)) for spec, _ in robots]
         self._model = compile_world(
             world,
-            [(spec.robot, m, start) for (spec, start), m in zip(robots, models, strict=True)],
+            [(spec.robot, found) for (spec, _), found in zip(robots, models, strict=True)],
+            {spec.robot: start for spec, start in robots},
         )
         self._data = mujoco.MjData(self._model)
         self._bodies = {
@@ -177,7 +180,11 @@ class MujocoBackend(Backend):
         except MotionFailed as error:
             ajar = self._mechanisms.is_ajar(error.blocked_by)
             blocker = error.blocked_by if ajar else None
-            self._end(robot, run, MotionState.FAILED, str(error), blocked_by=blocker)
+            self._end(robot, run, MotionState.FAILED, str(error))
+            assert run.ended is not None
+            run.ended = msgspec.structs.replace(
+                run.ended, blocked_by=blocker, retryable=error.retryable
+            )
             return
         if self.time_s - run.began_s >= run.motion.timeout_s:
             reason = (
@@ -193,7 +200,6 @@ class MujocoBackend(Backend):
         state: MotionState,
         reason: str | None,
         detections: tuple[Detection, ...] = (),
-        blocked_by: str | None = None,
     ) -> None:
         run.steps.close()
         if run.robot.drives:
@@ -205,7 +211,6 @@ class MujocoBackend(Backend):
             senses=self._senses(robot),
             reason=reason,
             detections=detections,
-            blocked_by=blocked_by,
         )
 
     def _note_stance(self, run: MotionRun, state: MotionState) -> None:

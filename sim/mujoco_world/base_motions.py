@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from keyexpr_schema.payloads.motions import Detection, PointM
-from sim.errors import NoWay
+from sim.errors import NoStance, NoWay
 from sim.mujoco_world.base_controllers import wrap
 from sim.mujoco_world.motion import MotionContext, MotionFailed, MotionRun, Step, Steps, stow
 from sim.mujoco_world.robot_body import RobotBody
@@ -105,7 +105,8 @@ def stand_at(
         raise MotionFailed(
             f"{robot.name} does not drive, and ({point[0]:.2f}, {point[1]:.2f}) is "
             f"{distance_m(run, point):.2f} m away: it reaches from {reach[0]:.2f} to "
-            f"{reach[1]:.2f} m"
+            f"{reach[1]:.2f} m",
+            retryable=False,
         )
 
 
@@ -191,7 +192,8 @@ def navigate(context: MotionContext, run: MotionRun, ask: Callable[[], None]) ->
     try:
         ask()
     except NoWay as error:
-        raise MotionFailed(str(error), error.blocked_by) from None
+        hopeless = isinstance(error, NoStance) and error.blocked_by is None
+        raise MotionFailed(str(error), error.blocked_by, not hopeless) from None
     yield
     while True:
         leg = context.legs.get(run.robot.name)

@@ -8,13 +8,12 @@ many ways to hold to list them is `Opaque`: only ever evaluated.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from fleet.core.model import derived
-from fleet.core.model.formulas.evaluation import evaluate
-from fleet.core.model.formulas.nodes import Formula, Holds, Not
+from fleet.core.model.formulas.evaluation import conjuncts, evaluate
+from fleet.core.model.formulas.nodes import Formula, Holds, Not, Or
 from fleet.core.model.world import WorldModel, known_value
 from fleet.planners.symbolic.engine.instantiation import Facts
 from fleet.planners.symbolic.engine.readings import (
@@ -213,7 +212,34 @@ class Nodes:
             if wanted in (place, *around) and self.travel.action(robot, place) is not None:
                 yield {FactKey(AT, robot): place}, True
 
+    def _one_of(self, formulas: Sequence[Formula]) -> int | bool:
+        """The node for that one of some formulas holds."""
+        rows: dict[tuple[frozenset[int], Stands], None] = {}
+        for formula in formulas:
+            parts = [self.formula(part) for part in conjuncts(formula)]
+            if all(part is True for part in parts):
+                return True
+            if any(part is False for part in parts):
+                continue
+            needs = frozenset(part for part in parts if part is not True)
+            alone = self._alternatives(*needs) if len(needs) == 1 else [(needs, ())]
+            rows |= dict.fromkeys(alone)
+        return self._holding_by(rows)
+
+    def _holding_by(
+        self, rows: Iterable[tuple[frozenset[int], Stands]], node: int | None = None
+    ) -> int | bool:
+        """The node that holds if all the nodes of a row do; false if there are no rows."""
+        if not rows:
+            return False
+        node = self._new(-1, None) if node is None else node
+        self.axioms[node] = [Axiom(tuple(sorted(needs)), stands, node) for needs, stands in rows]
+        return node
+
     def _read_formula(self, formula: Formula) -> int | bool:
+        if isinstance(formula, Or):
+            return self._one_of(formula.of)
+
         def domain(key: FactKey) -> Sequence[Value] | None:
             if key in self._counted:
                 raise TooManyWays
@@ -279,11 +305,9 @@ class Nodes:
                     needs.add(self.fact(self.number[key], value))
             for also, there in self._alternatives(holds):
                 rows[also | needs, tuple(sorted((*stands, *there)))] = None
-        if always or not rows:
-            return always and any_way
-        node = self._new(-1, None) if node is None else node
-        self.axioms[node] = [Axiom(tuple(sorted(needs)), stands, node) for needs, stands in rows]
-        return node
+        if always and any_way:
+            return True
+        return self._holding_by(rows, node)
 
     def _alternatives(self, holds: int | bool) -> Sequence[tuple[frozenset[int], Stands]]:
         """What it takes that a node holds: it, or where robots have to be if that is all."""
@@ -383,44 +407,3 @@ def merged(parts: Sequence[Stands]) -> Stands | None:
             if stands.setdefault(robot, place) != place:
                 return None
     return tuple(stands.items())
-
-
-def watch_lists(nodes: Nodes, rows: Sequence[Sequence[int]]) -> dict[int, list[int]]:
-    """Rows by the facts of which one must hold for all the nodes of the row to hold; -1: by none.
-
-    Chosen so that few rows are found by the same fact.
-    """
-    uses: dict[int, int] = defaultdict(int)
-    for row in rows:
-        for need in row:
-            uses[need] += 1
-    found_by: dict[int, list[int]] = defaultdict(list)
-    known: dict[int, list[int]] = {}
-    facts_of = {need: _deciding_facts(nodes, need, known) for need in uses}
-    for number, row in enumerate(rows):
-        decisive = [need for need in row if facts_of[need]]
-        best = min(decisive, key=lambda need: uses[need], default=None)
-        for fact in (-1,) if best is None else facts_of[best]:
-            found_by[fact].append(number)
-    return found_by
-
-
-def _deciding_facts(nodes: Nodes, node: int, known: dict[int, list[int]]) -> list[int]:
-    """Facts of one variable, one of which holds wherever the node does; none if there are none.
-
-    What is `known` of others is used, and more noted; of a circle of nodes nothing is.
-    """
-    if nodes.variable_of[node] >= 0:
-        return [node]
-    if node in nodes.rides:
-        return [nodes.rides[node].at_robot]
-    if node in known:
-        return known[node]
-    known[node] = []
-    axioms = nodes.axioms.get(node, ())
-    rows = [[f for n in axiom.needs for f in _deciding_facts(nodes, n, known)] for axiom in axioms]
-    variables = [{nodes.variable_of[fact] for fact in row} for row in rows]
-    if variables and (shared := set[int].intersection(*variables)):
-        variable = min(shared)
-        known[node] = sorted({f for row in rows for f in row if nodes.variable_of[f] == variable})
-    return known[node]

@@ -17,7 +17,7 @@ from fleet.core.model import derived
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.planners.symbolic.engine.relevance import Row, rows_of
-from fleet.planners.symbolic.engine.travel import Travel, only_drives
+from fleet.planners.symbolic.engine.travel import Travel, can_be_put_off
 from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Literal, Value
 
 ANYTHING = "?thing"
@@ -54,7 +54,7 @@ class RelaxedWorld:
         self._jump_s = inf
         """The quickest skill that is no drive and leaves a robot somewhere."""
         for row in (row for skill in world.skills.values() for row in rows_of(skill)):
-            if only_drives(row.skill):
+            if can_be_put_off(row.skill):
                 continue
             quickest_s = self.quickest_s(row.skill)
             if row.skill.conditional:

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
-from benchmarks.language.meanings import Meaning, Wanted, WantedMeaning
-from benchmarks.language.worlds import World, load_language_world, skill_data
-from fleet.core.model.skill_file import skills_from_data
-from fleet.core.model.skills import SkillModel, phrases_of
+from benchmarks.language.meanings import Asked, Conditions, Meaning, Wanted, WantedMeaning
+from benchmarks.language.worlds import NOW, World, load_language_world
+from fleet.core.model.skills import SkillModel, phrases_of, state_words_of
 from fleet.errors import NotUnderstood
-from fleet.language import Reading, Vocabulary, read_goal, statement_facts
+from fleet.language import Ambiguity, Reading, Vocabulary, WantedGoal, read
 from fleet.service.skill_models import load_skills
 from keyexpr_schema.config_files import config_file
 from keyexpr_schema.facts import Literal
 from keyexpr_schema.payloads.goals import Condition
-
-_WHICH = re.compile(r"could be (?P<names>[^:]+): (?:say which|call it by|name)")
 
 
 @dataclass(frozen=True)
@@ -50,24 +45,20 @@ Answer = Read | AskedBack | Refused
 
 def answer(text: str, world: str) -> Answer:
     """What the product makes of a text that is said in that world."""
-    words = _vocabulary(world)
     try:
-        return Read(_meaning(read_goal(text, words)))
-    except NotUnderstood as refused_as_goal:
-        try:
-            return Read(Meaning(facts=_facts(statement_facts(text, words))))
-        except NotUnderstood:
-            sentence = str(refused_as_goal)
-    which = _WHICH.search(sentence)
-    if which is None:
-        return Refused(sentence)
-    return AskedBack(sentence, names=frozenset(re.split(r", | or ", which["names"])))
+        found = read(text, _vocabulary(world), NOW)
+    except NotUnderstood as refused:
+        return Refused(str(refused))
+    if isinstance(found, Ambiguity):
+        return AskedBack(found.sentence, tuple(_meaning(each) for _, each in found.candidates))
+    return Read(_meaning(found))
 
 
 @cache
 def _vocabulary(name: str) -> Vocabulary:
     world = load_language_world(name)
     carriers = {thing: world.carriers(thing) for thing in (*world.objects, *world.robots)}
+    skills = skills_of(world)
     return Vocabulary(
         places=world.places,
         objects=world.objects,
@@ -81,9 +72,11 @@ def _vocabulary(name: str) -> Vocabulary:
         rests={
             thing: found[0] for thing, found in carriers.items() if found[:1] and len(found) > 1
         },
-        skill_phrases=phrases_of(skills_of(world)),
+        skill_phrases=phrases_of(skills),
         carriers=carriers,
         speaker=world.speaker,
+        believed=world.facts,
+        state_words=state_words_of(skills),
     )
 
 
@@ -91,30 +84,45 @@ def skills_of(world: World) -> dict[str, SkillModel]:
     """The household's skills and those of the world."""
     skills = dict(load_skills(config_file("skills", "household")))
     for path in world.skill_files:
-        skills |= skills_from_data(_without_words(skill_data(path)), str(path))
+        skills |= load_skills(path)
     return skills
 
 
-def _without_words(data: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        part: {
-            name: {field: value for field, value in row.items() if field != "says"}
-            for name, row in rows.items()
-        }
-        for part, rows in data.items()
-    }
-
-
 def _meaning(reading: Reading) -> Meaning:
-    stages = tuple(frozenset(map(_wanted, stage)) for stage in reading.stages)
-    return Meaning(goals=frozenset({WantedMeaning(stages=stages).canonical()}))
+    question = reading.question
+    return Meaning(
+        goals=frozenset(_goal(goal).canonical() for goal in reading.goals),
+        facts=_facts(reading.facts),
+        question=None
+        if question is None
+        else Asked(question.of, frozenset(question.subjects), _rows(question.holds)),
+    )
+
+
+def _goal(goal: WantedGoal) -> WantedMeaning:
+    return WantedMeaning(
+        stages=tuple(map(_rows, goal.stages)),
+        always=_rows(goal.always),
+        never=_rows(goal.never),
+        before=frozenset((_wanted(first), _wanted(then)) for first, then in goal.before),
+        when=_rows(goal.when),
+        priority=goal.priority,
+        due_s=goal.due_s,
+        not_before_s=goal.not_before_s,
+        every=goal.every,
+        by=frozenset(goal.by),
+    )
+
+
+def _rows(conditions: Iterable[Condition]) -> Conditions:
+    return frozenset(map(_wanted, conditions))
 
 
 def _wanted(condition: Condition) -> Wanted:
     return Wanted(condition.relation, frozenset(condition.subjects), frozenset({condition.value}))
 
 
-def _facts(literals: Iterable[Literal]) -> frozenset[Wanted]:
+def _facts(literals: Iterable[Literal]) -> Conditions:
     return frozenset(
         Wanted(key.relation, frozenset({key.subject}), frozenset({value}))
         for key, value in literals

@@ -4,25 +4,26 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import MutableMapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 
 from fleet.errors import NotUnderstood
+from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, parsed
 from fleet.language.reading import Ambiguity, Reading, WantedGoal
-from fleet.language.refusals import listed, nearest, reason_for, suggestion
+from fleet.language.refusals import reason_for
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT
+from fleet.language.resolve.mentions import WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.segments import Segment, Sentence, cut, sentences_of
-from fleet.language.tagging.lexicon import ENTITY_TYPES
 from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
-from fleet.language.words.times import TimePhrase
 from fleet.language.words.tokens import tokens_of
 from keyexpr_schema.facts import Literal
 from keyexpr_schema.payloads.goals import Condition
@@ -30,13 +31,10 @@ from keyexpr_schema.payloads.goals import Condition
 MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 120
-_BEFORE_NOUNS = frozenset({"DET", "INDEF", "UNIV", "NUM", "ORD", "ADJ", "OTHER", "ANOTHER"})
+_CHOICES = 12
+"""Of so many that a noun phrase may mean, one is asked for."""
 _READINGS = 12
 """Readings of what was read so far that are followed up."""
-_BORDERS = frozenset({"COMMA", "AND", "THEN", "PREP", "TO", "BE", "MODAL", "HAVE", "END"})
-_REFUSED_OF_GOALS = ("IF", "WHEN", "UNLESS", "UNTIL", "BEFORE", "AFTER", "TIME", "DONT", "NEVER",
-                     "AVOID", "WITHOUT", "ALWAYS", "NOT")  # fmt: skip
-
 _KEPT: deque[tuple[Vocabulary, Tagger]] = deque(maxlen=4)
 
 
@@ -61,8 +59,11 @@ def tagger_of(vocabulary: Vocabulary) -> Tagger:
 class _State:
     """One reading of what was read so far."""
 
-    def __init__(self, said: Discourse, cost: int = 0, question: Question | None = None) -> None:
-        self.said, self.cost, self.question = said, cost, question
+    def __init__(
+        self, said: Discourse, cost: int = 0, question: Question | None = None, asked: str = ""
+    ) -> None:
+        """`asked`: the sentence that asks which of several is meant, where it is one of them."""
+        self.said, self.cost, self.question, self.asked = said, cost, question, asked
 
 
 class Reader:
@@ -91,26 +92,32 @@ class Reader:
         self.text, self.vocabulary, self.mode = text, vocabulary, mode
         self.tagger = tagger_of(vocabulary)
         self.remarks: list[str] = []
-        self.times: list[TimePhrase] = []
+        self.why = Explanations(text, self.tokens, self.tagger, mode)
         self.line = " ".join(text.split())
 
-    def read(self, now: datetime | None) -> list[tuple[int, Reading]]:
+    def read(self, now: datetime | None) -> list[tuple[int, str, Reading]]:
         """All that the text can mean, the plainest first.
 
         Raises:
             NotUnderstood: nothing; one sentence says why.
         """
         draft = GoalDraft(self.vocabulary.is_at)
-        states = [_State(Discourse(self.text, self.tokens, draft))]
+        states = [_State(Discourse(self.text, self.tokens, draft, self.vocabulary.is_person))]
         lexemes = self.tagger.tagged(self.tokens, self.text)
         dangling = False
         for words in sentences_of(lexemes):
             sentence = cut(words)
-            self._check(sentence)
+            self.why.check(sentence)
+            timed = bool(sentence.times) or any(part.role for part in sentence.segments)
             for state in states:
-                state.said.elliptic, state.said.addressees = "", []
-                state.said.urgent |= sentence.urgent
-            self.times.extend(sentence.times)
+                said = state.said
+                said.elliptic, said.addressees, said.done, said.again = "", [], False, None
+                said.telegraphic = sentence.telegraphic
+                said.urgent = said.urgent or sentence.urgent
+                if timed or said.times or said.when:
+                    with suppress(NotUnderstood):  # the last sentence says it again
+                        self._close(said, now)
+                said.times = list(sentence.times)
             dangling = sentence.dangling
             if self._said_of_oneself(sentence):
                 try:
@@ -135,11 +142,11 @@ class Reader:
             raise NotUnderstood(
                 f"{len(segment.words)} words are too many for one clause: say it in several"
             )
-        self._unheard_of(segment)
+        self.why.unheard_of(segment)
         try:
             trees = parsed(segment.words, Builder(segment.words, self.tagger))
         except NotGrammatical as error:
-            raise self._ungrammatical(segment, error.at) from None
+            raise self.why.ungrammatical(segment, error.at) from None
         found: list[_State] = []
         problems: list[tuple[int, NotUnderstood]] = []
         for state in states:
@@ -149,14 +156,37 @@ class Reader:
                 except NotUnderstood as problem:
                     problems.append((cost, problem))
                 else:
-                    found.append(_State(said, state.cost + cost, question or state.question))
+                    found.append(
+                        _State(said, state.cost + cost, question or state.question, state.asked)
+                    )
+        which = min(problems, key=lambda row: row[0])[1] if problems else None
+        if not found and isinstance(which, WhichOne):
+            found = self._each(which, segment, states)
         if not found:
-            if not problems:
-                strange = [i for i, w in enumerate(segment.words) if "UNK" in w.tags]
-                raise self._ungrammatical(segment, strange[0] if strange else 0)
+            strange = [w for w in segment.words if "UNK" in w.tags]
+            if not problems or (strange and strange[0].text not in str(which)):
+                raise self.why.ungrammatical(segment, 0)
             raise min(problems, key=lambda row: row[0])[1]
         found.sort(key=lambda state: state.cost)
         return found[:_READINGS]
+
+    def _each(self, which: WhichOne, segment: Segment, states: Sequence[_State]) -> list[_State]:
+        """The readings in which a noun phrase means one, then another of those that it can."""
+        if len(which.names) > _CHOICES or len(states) > _CHOICES:
+            return []
+        found: list[_State] = []
+        for name in which.names:
+            forked = []
+            for state in states:
+                if which.key in state.said.chosen:
+                    return []
+                said = state.said.copy()
+                said.chosen[which.key] = name
+                asked = state.asked or str(which)
+                forked.append(_State(said, state.cost, state.question, asked))
+            with suppress(NotUnderstood):
+                found += self._segment(segment, forked)
+        return found
 
     def _resolved(
         self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment
@@ -212,7 +242,7 @@ class Reader:
             len(words),
         )
         remark = words[:end]
-        shown = self._quote(remark)
+        shown = self.why.quote(remark)
         special = reason_for([(word.word, word.text) for word in remark])
         if special or any("NOUN" in word.tags for word in remark):
             raise NotUnderstood(
@@ -226,77 +256,11 @@ class Reader:
         rest = [word for word in words if "POLITE" not in word.tags]
         return bool(rest) and "VERB" in rest[0].tags
 
-    def _quote(self, words: Sequence[Lexeme]) -> str:
-        start = self.tokens[words[0].first].start
-        return " ".join(self.text[start : self.tokens[words[-1].last - 1].end].split())
-
-    # --- refusals ---------------------------------------------------------------------------------
-    def _what(self) -> str:
-        return "a fact" if self.mode == "fact" else "a goal"
-
-    def _check(self, sentence: Sentence) -> None:
-        if self.mode != "goal":
-            return
-        for word in sentence.words:
-            if any(tag in word.tags for tag in _REFUSED_OF_GOALS) and "NOUN" not in word.tags:
-                spoken = [(t.word, self.text[t.start : t.end]) for t in
-                          self.tokens[word.first : word.last]]  # fmt: skip
-                special = reason_for(spoken, self._what())
-                if special:
-                    raise NotUnderstood(special)
-                raise NotUnderstood(f"{word.text!r} is nothing that {self._what()} can say yet")
-
-    def _unheard_of(self, segment: Segment) -> None:
-        """Whether a word stands there that is refused wherever it stands."""
-        for word in segment.words:
-            if "UNK" in word.tags and (
-                special := reason_for([(word.word, word.text)], self._what())
-            ):
-                raise NotUnderstood(special)
-
-    def _ungrammatical(self, segment: Segment, at: int) -> NotUnderstood:
-        words = segment.words
-        strange = [i for i, word in enumerate(words) if "UNK" in word.tags]
-        if strange and strange[0] < at:
-            at = strange[0]
-        end = at + 1
-        while end < len(words) and not words[end].tags & _BORDERS:
-            end += 1
-        special = reason_for([(w.word, w.text) for w in words[at:end]], self._what())
-        special = special or reason_for([(w.word, w.text) for w in words], self._what())
-        if special:
-            return NotUnderstood(special)
-        example = SAY_IT if self.mode == "fact" else EXAMPLE
-        if at >= len(words) and "PREP" in words[-1].tags:
-            known = listed(self.tagger.lexicon.known(("place",)))
-            return NotUnderstood(
-                f"{self._quote(words)!r} ends where a place is missing; known are {known}"
-            )
-        if at >= len(words):
-            return NotUnderstood(f"{self._quote(words)!r} ends before it says all: {example}")
-        shown = self._quote(words[at:end])
-        begins = at
-        while begins and words[begins - 1].tags & _BEFORE_NOUNS:
-            begins -= 1
-        if "UNK" in words[at].tags and (begins < at or (at and "PREP" in words[at - 1].tags)):
-            types = ENTITY_TYPES
-            hint = suggestion(words[at].text, self.tagger.lexicon.names_in(types))
-            return NotUnderstood(
-                f"{self._quote(words[begins:end])!r} is not a known object, robot or place{hint}; "
-                f"known are {nearest(self.tagger.lexicon.known(types), words[at].text)}"
-            )
-        if at == 0:
-            verbs = {entry.base for entries in self.tagger.verbs.entries.values()
-                     for entry in entries}  # fmt: skip
-            hint = suggestion(words[0].word, verbs) if "UNK" in words[0].tags else ""
-            return NotUnderstood(f"{shown!r} is not understood as {self._what()}{hint}: {example}")
-        return NotUnderstood(f"{shown!r} is not understood after {self._quote(words[:at])!r}")
-
     # --- the end ----------------------------------------------------------------------------------
     def _ended(
         self, states: Sequence[_State], now: datetime | None, dangling: bool
-    ) -> list[tuple[int, Reading]]:
-        found: dict[Reading, int] = {}
+    ) -> list[tuple[int, str, Reading]]:
+        found: dict[Reading, tuple[int, str]] = {}
         problem: NotUnderstood | None = None
         for state in states:
             try:
@@ -304,49 +268,68 @@ class Reader:
             except NotUnderstood as error:
                 problem = problem or error
             else:
-                found[reading] = min(state.cost, found.get(reading, state.cost))
+                row = (state.cost, state.asked)
+                found[reading] = min(row, found.get(reading, row))
         if not found:
             assert problem is not None
             raise problem
-        return sorted(((cost, reading) for reading, cost in found.items()), key=lambda row: row[0])
+        rows = [(cost, asked, reading) for reading, (cost, asked) in found.items()]
+        return sorted(rows, key=lambda row: row[0])
 
     def _reading(self, state: _State, now: datetime | None, dangling: bool) -> Reading:
-        said = state.said
-        stages = said.draft.conditions()
-        wants = bool(stages or said.always or said.never)
+        said = state.said.copy()
+        self._close(said, now)
         facts = tuple(Literal(key, value) for key, value in said.facts.items())
-        if dangling or not (wants or facts or state.question):
+        if dangling or not (said.goals or facts or state.question):
             if self.mode == "fact":
                 raise NotUnderstood(f"{self.line!r} ends before it says anything: {SAY_IT}")
             raise NotUnderstood(f"{self.line!r} ends before it says what to do: {EXAMPLE}")
-        goals: tuple[WantedGoal, ...] = ()
+        goals = tuple(replace(goal, priority=said.urgent) for goal in said.goals)
+        presumed = tuple(dict.fromkeys(said.presumed))
+        return Reading(self.line, goals, facts, state.question, presumed, tuple(self.remarks))
+
+    def _close(self, said: Discourse, now: datetime | None) -> None:
+        """End the goal that was being said: other times or conditions hold for what follows.
+
+        Raises:
+            NotUnderstood: it cannot be, or a time belongs to nothing.
+        """
+        stages = said.draft.conditions(self.vocabulary.speaker)
+        wants = bool(stages or said.always or said.never)
         if wants:
             goal = WantedGoal(
                 stages,
                 tuple(dict.fromkeys(said.always)),
                 tuple(dict.fromkeys(said.never)),
-                int(said.urgent),
-                when=tuple(said.when),
+                when=tuple(dict.fromkeys(said.when)),
+                by=tuple(dict.fromkeys(said.by)),
             )
-            goals = (self._timed(goal, now),)
-        elif self.times and self.mode == "fact":
+            said.goals.append(self._timed(goal, said, now))
+        elif said.times and self.mode == "fact":
             named = [(token.word, token.spoken) for token in self.tokens]
             reason = reason_for(named, "a fact")
             raise NotUnderstood(reason or f"{self.line!r} names a time, which a fact cannot")
-        elif self.times or said.when:
+        elif said.times or said.when:
             raise NotUnderstood(f"{self.line!r} names a time or a condition, but nothing to do")
-        presumed = tuple(dict.fromkeys(said.presumed))
-        return Reading(self.line, goals, facts, state.question, presumed, tuple(self.remarks))
+        said.draft = GoalDraft(self.vocabulary.is_at)
+        said.always, said.never, said.when, said.times, said.by = [], [], [], [], []
 
-    def _timed(self, goal: WantedGoal, now: datetime | None) -> WantedGoal:
-        for time in self.times:
-            if time.kind == "every":
+    @staticmethod
+    def _timed(goal: WantedGoal, said: Discourse, now: datetime | None) -> WantedGoal:
+        every = next((time for time in said.times if time.kind == "every"), None)
+        for time in said.times:
+            if time is every:
+                at = next((t for t in said.times if t.kind == "start" and t.hour is not None), None)
+                if at is not None and time.every_s is None:
+                    time = replace(time, hour=at.hour, minute=at.minute)
                 goal = replace(goal, every=time.recurrence)
+                continue
+            if every is not None and time.kind == "start" and time.hour is not None:
                 continue
             if time.after_s is None and now is None:
                 raise NotUnderstood("a time of day is named, and what time it is now is not known")
             seconds = time.after_s if now is None or time.after_s is not None else time.seconds(now)
-            if time.kind == "due":
+            if time.kind == "due" or (time.hour is not None and not said.done):
                 goal = replace(goal, due_s=seconds)
             else:
                 goal = replace(goal, not_before_s=seconds)
@@ -364,12 +347,13 @@ def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Read
     return _one(Reader(text, vocabulary).read(now))
 
 
-def _one(readings: Sequence[tuple[int, Reading]]) -> Reading | Ambiguity:
-    least = readings[0][0]
-    best = [reading for cost, reading in readings if cost == least]
+def _one(readings: Sequence[tuple[int, str, Reading]]) -> Reading | Ambiguity:
+    least, asked = readings[0][:2]
+    best = [reading for cost, _, reading in readings if cost == least]
     if len(best) == 1:
         return best[0]
-    return Ambiguity(best[0].text, tuple((each.understood_as, each) for each in best[:5]))
+    candidates = tuple((each.understood_as, each) for each in best[:_CHOICES])
+    return Ambiguity(best[0].text, candidates, asked)
 
 
 def read_goal(text: str, vocabulary: Vocabulary) -> Reading:

@@ -78,9 +78,12 @@ class Ambiguity:
 
     text: str
     candidates: tuple[tuple[str, Reading], ...]
+    asked: str = ""
 
     @property
     def sentence(self) -> str:
         """The question to the person who said it."""
+        if self.asked:
+            return self.asked
         listed = "; or ".join(words for words, _ in self.candidates)
         return f"{self.text!r} can mean {listed}: which?"

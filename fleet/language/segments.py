@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.words.times import TimePhrase
@@ -34,8 +34,10 @@ class Sentence:
     words: tuple[Lexeme, ...]
     segments: tuple[Segment, ...]
     times: tuple[TimePhrase, ...] = ()
-    urgent: bool = False
+    urgent: int = 0
     dangling: bool = False
+    telegraphic: bool = False
+    """Whether it has no articles: "toys in box" are all the toys."""
 
 
 def sentences_of(lexemes: Sequence[Lexeme]) -> list[tuple[Lexeme, ...]]:
@@ -62,17 +64,19 @@ def sentences_of(lexemes: Sequence[Lexeme]) -> list[tuple[Lexeme, ...]]:
 def cut(words: Sequence[Lexeme]) -> Sentence:
     """A sentence cut where that is clear: at "then", and before verbs that begin a clause."""
     times: list[TimePhrase] = []
-    urgent = False
+    urgent = 0
     kept: list[Lexeme] = []
     for word in words:
         if "TIME" in word.tags and word.time is not None:
             times.append(word.time)
         elif "URGENT" in word.tags:
-            urgent = True
+            urgent = 1
+        elif "LATER" in word.tags:
+            urgent = urgent or -1
         elif "POLITE" not in word.tags or word.tags & {"NOUN"}:
             kept.append(word)
     segments: list[Segment] = []
-    for role, part in _roles(_commas(kept)):
+    for role, part in _roles(_ordered(_commas(kept))):
         joint, begun = "", list[Lexeme]()
         for i, word in enumerate(part):
             rest = part[i + 1 :]
@@ -89,10 +93,14 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
                 joint = joint or ("and" if "AND" in word.tags else "")
             else:
                 begun.append(word)
+        if not begun and joint == "then" and segments and part and "THEN" in part[-1].tags:
+            segments[-1] = replace(segments[-1], joint="then")  # "… after that."
+            joint = ""
         segments += _segment(begun, joint, role)
         dangling = not _content(begun) and joint in ("then", "and")
         dangling = dangling or bool(begun and "AND" in begun[-1].tags)
-    return Sentence(tuple(words), tuple(segments), tuple(times), urgent, dangling)
+    telegraphic = not any(word.tags & {"DET", "INDEF"} for word in words)
+    return Sentence(tuple(words), tuple(segments), tuple(times), urgent, dangling, telegraphic)
 
 
 def _content(words: Sequence[Lexeme]) -> list[Lexeme]:
@@ -128,6 +136,32 @@ def _opens(rest: Sequence[Lexeme]) -> bool:
     return "VERB" in tags and not tags & {"NOUN", "ADJ", "ORD"}
 
 
+def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
+    """With "A before B" and "after B, A" as "A then B", where a clause follows those words."""
+    for i, word in enumerate(words):
+        tag = next((tag for tag in ("BEFORE", "AFTER") if tag in word.tags), None)
+        rest = list(words[i + 1 :])
+        if tag is None or not rest or not _happens(rest):
+            continue
+        then = replace(word, tags=frozenset({"THEN"}))
+        if i:
+            first = _commas(words[:i])
+            return [*first, then, *rest] if tag == "BEFORE" else [*rest, then, *first]
+        ends = [j for j, w in enumerate(rest) if "COMMA" in w.tags]
+        if not ends:
+            return list(words)
+        inner, outer = rest[: ends[0]], rest[ends[0] + 1 :]
+        return [*outer, then, *inner] if tag == "BEFORE" else [*inner, then, *outer]
+    return list(words)
+
+
+def _happens(words: Sequence[Lexeme]) -> bool:
+    """Whether what follows "before" is something that somebody does."""
+    if "PEOPLE" in words[0].tags:
+        return len(words) > 1 and bool(words[1].tags & {"VERB", "HAVE"})
+    return "GER" in words[0].tags
+
+
 def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
     """A sentence with "if", "when" or "unless" cut into condition and the rest."""
     for i, word in enumerate(words):
@@ -135,7 +169,7 @@ def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
         if role is None:
             continue
         if i:
-            return [(role, list(words[i + 1 :])), ("", list(words[:i]))]
+            return [("", list(words[:i])), (role, list(words[i + 1 :]))]
         end = next(
             (j for j in range(1, len(words)) if words[j].tags & {"COMMA", "THEN"}),
             None,
@@ -145,6 +179,10 @@ def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
             if rest and "THEN" in rest[0].tags:
                 rest = rest[1:]
             return [(role, list(words[1:end])), ("", rest)]
+    if words and words[0].words == ("should",):  # "should the door be open, close it"
+        end = next((j for j, word in enumerate(words) if "COMMA" in word.tags), None)
+        if end is not None:
+            return [("when", list(words[:end])), ("", list(words[end + 1 :]))]
     return [("", list(words))]
 
 
@@ -152,11 +190,17 @@ def _segment(words: Sequence[Lexeme], joint: str, role: str) -> list[Segment]:
     words = _commas(words)
     if len(words) > 1 and words[0].words == ("1st",) and "COMMA" in words[1].tags:
         words = words[2:]
-    while words and words[-1].tags & {"AND"}:
+    while words and words[-1].tags & {"AND", "COMMA"}:
         words = words[:-1]
-    if words and words[0].words == ("1st",) and "NOUN" not in words[0].tags:
+    numbered = words and "ORD" in words[0].tags and "NOUN" not in words[0].tags
+    if numbered:
         following = words[1].tags if len(words) > 1 else frozenset()
-        verbal = "VERB" in following and "NOUN" not in following
+        after = words[2].tags if len(words) > 2 else frozenset()
+        verbal = "VERB" in following and (
+            "NOUN" not in following or bool(after & {"DET", "INDEF", "UNIV", "NUM"})
+        )
+        if verbal and words[0].words != ("1st",):
+            joint = "then"
         if following & ({"COMMA", "GER"} | _OPENING) or verbal:
             words = _commas(words[1:])
     always = any("ALWAYS" in word.tags for word in words)

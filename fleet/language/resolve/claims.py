@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
-from fleet.language.resolve.frames import SAY_IT, framed
+from fleet.language.resolve.frames import SAY_IT, framed, frames_of
 from fleet.language.resolve.mentions import Mention
 from fleet.language.resolve.nouns import NounResolver
 from fleet.language.resolve.places import PlaceResolver
@@ -129,7 +129,8 @@ class Claims:
 
     def looked_around(self, nouns: Nouns | None, value: bool) -> None:
         """Somebody looked around in these places, or nobody did."""
-        assert nouns is not None
+        if nouns is None:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say where: name a place")
         names = [n for m in self.places.place_mentions(nouns) for n in m.subjects]
         if not value and len(names) > 1:
             raise NotUnderstood(
@@ -185,6 +186,17 @@ class Claims:
         predicate = clause.predicate
         word = predicate.words[0].word if predicate is not None and predicate.words else ""
         assert clause.subject is not None
+        states = self.scene.stated.states
+        if predicate is not None and predicate.words and predicate.words[0].words in states:
+            names = {
+                n
+                for types in (THINGS, PLACES)
+                if self.nouns.can_be(clause.subject, types)
+                for s in self.nouns.subjects(clause.subject, types, "an object")
+                for n in (s.subjects if isinstance(s, Mention) else s.names)
+            }
+            if not predicate.arguments and names & self.scene.stated.able(predicate.words[0]):
+                return self.are(clause.subject, predicate.words[:1], not value)
         if word not in self.scene.tagger.book.searched or (predicate and predicate.arguments):
             if predicate and predicate.kind == "done" and predicate.arguments and value:
                 return self.placed(clause.subject, predicate.arguments)
@@ -193,9 +205,60 @@ class Claims:
             raise NotUnderstood(f"{self.scene.said.clause!r}: only places are searched")
         return self.looked_around(clause.subject, value)
 
+    def on_gone(self, clause: Clause) -> None:
+        """`the pizza has gone cold`."""
+        self.check_mode()
+        assert clause.subject is not None
+        self.are(clause.subject, [w for w in clause.words if "ADJ" in w.tags][-1:], False)
+
+    def on_left_so(self, clause: Clause) -> None:
+        """`somebody left the fridge open`."""
+        self.check_mode()
+        things = [a for a in (clause.subject, *clause.arguments) if isinstance(a, Nouns)][-1]
+        words = [w for w in clause.words if "ADJ" in w.tags][-1:]
+        self.are(things, words, False)
+
+    def on_did(self, clause: Clause) -> None:
+        """`Ben opened the door`, `we moved the crate to aisle 3`, `I have searched the kitchen`."""
+        self.check_mode()
+        self._done_by_somebody(clause, True)
+
+    def on_not_done(self, clause: Clause) -> None:
+        """`nobody has searched the kitchen`."""
+        self.check_mode()
+        self._done_by_somebody(clause, False)
+
+    def _done_by_somebody(self, clause: Clause, value: bool) -> None:
+        verb = clause.verb
+        assert verb is not None
+        refusal = NotUnderstood(f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}")
+        for frame, skills in frames_of(self.scene.tagger, verb, clause.arguments, ("PART",)):
+            if len(frame.themes) != 1 and not (frame.places and "search" in frame.senses):
+                continue
+            if skills and not frame.places:
+                phrase = skills[0].phrase
+                if phrase.type == "place":
+                    names = [
+                        n for m in self.places.place_mentions(frame.themes[0]) for n in m.subjects
+                    ]
+                else:
+                    names = [n for m in self.settled(frame.themes[0]) for n in m.subjects]
+                for name in names:
+                    for relation, wanted in phrase.wants:
+                        if not value and not isinstance(wanted, bool):
+                            raise refusal
+                        self.fact(relation, name, wanted if value else not wanted)
+                return None
+            if "search" in frame.senses and "move" not in frame.senses:
+                nouns = frame.themes[0] if frame.themes else frame.places[0].nouns
+                return self.looked_around(nouns, value)
+            if "move" in frame.senses and frame.places and value:
+                return self.placed(frame.themes[0], frame.places)
+        raise refusal
+
     def on_was(self, clause: Clause) -> None:
         predicate = clause.predicate
-        if predicate is not None and predicate.kind == "done":
+        if predicate is not None and predicate.kind in ("done", "state"):
             return self.were(clause, not clause.has("NOT"))
         was = next(word.text for word in clause.words if "WAS" in word.tags)
         raise NotUnderstood(f"{was!r} tells of the past; say what holds now")
@@ -263,13 +326,6 @@ class Claims:
             self.who.resolve(s) for s in self.nouns.subjects(clause.subject, ("robot",), "a robot")
         ]
         self.holding(robots, None, True)
-
-    def on_looked(self, clause: Clause) -> None:
-        self.check_mode()
-        participle = next((w.word for w in clause.words if "PART" in w.tags), "")
-        if participle not in self.scene.tagger.book.searched:
-            raise NotUnderstood(f"{self.scene.said.clause!r} is not understood as a fact: {SAY_IT}")
-        self.looked_around(clause.subject, not clause.has("NOBODY"))
 
     def on_seen(self, clause: Clause) -> None:
         self.check_mode()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fleet.errors import NotUnderstood
+from fleet.language.refusals import one_of
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.ellipsis import Continuations
@@ -20,9 +21,15 @@ from fleet.language.resolve.skilled import Skilled
 from fleet.language.resolve.tidiness import Tidiness
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import Clause
+from fleet.language.words.tokens import words_in
 
+_STATES = frozenset({"shall_be", "wanted", "belongs", "bare", "bare_state", "named", "needs"})
+"""Kinds of clauses that say what shall be so, rather than what shall be done."""
+_COMMANDS = _STATES | {"do", "told", "needs_doing"}
 _WISHES = frozenset(
-    {"wanted", "belongs", "whereto", "enough", "kept", "never_be", "never_do", "avoid"}
+    words_in(
+        "wanted belongs whereto enough kept never_be never_do avoid needs needs_doing not_allowed"
+    )
 )
 
 
@@ -44,7 +51,7 @@ class Clauses:
         commands = Commands(
             scene, who, nouns, places, wishes, looking, skilled, tidiness, questions
         )
-        ellipsis = Continuations(scene, who, nouns, wishes, claims)
+        ellipsis = Continuations(scene, who, nouns, wishes, claims, commands)
         self._by_kind: dict[str, Callable[[Clause], None]] = {
             name.removeprefix("on_"): getattr(part, name)
             for part in (claims, questions, shall, commands, ellipsis)
@@ -65,3 +72,11 @@ class Clauses:
         if self.scene.mode == "fact" and clause.kind in _WISHES:
             raise NotUnderstood(f"{said.clause!r} is not understood as a fact: {SAY_IT}")
         self._by_kind[clause.kind](clause)
+        self.scene.said.done |= clause.kind not in _STATES
+        said = self.scene.said
+        for mention, wants in said.extra:
+            if self.scene.mode == "fact" or clause.kind not in _COMMANDS:
+                raise NotUnderstood(f"it is not known whether {one_of(mention.subjects)} is so")
+            for relation, value in wants:
+                said.draft.add(relation, mention, value)
+        said.extra = []

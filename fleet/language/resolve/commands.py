@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import reason_for
-from fleet.language.resolve.frames import EXAMPLE, Frame, frames_of
+from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of
 from fleet.language.resolve.looking import ROBOTS_TELL, Looking
 from fleet.language.resolve.mentions import NounPhrase, Subject
 from fleet.language.resolve.nouns import NounResolver
@@ -18,8 +19,10 @@ from fleet.language.resolve.skilled import Skilled
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.resolve.tidiness import Tidiness
 from fleet.language.resolve.wishes import Wishes
+from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tree.nodes import (
     Clause,
+    Nouns,
 )
 from keyexpr_schema.facts import (
     AT,
@@ -43,6 +46,7 @@ class Commands:
         questions: Questions,
     ) -> None:
         self.scene = scene
+        self._clause: Clause | None = None
         self.who = who
         self.nouns = nouns
         self.places = places
@@ -53,19 +57,45 @@ class Commands:
         self.questions = questions
 
     def on_do(self, clause: Clause) -> None:
+        """`bring the soup to Anna`, `bring me my mug, washed`."""
         self._verb(clause, self.scene.said.addressees or None)
+        for word in clause.words:
+            if word.tags & {"ADJ", "PART"} and "NOUN" not in word.tags:
+                for mention in self.scene.said.recent:
+                    wants = self.scene.stated.wants(word, mention.subjects[0])
+                    self.skilled.wish([mention], wants)
+
+    def once_more(self, clause: Clause) -> bool:
+        """`then the cactus`, after `water the fern`: whether the verb before was of that kind."""
+        before = self.scene.said.again
+        if before is None or clause.subject is None:
+            return False
+        rest = [a for a in before.arguments if not isinstance(a, Nouns)]
+        self._verb(replace(before, arguments=(clause.subject, *rest)), None)
+        return True
 
     def on_told(self, clause: Clause) -> None:
         assert clause.subject is not None
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+        if any(s.type == "object" for s in who) and self._goes(clause):
+            return self.wishes.to_target(
+                who, *self.wishes.whereto(framed(clause.arguments), each=True)
+            )
         self.who.check_robots(who)
         self.scene.said.addressees = [
             s for s in who if not (isinstance(s, NounPhrase) and s.generic)
         ]
-        self._verb(clause, who)
+        return self._verb(clause, who)
+
+    def _goes(self, clause: Clause) -> bool:
+        """`the mail should go to Carla`: whether that is what shall be done with a thing."""
+        verb = clause.verb
+        heads = self.scene.tagger.verbs.heads(verb.words, "VERB", "FIN") if verb else ()
+        return ("go",) in heads
 
     def _verb(self, clause: Clause, who: Sequence[Subject] | None) -> None:
         assert clause.verb is not None
+        self._clause = clause
         problems: list[NotUnderstood] = []
         frames = frames_of(self.scene.tagger, clause.verb, clause.arguments, ("VERB", "FIN", "GER"))
         if not frames:
@@ -74,11 +104,12 @@ class Commands:
             before = self.scene.said
             self.scene.said = before.copy()
             try:
+                frame = self._for_me(frame, phrases)
                 if phrases:
                     if phrases[0].phrase.type != "robot":
                         self._check_who(who)
                     self.scene.said.elliptic = ""
-                    self.scene.said.again = (clause.verb, clause.arguments)
+                    self.scene.said.again = clause
                     self.skilled.skill(frame, phrases, who)
                 else:
                     self._sense(frame, who)
@@ -88,9 +119,26 @@ class Commands:
                 problems.append(problem)
         raise problems[0]
 
+    def _for_me(self, frame: Frame, skills: Sequence[SkillFrame]) -> Frame:
+        """The frame without "for me" and "me", where that says no more than who asks."""
+        if "move" in frame.senses:
+            return frame
+        for_me = tuple(
+            p for p in frame.places if p.role == "for" and p.nouns and p.nouns.items[0].form == "me"
+        )
+        places = tuple(p for p in frame.places if p not in for_me)
+        themes = frame.themes
+        if skills and len(themes) == 2 and themes[0].items[0].form == "me":
+            themes = themes[1:]
+        if for_me and "pick" in frame.senses and self.scene.vocabulary.speaker is not None:
+            return replace(frame, senses=frozenset({"move"}))
+        return replace(frame, places=places, themes=themes)
+
     def _sense(self, frame: Frame, who: Sequence[Subject] | None) -> None:
         senses = frame.senses
         self.scene.said.verb = frame.verb
+        if not senses & {"move", "go", "give"}:
+            self.scene.said.again = self._clause
         self.scene.said.elliptic = "move" if senses & {"move", "go", "give"} else ""
         if "go" in senses and not frame.themes and ("move" not in senses or _whereto(frame)):
             return self.wishes.go(frame, who)
@@ -98,6 +146,8 @@ class Commands:
             self.who.check_robots(who or ())
             return self.looking.patrol(frame, who or ())
         self._check_who(who)
+        if "bin" in senses:
+            return self.wishes.throw_away(frame)
         if "clear" in senses and "tidy" not in senses:
             return self.tidiness.clear(frame)
         if "move" in senses and (frame.themes or "tidy" not in senses):
@@ -115,6 +165,21 @@ class Commands:
     def _check_who(self, who: Sequence[Subject] | None) -> None:
         if who is not None:
             self.who.check_who(who)
+
+    def on_needs_doing(self, clause: Clause) -> None:
+        """`the living room needs tidying up`."""
+        assert clause.subject is not None and clause.verb is not None
+        self._verb(replace(clause, arguments=(clause.subject, *clause.arguments)), None)
+
+    def on_not_allowed(self, clause: Clause) -> None:
+        """`Scout isn't allowed in the office`."""
+        assert clause.subject is not None
+        who = self.nouns.subjects(clause.subject, ("robot",), "a robot")
+        names = [n for s in who for n in self.who.resolve(s).subjects]
+        places = self._entered(framed(clause.arguments))
+        self.scene.said.never.extend(
+            Condition(relation=AT, subject=name, value=place) for name in names for place in places
+        )
 
     def on_never_do(self, clause: Clause) -> None:
         """`never go to the kitchen`, `the hsr should never enter it`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -22,6 +22,7 @@ class Discourse:
     text: str
     tokens: Sequence[Token]
     draft: GoalDraft
+    is_person: Callable[[str], bool] = lambda name: False
     recent: list[Mention] = field(default_factory=list)
     """Whom "it" and "them" may mean."""
     mentioned: list[Mention] = field(default_factory=list)
@@ -35,6 +36,18 @@ class Discourse:
     """`move`: "and the book to the kitchen" may follow; `be`: "and the book in the hallway"."""
     verb: str = ""
     addressees: list[Subject] = field(default_factory=list)
+    chosen: dict[int, str] = field(default_factory=dict)
+    """Whom a noun phrase means of several, by the token at which it begins, while that is asked."""
+    extra: list[tuple[Mention, tuple[tuple[str, Value], ...]]] = field(default_factory=list)
+    """States that are wanted as well: "bring me a cooked egg"."""
+    by: list[str] = field(default_factory=list)
+    """Robots that shall do it."""
+    person: str | None = None
+    """Whom "him" and "her" mean."""
+    carrier: str | None = None
+    """What something was put in or on last: "put the cup inside"."""
+    goals: list[Any] = field(default_factory=list)
+    """Goals that ended with their sentence, for which a time or condition was said."""
     again: Any = None
     """The verb and arguments of the last clause: "and then the second one"."""
     began: int = 0
@@ -45,7 +58,11 @@ class Discourse:
     never: list[Condition] = field(default_factory=list)
     when: list[Condition] = field(default_factory=list)
     times: list[TimePhrase] = field(default_factory=list)
-    urgent: bool = False
+    urgent: int = 0
+    telegraphic: bool = False
+    """Whether the sentence has no articles."""
+    done: bool = False
+    """Whether the sentence asks that something be done, rather than be so."""
 
     def copy(self) -> Discourse:
         """The same, for another reading to go on from."""
@@ -62,12 +79,21 @@ class Discourse:
             never=list(self.never),
             when=list(self.when),
             times=list(self.times),
+            chosen=dict(self.chosen),
+            extra=list(self.extra),
+            by=list(self.by),
+            goals=list(self.goals),
         )
 
     def quote(self, first: int, last: int) -> str:
         """The text of some tokens, as it was written."""
         chosen = self.tokens[first:last]
         return " ".join(self.text[chosen[0].start : chosen[-1].end].split()) if chosen else ""
+
+    def spoken_of(self, names: Sequence[str]) -> None:
+        """If it is one person, they are whom "him" means from now on."""
+        if len(names) == 1 and self.is_person(names[0]):
+            self.person = names[0]
 
     @property
     def clause(self) -> str:
@@ -82,6 +108,8 @@ class Discourse:
     def remember(self, mentions: Sequence[Mention]) -> None:
         """These are whom a pronoun means from now on."""
         self.mentioned.extend(mentions)
+        for mention in mentions:
+            self.spoken_of(mention.subjects)
         if len(mentions) > 1 and not any(m.open for m in mentions):
             names = tuple(dict.fromkeys(s for m in mentions for s in m.subjects))
             self.recent = [Mention(names, mentions[0].type, mentions[0].key)]

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.claims import Claims
+from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.frames import EXAMPLE, framed
 from fleet.language.resolve.mentions import Subject
 from fleet.language.resolve.nouns import NounResolver
+from fleet.language.resolve.places import Where
 from fleet.language.resolve.referents import Referents
 from fleet.language.resolve.scene import PLACES, THINGS, Scene
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import (
     Clause,
+    Nouns,
 )
 
 
@@ -19,13 +22,20 @@ class Continuations:
     """Turns clauses that go on from one before into wishes."""
 
     def __init__(
-        self, scene: Scene, who: Referents, nouns: NounResolver, wishes: Wishes, claims: Claims
+        self,
+        scene: Scene,
+        who: Referents,
+        nouns: NounResolver,
+        wishes: Wishes,
+        claims: Claims,
+        commands: Commands,
     ) -> None:
         self.scene = scene
         self.who = who
         self.nouns = nouns
         self.wishes = wishes
         self.claims = claims
+        self.commands = commands
 
     def on_bare(self, clause: Clause) -> None:
         """`and the book to the kitchen`, `and the second cup in the hallway`."""
@@ -34,10 +44,9 @@ class Continuations:
             return self.claims.placed(clause.subject, clause.arguments)
         if self.scene.mode == "fact":
             return self.claims.placed(clause.subject, clause.arguments)
-        if not self.scene.said.elliptic:
-            subject = clause.subject.items
-            shown = self.scene.said.quote(subject[0].first, subject[-1].last)
-            raise NotUnderstood(f"{shown!r} is not understood as a goal: {EXAMPLE}")
+        frame, beneficiary = self.wishes.for_whom(framed(clause.arguments))
+        if beneficiary is not None and not frame.places:
+            return self._to_person(clause.subject, beneficiary)
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         verb = self.scene.said.verb.split() if self.scene.said.elliptic == "move" else [""]
         fetching = verb[0] in self.scene.tagger.book.fetching
@@ -56,6 +65,9 @@ class Continuations:
 
     def on_named(self, clause: Clause) -> None:
         assert clause.subject is not None
+        said = self.scene.said
+        if not said.elliptic and self.commands.once_more(clause):
+            return None
         strange = any("UNK" in w.tags for n in clause.subject.items for w in n.head)
         if self.scene.said.elliptic and not strange and self.nouns.can_be(clause.subject, PLACES):
             raise NotUnderstood(
@@ -64,8 +76,18 @@ class Continuations:
             )
         if self.scene.said.elliptic and not strange:
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say where to: name a place")
+        one = clause.subject.items[0]
+        asked = one.quantity.name == "ANY" or "SOMETHING" in ((one.head and one.head[0].tags) or ())
+        speaker = self.scene.vocabulary.speaker
+        if asked and speaker is not None and not strange and self.scene.mode == "":
+            return self._to_person(clause.subject, speaker)
         shown = self.scene.said.clause
         raise NotUnderstood(f"{shown!r} is not understood as a goal: {EXAMPLE}")
+
+    def _to_person(self, nouns: Nouns, person: str) -> None:
+        things = self.nouns.subjects(nouns, ("object",), "an object")
+        where = Where(target=person, target_type="object")
+        return self.wishes.to_target(things, where, False)
 
     def on_enough(self, clause: Clause) -> None:
         """`a bottle in the kitchen would do`: which of what was asked for before, and where to."""

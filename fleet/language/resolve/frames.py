@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from fleet.errors import NotUnderstood
 from fleet.language.tagging.skill_words import SKILL, SkillFrame
 from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.nodes import (
@@ -30,7 +31,6 @@ class Frame:
     themes: tuple[Nouns, ...]
     places: tuple[Place, ...]
     particles: tuple[Particle, ...] = ()
-    but: tuple[Except, ...] = ()
 
     @property
     def home(self) -> bool:
@@ -49,13 +49,18 @@ def framed(
     arguments: Sequence[Argument], verb: str = "", senses: frozenset[str] = frozenset()
 ) -> Frame:
     """The arguments of a clause, sorted."""
+    themes = [a for a in arguments if isinstance(a, Nouns)]
+    for left_out in (a for a in arguments if isinstance(a, Except)):
+        if not themes:
+            raise NotUnderstood("'except' leaves something out, and it is not said of what")
+        last = replace(themes[-1].items[-1], but=left_out.nouns)
+        themes[-1] = replace(themes[-1], items=(*themes[-1].items[:-1], last))
     return Frame(
         verb,
         senses,
-        tuple(a for a in arguments if isinstance(a, Nouns)),
+        tuple(themes),
         tuple(a for a in arguments if isinstance(a, Place)),
         tuple(a for a in arguments if isinstance(a, Particle)),
-        tuple(a for a in arguments if isinstance(a, Except)),
     )
 
 
@@ -73,6 +78,7 @@ def frames_of(
                 of_skill = skills if SKILL in entry.senses else []
                 found.append((len(entry.behind), fitted, of_skill))
     longest = max((row[0] for row in found), default=0)
+    found.sort(key=lambda row: not any(frame.phrase.says for frame in row[2]))
     return [(frame, skills) for length, frame, skills in found if length == longest]
 
 
@@ -90,10 +96,10 @@ def _fitted(
             left.remove(one)
             continue
         at = next((p for p in places if tuple(p.preposition.split()) == rest), None)
-        if at is None or (themes and "find" in senses):
+        if at is None or (themes and senses & {"find", SKILL}):
             return None
         if senses & {"find", SKILL} and not themes and at.nouns is not None:
             places.remove(at)
             themes = (at.nouns,)
         break
-    return Frame(verb, senses, themes, tuple(places), tuple(left), frame.but)
+    return Frame(verb, senses, themes, tuple(places), tuple(left))

@@ -8,7 +8,7 @@ from fleet.errors import NotUnderstood
 from fleet.language.resolve.frames import Frame
 from fleet.language.resolve.mentions import Mention, Subject
 from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import PlaceResolver
+from fleet.language.resolve.places import WHERE, PlaceResolver
 from fleet.language.resolve.referents import Referents
 from fleet.language.resolve.scene import Scene
 from fleet.language.resolve.wishes import Wishes
@@ -70,6 +70,9 @@ class Looking:
     def _look_in(self, places: Sequence[Place]) -> None:
         if not places:
             return None
+        for place in places:
+            if place.role not in ("around", *WHERE):
+                self.places.locative(place)  # says what is wrong with it
         if any(p.role not in ("in", "from", "around") and p.special != "house" for p in places):
             raise NotUnderstood(f"{self.scene.said.clause!r}: things are looked for in places")
         if len(places) > 1 and all(p.nouns and len(p.nouns.items) == 1 for p in places):
@@ -138,7 +141,10 @@ class Looking:
         places = [p for p in frame.places if p.role != "for" and p.special != "there"]
         if len(frame.themes) > 1:
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say where to look around")
-        if any(p.role not in ("in", "around", "via", "to", "above", "under") for p in places):
+        if any(p.role not in ("in", "around", "via", "to") for p in places):
+            for place in places:
+                if place.role not in ("around", "via", *WHERE):
+                    self.places.locative(place)  # says what is wrong with it
             raise NotUnderstood(f"{self.scene.said.clause!r}: places are searched, and in them")
         if frame.themes and not (
             len(frame.themes[0].items) == 1 and frame.themes[0].items[0].form == "pronoun"

@@ -10,6 +10,17 @@ from fleet.language.refusals import one_of
 from fleet.language.tagging.lexicon import Entity, EntityType
 from fleet.language.tree.nodes import Quantity
 
+_MOST = 6
+"""Of so many at most some may be left open: "two of the chairs"."""
+
+
+class WhichOne(NotUnderstood):
+    """A noun phrase could be one of several; `key` is the token at which it begins."""
+
+    def __init__(self, sentence: str, key: int, names: tuple[str, ...]) -> None:
+        super().__init__(sentence)
+        self.key, self.names = key, names
+
 
 @dataclass(frozen=True)
 class Mention:
@@ -26,11 +37,13 @@ class Mention:
     open: bool = False
     selective: bool = False
     surfaces: tuple[str, ...] = ()
+    least: int = 1
+    """Of an open one, how many of them."""
 
     @property
     def single(self) -> bool:
         """Whether just one is meant, known or open."""
-        return self.open or len(self.subjects) == 1
+        return (self.open and self.least == 1) or len(self.subjects) == 1
 
 
 @dataclass(frozen=True)
@@ -86,6 +99,9 @@ class NounPhrase:
             return Mention(self._by_ordinal(), self.type, self.key)
         if self.count is not None and self.count != len(names):
             verb = "is" if len(names) == 1 else "are"
+            several = len(names) <= _MOST and self.quantity in (Quantity.BARE, Quantity.ANY)
+            if 0 < self.count < len(names) and several:
+                return Mention(names, self.type, self.key, open=True, least=self.count)
             reason = (
                 f"say which {self.count}"
                 if 0 < self.count < len(names)
@@ -107,7 +123,8 @@ class NounPhrase:
         if self.plural:
             return Mention(names, self.type, self.key, selective=True)
         what = "place" if self.type == "surface" else self.type
-        raise NotUnderstood(f"{self.text!r} could be {one_of(names)}: say which {what}")
+        sentence = f"{self.text!r} could be {one_of(names)}: say which {what}"
+        raise WhichOne(sentence, self.key, names)
 
     def _by_ordinal(self) -> tuple[str, ...]:
         ordered = sorted(self.found, key=lambda e: e.rank)

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, nearest, one_of, suggestion
-from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
+from fleet.language.resolve.mentions import NounPhrase, Subject
+from fleet.language.resolve.pronouns import PERSONAL, Pronouns, either
 from fleet.language.resolve.referents import Referents
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import CATEGORIES, ENTITY_TYPES, Entity, EntityType
@@ -18,7 +19,7 @@ from fleet.language.tree.nodes import (
 )
 from fleet.language.words.tokens import ORDINALS, Token, words_of
 
-_PLURAL = frozenset({"them", "they", "these", "those", "both", "all", "each"})
+_SINGULAR = ("ss", "us", "is")
 
 
 class NounResolver:
@@ -27,6 +28,7 @@ class NounResolver:
     def __init__(self, scene: Scene, who: Referents) -> None:
         self.scene = scene
         self.who = who
+        self.pronouns = Pronouns(scene)
         self.located: Callable[[Noun, NounPhrase], NounPhrase] = lambda noun, made: made
 
     def subjects(self, nouns: Nouns, types: Sequence[EntityType], what: str) -> list[Subject]:
@@ -37,10 +39,10 @@ class NounResolver:
         """
         found = [self.subject(noun, types, what) for noun in nouns.items]
         if nouns.either:
-            either = found[0]
+            one_of_them = found[0]
             for other in found[1:]:
-                either = self._either(either, other)
-            return [either]
+                one_of_them = either(one_of_them, other)
+            return [one_of_them]
         for i in range(1, len(found)):
             found[i] = _determined(found[i], found[i - 1])
         return found
@@ -48,16 +50,21 @@ class NounResolver:
     def subject(self, noun: Noun, types: Sequence[EntityType], what: str) -> Subject:
         """Whom one noun phrase or pronoun means."""
         if noun.form == "pronoun":
-            return self.pronoun(noun)
+            return self.pronouns.pronoun(noun, types)
         if noun.form == "me":
-            return self.speaker(noun, "object")
+            return self.pronouns.speaker(noun, "object")
         return self.noun(noun, types, what)
 
     def can_be(self, nouns: Nouns, types: Sequence[EntityType]) -> bool:
         """Whether all of them can be of one of these types, by their words."""
         for noun in nouns.items:
             if noun.form == "pronoun":
-                if not any(m.type in types for m in self.scene.said.recent):
+                if noun.words[0] in PERSONAL and self.scene.said.person is not None:
+                    if "object" not in types:
+                        return False
+                elif "object" not in types and "place" in types and self.scene.said.last_place:
+                    continue
+                elif not any(m.type in types for m in self.scene.said.recent):
                     return False
             elif noun.form == "me":
                 if self.scene.vocabulary.speaker is None or "object" not in types:
@@ -69,68 +76,57 @@ class NounResolver:
                     return False
         return True
 
-    def speaker(self, noun: Noun, as_type: EntityType = "surface") -> NounPhrase:
-        """Who says "me".
-
-        Raises:
-            NotUnderstood: nobody knows.
-        """
-        text = self.scene.said.quote(noun.first, noun.last)
-        found = tuple(
-            e
-            for e in self.scene.lexicon.entities
-            if e.type == as_type and e.id == self.scene.vocabulary.speaker
-        )
-        if not found:
-            raise NotUnderstood(
-                f"{text!r} names somebody whose place is not known; name a place or a robot"
-            )
-        return NounPhrase(found, text, noun.first, exact=True)
-
-    def pronoun(self, noun: Noun) -> Mention:
-        word = noun.words[0]
-        plural = word in _PLURAL or len(noun.words) > 1
-        meant = [m for m in self.scene.said.recent if m.single != plural]
-        count = 2 if word == "both" else int(word) if word.isdecimal() else None
-        if len(meant) == 1 and count in (None, len(meant[0].subjects)):
-            return meant[0]
-        names = sorted({s for m in self.scene.said.recent for s in m.subjects})
-        reason = f"could be {one_of(names)}" if names else "refers to nothing before it"
-        text = self.scene.said.quote(noun.first, noun.last)
-        raise NotUnderstood(f"{text!r} {reason}: name what you mean")
-
-    def _either(self, first: Subject, second: Subject) -> NounPhrase:
-        if not isinstance(first, NounPhrase) or not isinstance(second, NounPhrase):
-            raise NotUnderstood('"or" is understood between names only: name both')
-        if first.type != second.type or not (first.resolve().single and second.resolve().single):
-            raise NotUnderstood(f"{first.text!r} or {second.text!r} leaves too much open")
-        both = (
-            first.among(first.resolve().subjects).found
-            + second.among(second.resolve().subjects).found
-        )
-        return NounPhrase(both, f"{first.text} or {second.text}", first.key, Quantity.ANY)
-
     def noun(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
         """What a noun phrase can mean; its own words may say where it is.
 
         Raises:
             NotUnderstood: nothing known of these types; the message lists what is.
         """
-        return self.located(noun, self._described_by_words(noun, types, what))
+        made = self.located(noun, self._described_by_words(noun, types, what))
+        chosen = self.scene.said.chosen.get(noun.first)
+        if chosen is not None and chosen in made.names:
+            return replace(made.among({chosen}), exact=True, source=None)
+        return self._salient(self._spoken_briefly(noun, made))
+
+    def _spoken_briefly(self, noun: Noun, made: NounPhrase) -> NounPhrase:
+        """Bare plurals of a sentence without articles are all of them: "lights off"."""
+        bare = made.plural and made.quantity is Quantity.BARE and made.count is None
+        if bare and self.scene.said.telegraphic and self.scene.mode == "":
+            return replace(made, quantity=Quantity.ALL)
+        return made
+
+    def _salient(self, made: NounPhrase) -> NounPhrase:
+        """Of several, the one that was spoken of last: "the plate" after "plate 2"."""
+        if made.quantity is not Quantity.THE or made.plural or made.source is not None:
+            return made
+        if made.ordinal is not None or made.count is not None or len(made.names) < 2:
+            return made
+        for mention in reversed(self.scene.said.mentioned):
+            named = [name for name in made.names if name in mention.subjects]
+            if len(named) == 1 and not mention.open and len(mention.subjects) == 1:
+                return made.among(named)
+            if named:
+                return made
+        return made
 
     def _described_by_words(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
         text = self.scene.said.quote(noun.first, noun.last)
         made = NounPhrase((), text, noun.first, noun.quantity, count=noun.count)
         made = self._headed(noun, made, types, what)
+        made = self._owned(noun, made)
         if noun.use is not None:
             made = self._useful(made, noun.use)
         for adjective in noun.adjectives:
             made = self.scene.stated.narrowed(made, adjective, self.scene.said)
+        if noun.determiner == "any" and (noun.adjectives or noun.relatives):
+            made = replace(made, quantity=Quantity.ALL)  # "any plant that is dry"
         for relative in noun.relatives:
             if relative.state is not None:
                 made = self.scene.stated.narrowed(
                     made, relative.state, self.scene.said, relative.negated
                 )
+        if noun.but is not None and noun.ordinals:
+            raise NotUnderstood(f"{made.text!r} leaves something out of one thing")
         if noun.but is not None:
             made = self._without(made, noun.but, types, what)
         made = replace(made, plural=made.plural and not noun.part)
@@ -143,6 +139,11 @@ class NounResolver:
     def _headed(
         self, noun: Noun, made: NounPhrase, types: Sequence[EntityType], what: str
     ) -> NounPhrase:
+        if noun.form == "whatever":
+            found = tuple(e for e in self.scene.lexicon.entities if e.type == "object")
+            if "object" not in types or not found:
+                raise self.unknown(noun, types, what)
+            return replace(made, found=found, generic=True)
         if noun.form == "general":
             return self._general(noun, made, types, what)
         if noun.form == "headless" or (noun.form == "one" and len(noun.head) == 1):
@@ -191,10 +192,15 @@ class NounResolver:
         kind = self.scene.lexicon.kind(tokens, 0, end, types)
         if kind is not None and (of_kind := tuple(e for e in found if e in kind[1])):
             plural, found = kind[0], of_kind
+            plural = plural or (words[-1].endswith("s") and not words[-1].endswith(_SINGULAR))
             category = any(words[0] in (c, f"{c}s") for cs in CATEGORIES.values() for c in cs)
             generic = len(words) == 1 and len(found) == len(kind[1]) and category
         if noun.of:
             found = self._of_what(noun, found, types, what)
+        said_plainly = noun.quantity is Quantity.THE and not plural
+        if noun.ordinals or noun.numbers or said_plainly:  # the first cup is no mug
+            closest = tuple(e for e in found if self.scene.lexicon.is_kin(words, e))
+            found = closest or found
         self._remember_kind(found[0])
         if noun.form == "one":
             return replace(made, found=found, plural=noun.head[-1].spoken == "ones")
@@ -227,6 +233,28 @@ class NounResolver:
             raise self.unknown(noun, types, what)
         return replace(made, found=found, quantity=quantity, generic=entity_type == "object")
 
+    def _owned(self, noun: Noun, made: NounPhrase) -> NounPhrase:
+        """Those of an owner: of "Anna's mug" only those; of "my mug" those, if there are any."""
+        said = self.scene.said
+        owner: str | None = None
+        if noun.whose is not None:
+            subject = self.subject(noun.whose, ("object", "robot"), "a person")
+            owner = self.who.resolve(subject).subjects[0]
+            said.spoken_of((owner,))
+        elif noun.determiner in ("my", "our"):
+            owner = self.scene.vocabulary.speaker
+        elif noun.determiner in ("his", "her", "their"):
+            owner = said.person
+        things = self.scene.vocabulary.objects
+        owned = [
+            n for n in made.names if n in things and things[n].properties.get("owner") == owner
+        ]
+        if owner is not None and owned:
+            return replace(made.among(owned), exact=made.exact and len(owned) == 1)
+        if noun.whose is not None:
+            raise NotUnderstood(f"{made.text!r}: nothing of that kind is known to be {owner}'s")
+        return made
+
     def _useful(self, made: NounPhrase, verb: str) -> NounPhrase:
         known = {use for e in self.scene.lexicon.entities if e.type == "object" for use in e.uses}
         found = tuple(e for e in made.found if verb in e.uses)
@@ -249,7 +277,8 @@ class NounResolver:
         if stray := sorted(gone - names):
             raise NotUnderstood(f"{made.text!r}: {one_of(stray)} is none of {one_of(made.names)}")
         left = made.among(names - gone)
-        if not left.found or made.quantity not in (Quantity.ALL, Quantity.THE):
+        several = made.quantity is Quantity.ALL or (made.quantity is Quantity.THE and made.plural)
+        if not left.found or not several or made.count is not None:
             raise NotUnderstood(f"{made.text!r} leaves nothing, or does not say all of what")
         return replace(left, quantity=Quantity.ALL)
 

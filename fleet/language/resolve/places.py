@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of, reason_for
 from fleet.language.resolve.frames import EXAMPLE
-from fleet.language.resolve.mentions import Mention, NounPhrase
+from fleet.language.resolve.mentions import Mention, NounPhrase, WhichOne
 from fleet.language.resolve.nouns import NounResolver
 from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import PLACES, SPOTS, Scene
+from fleet.language.resolve.scene import PLACES, SPOTS, THINGS, Scene
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tree.nodes import (
     Noun,
@@ -104,7 +104,7 @@ class PlaceResolver:
         if noun.form == "basket":
             return self._basket(noun)
         if noun.form == "me":
-            return self.nouns.speaker(noun)
+            return self.nouns.pronouns.speaker(noun)
         if noun.form == "pronoun":
             return self._it(noun)
         if self.scene.vocabulary.good_for:
@@ -112,7 +112,7 @@ class PlaceResolver:
         return self.nouns.noun(noun, SPOTS, "a place")
 
     def _it(self, noun: Noun) -> NounPhrase:
-        mention = self.nouns.pronoun(noun)
+        mention = self.nouns.pronouns.pronoun(noun, THINGS)
         text = self.scene.said.quote(noun.first, noun.last)
         entities = {e.id: e for e in self.scene.lexicon.entities if e.type in SPOTS}
         found = tuple(entities[name] for name in mention.subjects if name in entities)
@@ -254,8 +254,10 @@ class PlaceResolver:
         for locative in finest:
             mention = locative.noun.among(shared).resolve()
             if mention.open or len(mention.subjects) != 1:
-                raise NotUnderstood(
-                    f"{locative.noun.text!r} could be {one_of(mention.subjects)}: say which"
+                raise WhichOne(
+                    f"{locative.noun.text!r} could be {one_of(mention.subjects)}: say which",
+                    locative.noun.key,
+                    mention.subjects,
                 )
         return mention.subjects[0], mention.type
 
@@ -328,6 +330,8 @@ class PlaceResolver:
         mentions = []
         for subject in self.nouns.subjects(nouns, PLACES, "a place"):
             mention = self.who.resolve(subject)
+            if people := [n for n in mention.subjects if self.scene.vocabulary.is_person(n)]:
+                raise NotUnderstood(f"{one_of(people)} is no place")
             if mention.open or mention.type not in PLACES:
                 raise NotUnderstood(f"it does not say which place: {EXAMPLE}")
             surfaces = subject.surfaces

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace as replace_nouns
 
 from msgspec.structs import replace
 
@@ -18,6 +19,7 @@ from fleet.language.tree.nodes import (
     Clause,
 )
 from keyexpr_schema.facts import (
+    AT,
     SEARCHED,
 )
 from keyexpr_schema.payloads.goals import Condition
@@ -65,14 +67,20 @@ class Questions:
     def _asked_of(self, clause: Clause) -> tuple[str, ...]:
         assert clause.subject is not None
         types = THINGS if self.nouns.can_be(clause.subject, THINGS) else PLACES
-        found = self.nouns.subjects(clause.subject, types, "an object, robot or place")
+        plain = replace_nouns(
+            clause.subject,
+            items=tuple(replace_nouns(n, adjectives=()) for n in clause.subject.items),
+        )
+        found = self.nouns.subjects(plain, types, "an object, robot or place")
         return tuple(
             dict.fromkeys(
                 n for s in found for n in (s.names if not isinstance(s, Mention) else s.subjects)
             )
         )
 
-    def _asked(self, clause: Clause, names: Sequence[str]) -> tuple[Condition, ...]:
+    def _asked(
+        self, clause: Clause, names: Sequence[str], negated: bool = False
+    ) -> tuple[Condition, ...]:
         """What may be so of each of them, who are then called `?`."""
         predicate = clause.predicate
         arguments = predicate.arguments if predicate is not None else clause.arguments
@@ -91,11 +99,13 @@ class Questions:
         if words:
             held = {
                 (relation, value)
-                for relation, _, value in of_each(self.scene.stated, words, names[:1])
+                for relation, _, value in of_each(self.scene.stated, words, names[:1], negated)
             }
             return tuple(Condition(relation=r, subject="?", value=v) for r, v in sorted(held))
         if not arguments:
             return ()
+        if negated:
+            raise NotUnderstood(f"{self.scene.said.clause!r}: ask where they are, not where not")
         where, _ = self.wishes.whereto(framed(arguments))
         target = where.target or where.source
         if target is None:
@@ -106,6 +116,17 @@ class Questions:
         """`is the door open?`"""
         self._asks(clause)
         assert clause.subject is not None
+        if not clause.has("DET") and any(
+            n.quantity.name != "THE" and not n.numbers and n.form == "noun" and n.determiner
+            for n in clause.subject.items
+        ):  # "are there any clean glasses?"
+            names_of_any = self._asked_of(clause)
+            held = self._asked(clause, names_of_any)
+            states = [w for n in clause.subject.items for w in n.adjectives]
+            rows = of_each(self.scene.stated, states, names_of_any[:1])
+            told = tuple(Condition(relation=r, subject="?", value=v) for r, _, v in rows)
+            self.scene.question = Question("whether", names_of_any, (*held, *told))
+            return
         types = THINGS if self.nouns.can_be(clause.subject, THINGS) else PLACES
         mentions = [
             self.who.resolve(s)
@@ -122,6 +143,18 @@ class Questions:
             tuple(replace(each, subject=name) for name in names for each in held),
         )
 
+    def on_which_not(self, clause: Clause) -> None:
+        """`which boxes aren't sealed?`"""
+        self._asks(clause)
+        names = self._asked_of(clause)
+        self.scene.question = Question("which", names, self._asked(clause, names, True))
+
+    def on_who_at(self, clause: Clause) -> None:
+        """`who is in the study?`"""
+        self._asks(clause)
+        held = self._asked(clause, ())
+        self.scene.question = Question("who", (), held)
+
     def on_doing(self, clause: Clause) -> None:
         """`what is the robot doing?`"""
         self._asks(clause)
@@ -131,4 +164,5 @@ class Questions:
     def on_who(self, clause: Clause) -> None:
         """`who has the book?`"""
         self._asks(clause)
-        self.scene.question = Question("who", self._asked_of(clause))
+        held = tuple(Condition(relation=AT, subject=n, value="?") for n in self._asked_of(clause))
+        self.scene.question = Question("who", (), held)

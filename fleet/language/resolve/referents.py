@@ -158,6 +158,11 @@ class Referents:
         for subject in who:
             names = subject.names if isinstance(subject, NounPhrase) else subject.subjects
             if not self.any_robot(subject) and len(self.scene.vocabulary.robots) > 1:
+                if self.scene.mode != "goal":
+                    mention = self.resolve(subject)
+                    if not (mention.open and set(names) == set(self.scene.vocabulary.robots)):
+                        self.scene.said.by.extend(mention.subjects)
+                    continue
                 raise NotUnderstood(
                     f"{' and '.join(names)} cannot be told to do it: a goal says what must hold, "
                     "and the allocator finds who does it; leave the name out"

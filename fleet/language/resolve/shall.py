@@ -23,6 +23,7 @@ from fleet.language.tree.nodes import (
     Argument,
     Clause,
     Nouns,
+    Place,
     Predicate,
 )
 from keyexpr_schema.facts import (
@@ -69,6 +70,12 @@ class Shall:
             raise NotUnderstood(f"{modal!r} is uncertain; say what holds, or what should hold")
         if self.scene.mode == "fact":
             raise NotUnderstood(f"{self.scene.said.line!r} is a goal and not a fact: {SAY_IT}")
+        got = any(w.word == "get" for w in clause.words)
+        if got and clause.predicate is not None and clause.predicate.kind == "placed":
+            raise NotUnderstood(f"{self.scene.said.clause!r}: that is what somebody does")
+        got = any(w.word == "get" for w in clause.words)
+        if got and clause.predicate is not None and clause.predicate.kind == "placed":
+            raise NotUnderstood(f"{self.scene.said.clause!r}: that is what somebody does")
         return self.to_be(clause.subject, clause.predicate, clause.arguments)
 
     def to_be(
@@ -155,6 +162,40 @@ class Shall:
                 )
             self.scene.said.draft.add(relation, mention, True)
         return self.scene.said.remember(mentions)
+
+    def on_guess(self, clause: Clause) -> None:
+        """`should the door be open, …`: a condition, else a guess."""
+        if self.scene.mode == "fact":
+            return self.on_being(clause)
+        raise NotUnderstood(f"{self.scene.said.clause!r} asks what may be: say what shall be")
+
+    def on_needs(self, clause: Clause) -> None:
+        """`Ben needs a screwdriver`."""
+        assert clause.subject is not None
+        wanted = next((a for a in clause.arguments if isinstance(a, Nouns)), None)
+        persons = self.nouns.subjects(clause.subject, ("object",), "a person")
+        names = [n for s in persons for n in self.who.resolve(s).subjects]
+        if wanted is None or len(names) != 1 or not self.scene.vocabulary.is_person(names[0]):
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say what shall be so")
+        things = self.nouns.subjects(wanted, ("object",), "an object")
+        where = replace(self.places.where([]), target=names[0], target_type="object")
+        self.scene.said.spoken_of(names)
+        return self.wishes.to_target(things, where, False)
+
+    def on_bare_state(self, clause: Clause) -> None:
+        """`and the curtains closed`, `lights off in the bathroom`."""
+        assert clause.subject is not None
+        words = [w for w in clause.words if "ADJ" in w.tags]
+        if self.scene.said.elliptic in ("is", "are") or self.scene.mode == "fact":
+            return self.claims.are(clause.subject, words, False)
+        self.scene.said.elliptic = "be"
+        subject = clause.subject
+        if clause.arguments:
+            placed = tuple(a for a in clause.arguments if isinstance(a, Place))
+            last = replace(subject.items[-1], places=placed)
+            subject = replace(subject, items=(*subject.items[:-1], last))
+        places = not self.nouns.can_be(subject, THINGS) and self.nouns.can_be(subject, PLACES)
+        return self._made(subject, words, places)
 
     def on_wanted(self, clause: Clause) -> None:
         assert clause.subject is not None

@@ -18,6 +18,7 @@ from fleet.language.vocabulary import SkillPhrase
 from keyexpr_schema.facts import (
     Value,
 )
+from keyexpr_schema.payloads.world import Feature
 
 
 class Skilled:
@@ -88,10 +89,19 @@ class Skilled:
             for o in self.scene.vocabulary.objects.values()
             if any(p.fits(o) for p in phrases)
         }
+        carrier = self.scene.said.carrier
+        things = [
+            Mention((carrier,), "object", thing.key)
+            if carrier in able and isinstance(thing, Mention) and not set(thing.subjects) & able
+            else thing
+            for thing in things
+        ]
         source, surface = (where.source, where.source_surface) if where else (None, None)
         mentions = self.those(things, able, phrase.verb, source, surface)
         self.scene.said.remember(mentions)
         for mention in mentions:
+            if Feature.CONTAINS in self.scene.vocabulary.good_for.get(mention.subjects[0], ()):
+                self.scene.said.carrier = mention.subjects[0]
             meant = [self.scene.vocabulary.objects[n] for n in mention.subjects]
             fitting = next((p for p in phrases if all(map(p.fits, meant))), phrase)
             self.wish([mention], fitting.wants)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
@@ -78,10 +79,30 @@ class GoalDraft:
         whereto: bool = False,
     ) -> None:
         """One more wish, for each of those meant, or for any of them."""
-        each = (mention.subjects,) if mention.open else tuple((s,) for s in mention.subjects)
+        each: tuple[tuple[str, ...], ...] = tuple((s,) for s in mention.subjects)
+        each = (mention.subjects,) if mention.open else each
+        if mention.least > 1:  # "two of the three": one of each pair
+            each = tuple(combinations(mention.subjects, len(mention.subjects) - mention.least + 1))
+        if relation not in PLACED and any(
+            wish.relation == relation
+            and wish.value != value
+            and not wish.open
+            and any((wish.subjects[0],) == subjects for subjects in each)
+            for wish in self.stages[-1]
+        ):  # "open the door, …, close it"
+            self.next_stage()
         self.stages[-1].extend(
-            Wish(relation, subjects, value, mention.key, mention.open, on_robot, means, whereto)
-            for subjects in each
+            Wish(
+                relation,
+                subjects,
+                value,
+                mention.key if mention.least == 1 else -(1000 * (mention.key + 1) + number),
+                mention.open,
+                on_robot,
+                means,
+                whereto,
+            )
+            for number, subjects in enumerate(each)
         )
 
     def narrow(self, mention: Mention, subjects: Collection[str]) -> Mention:
@@ -95,16 +116,21 @@ class GoalDraft:
             ]
         return meant
 
-    def conditions(self) -> tuple[tuple[Condition, ...], ...]:
+    def conditions(self, speaker: str | None = None) -> tuple[tuple[Condition, ...], ...]:
         """The stages, each free of contradictions and of what another wish implies.
+
+        What was fetched, and goes nowhere, is for the `speaker`.
 
         Raises:
             NotUnderstood: two wishes of one stage cannot both come true.
         """
-        _check_carried([wish for stage in self.stages for wish in stage])
-        stages = [
-            part for stage in self.stages for part in _sequenced(_without_implied_travel(stage))
-        ]
+        wished = [wish for stage in self.stages for wish in stage]
+        given = [] if speaker is None else [
+            [_for_speaker(wish, wished, speaker) for wish in stage] for stage in self.stages
+        ]  # fmt: skip
+        stages_ = given or self.stages
+        _check_carried([wish for stage in stages_ for wish in stage])
+        stages = [part for stage in stages_ for part in _sequenced(_without_implied_travel(stage))]
         return tuple(
             tuple(dict.fromkeys(wish.condition() for wish in _consistent(stage, self.is_at)))
             for stage in stages
@@ -113,7 +139,9 @@ class GoalDraft:
 
 
 def _same(one: Wish, other: Wish) -> bool:
-    return one.key == other.key or (one.subjects == other.subjects and one.open == other.open)
+    if one.open or other.open:
+        return one.key == other.key or (one.subjects, one.open) == (other.subjects, other.open)
+    return one.subjects == other.subjects
 
 
 def _check_carried(wishes: Sequence[Wish]) -> None:
@@ -135,6 +163,14 @@ def _check_carried(wishes: Sequence[Wish]) -> None:
                 f"it does not say whether {one_of(wish.subjects)} goes along: "
                 'say "bring … to …" to take it somewhere'
             )
+
+
+def _for_speaker(wish: Wish, wishes: Sequence[Wish], speaker: str) -> Wish:
+    """The same, or that the speaker has it, where it was fetched and nothing says where to."""
+    at = next(i for i, other in enumerate(wishes) if other is wish)
+    if not wish.whereto or any(_brings(later, wish) for later in wishes[at + 1 :]):
+        return wish
+    return replace(wish, relation=AT, value=speaker, on_robot=True, whereto=False)
 
 
 def _brings(wish: Wish, held: Wish) -> bool:
@@ -216,7 +252,9 @@ def _finest(stage: Sequence[Wish], is_at: Callable[[str, str], bool]) -> list[Wi
 
 def _implies(wish: Wish, other: Wish, later: bool) -> bool:
     """Whether `other` need not be said beside `wish`."""
-    same = wish.subjects == other.subjects or wish.key == other.key
+    same = _same(wish, other)
+    if other.relation == LOCATED and wish.value in other.subjects:
+        return wish.relation in PLACED  # "find Lily and give her the doll"
     if other.relation == LOCATED:
         return same and wish.relation in {*PLACED, HELD}
     return same and other.relation == HELD and wish.relation in PLACED and later

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.discourse import Discourse
-from fleet.language.resolve.mentions import NounPhrase
+from fleet.language.resolve.mentions import Mention, NounPhrase
 from fleet.language.tagging.tagger import Lexeme, Tagger
+from fleet.language.tree.nodes import Quantity
 from fleet.language.vocabulary import StateWord, Vocabulary
 from keyexpr_schema.facts import FactKey, Literal, Value
 
@@ -77,6 +78,12 @@ class Stated:
         ]
         if so:
             return noun.among(so)
+        made = {(r, v) for phrase in self.vocabulary.skill_phrases for r, v in phrase.wants}
+        open_ = noun.quantity is Quantity.ANY or noun.quantity is Quantity.BARE
+        if (open_ or len(able.names) == 1) and set(wants[able.names[0]]) <= made:
+            mention = Mention(able.names, able.type, noun.key, open=len(able.names) > 1)
+            said.extra.append((mention, wants[able.names[0]]))
+            return able
         if len(able.names) == 1:
             said.presumed.extend(
                 Literal(FactKey(relation, able.names[0]), value)
@@ -109,8 +116,11 @@ class Stated:
                 measured[name] = _WEIGHTS[word] * thing.mass_kg
             elif word in _SIZES and sizes:
                 measured[name] = _SIZES[word] * sizes[0]
-        best = [n for n in measured if measured[n] == max(measured.values())]
-        if len(measured) < len(noun.names) or len(best) != 1:
+        order = sorted(measured, key=lambda n: -measured[n])
+        count = noun.count or 1
+        edge = sorted(measured.values(), reverse=True)[:count]
+        best = [n for n in order if edge and measured[n] >= edge[-1]]
+        if len(measured) < len(noun.names) or len(best) != count:
             raise NotUnderstood(
                 f"it is not known which of {one_of(noun.names)} is the {word}: name it"
             )

@@ -99,6 +99,8 @@ class Tidiness:
     def _within(self, mentions: Sequence[Mention], homes: Mapping[str, str]) -> tuple[str, ...]:
         """What is to be tidied up in these places."""
         places = dict.fromkeys(n for m in mentions if m.type == "place" for n in m.subjects)
+        if len(places) == 1:
+            self.scene.said.last_place = next(iter(places))
         if len(places) > 1 and set(places) == set(self.scene.vocabulary.places):
             return tuple(homes)
         on_tables = [n for m in mentions if m.type == "surface" for n in self._lying_on(m, homes)]

@@ -15,7 +15,7 @@ from fleet.language.resolve.referents import Referents
 from fleet.language.resolve.scene import THINGS, Scene
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tree.nodes import (
-    Nouns,
+    Place,
 )
 from keyexpr_schema.facts import (
     AT,
@@ -55,14 +55,33 @@ class Wishes:
                 to_speaker = True
             else:
                 receiver = self._receiver(frame)
-        moved_nouns = self._excepting(moved_nouns, frame)
         moved = self.nouns.subjects(moved_nouns, THINGS, "an object")
         if receiver is not None:
-            return self.to_target(moved, Where(None, *receiver), False)
+            where, home = self.whereto(frame, fetching=True)
+            if where.target is not None or home or where.each:
+                raise NotUnderstood(f"{self.scene.said.clause!r} says twice where to: say one")
+            target = Where(where.source, *receiver, source_surface=where.source_surface)
+            return self.to_target(moved, target, False)
+        frame, beneficiary = self.for_whom(frame)
+        frame, inside = self._inside(frame)
+        moved_more = [p.nouns for p in frame.places if p.role == "along" and p.nouns is not None]
+        if moved_more:
+            frame = replace(frame, places=tuple(p for p in frame.places if p.role != "along"))
+            moved += [s for n in moved_more for s in self.nouns.subjects(n, THINGS, "an object")]
         fetching = frame.verb.split()[0] in self.scene.tagger.book.fetching
         where, home = self.whereto(frame, each=not give, fetching=fetching)
-        if to_speaker and where.target is None and not where.each and not home:
-            where = replace(where, target=self.scene.vocabulary.speaker, target_type="object")
+        speaker = self.scene.vocabulary.speaker
+        brings = frame.verb.split()[0] in ("bring", "get", "fetch", "retrieve") and speaker
+        whereto = where.target is not None or bool(where.each) or home
+        if inside is not None and not whereto:
+            where = replace(where, target=inside, target_type="object")
+            where = replace(where, relation=self._relation_of(inside))
+        elif beneficiary is not None and not whereto and not (tidy and not fetch):
+            where = replace(where, target=beneficiary, target_type="object")
+        elif (to_speaker and not whereto) or (
+            brings and not whereto and self._only_things(moved) and not self._goes_on()
+        ):
+            where = replace(where, target=speaker, target_type="object")
         if give and where.target is not None and not self.receives(where):
             people = sorted(filter(self.scene.vocabulary.is_person, self.scene.vocabulary.objects))
             known = listed([*self.scene.lexicon.known(("robot",)), *people])
@@ -72,16 +91,50 @@ class Wishes:
             )
         whereto = where.target is not None or bool(where.each) or home
         if fetch and not whereto:
-            return self._fetched(moved, where)
+            return self._fetched(moved, where, frame.senses)
         return self.to_target(moved, where, home or (tidy and where.target is None))
 
-    def _excepting(self, nouns: Nouns, frame: Frame) -> Nouns:
-        """The same, without what is excepted behind the places."""
-        for left_out in frame.but:
-            nouns = replace(
-                nouns, items=(*nouns.items[:-1], replace(nouns.items[-1], but=left_out.nouns))
-            )
-        return nouns
+    def for_whom(self, frame: Frame) -> tuple[Frame, str | None]:
+        """The frame without "for Anna"; for whom it is, if that is known."""
+        for place in frame.places:
+            if place.role != "for" or place.nouns is None:
+                continue
+            rest = replace(frame, places=tuple(p for p in frame.places if p is not place))
+            one = place.nouns.items[0]
+            if one.form == "me":
+                return rest, self.scene.vocabulary.speaker
+            if len(place.nouns.items) == 1 and self.nouns.can_be(place.nouns, ("object",)):
+                subject = self.nouns.subject(one, ("object",), "a person")
+                mention = self.who.resolve(subject)
+                if len(mention.subjects) == 1:
+                    self.scene.said.spoken_of(mention.subjects)
+                if not mention.open and self.scene.vocabulary.is_person(mention.subjects[0]):
+                    return rest, mention.subjects[0]
+        return frame, None
+
+    def _inside(self, frame: Frame) -> tuple[Frame, str | None]:
+        """The frame without "inside" that nothing follows, and what something was put in last."""
+        inside = [p for p in frame.particles if p.lexeme.word in ("in", "inside")]
+        carrier = self.scene.said.carrier
+        if not inside or carrier is None or frame.places:
+            return frame, None
+        rest = tuple(p for p in frame.particles if p not in inside)
+        return replace(frame, particles=rest), carrier
+
+    def _relation_of(self, thing: str) -> str:
+        good_for = self.scene.vocabulary.good_for.get(thing, ())
+        return IN if Feature.CONTAINS in good_for else ON if Feature.SUPPORTS in good_for else AT
+
+    @staticmethod
+    def _only_things(moved: Sequence[Subject]) -> bool:
+        return all(subject.type == "object" for subject in moved)
+
+    def _goes_on(self) -> bool:
+        """Whether the text goes on: where to may be said later."""
+        return self.scene.said.ended < len(self.scene.said.tokens) - 1 and any(
+            token.word in ("it", "them", "put", "place", "give", "bring", "take")
+            for token in self.scene.said.tokens[self.scene.said.ended :]
+        )
 
     def receives(self, where: Where) -> bool:
         return where.target_type == "robot" or self.scene.vocabulary.is_person(where.target or "")
@@ -99,12 +152,13 @@ class Wishes:
             raise NotUnderstood(f"{name} is no robot or person that something could be given to")
         return name, mention.type
 
-    def _fetched(self, moved: Sequence[Subject], where: Where) -> None:
+    def _fetched(self, moved: Sequence[Subject], where: Where, senses: frozenset[str]) -> None:
         if any(subject.type == "robot" for subject in moved):
             raise self._no_target()
         mentions = [self.from_where(self.who.movable(s), where) for s in moved]
+        later = "hold" not in senses or self.scene.vocabulary.speaker is None
         for mention in mentions:
-            self.scene.said.draft.add(HELD, mention, True, whereto=True)
+            self.scene.said.draft.add(HELD, mention, True, whereto=later)
         self.scene.said.remember(mentions)
 
     def from_where(self, subject: Subject, where: Where) -> Mention:
@@ -127,6 +181,12 @@ class Wishes:
             for place in frame.places
             if place.special not in ("home", "anywhere")
         ]
+        bare = [p.special == "there" and not p.preposition for p in frame.places]
+        if len(locatives) == len(bare) > 1:  # "in the washing machine there"
+            locatives = [
+                replace(loc, role="in") if is_bare else loc
+                for loc, is_bare in zip(locatives, bare, strict=True)
+            ]
         placed = any(locative.role != "from" for locative in locatives)
         home = frame.home or bool(particles & {"back", "away"})
         if placed and frame.home:
@@ -145,6 +205,9 @@ class Wishes:
         """
         locatives, home = self.locatives(frame)
         where = self.places.where(locatives, fetching)
+        good_for = self.scene.vocabulary.good_for.get(where.target or "", frozenset())
+        if good_for - {Feature.PERSON}:
+            self.scene.said.carrier = where.target
         if where.each and not each:
             raise self._which_of(where)
         if where.target is not None and where.target_type != "robot":
@@ -251,10 +314,34 @@ class Wishes:
         within = Feature.CONTAINS in good_for
         self.scene.said.draft.add(AT if on == within else ON if on else IN, mention, spot)
 
+    def throw_away(self, frame: Frame) -> None:
+        """`throw away the newspaper`: into the one bin there is."""
+        if len(frame.themes) != 1:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say what to throw away")
+        bins = {
+            e.id
+            for words in self.scene.tagger.book.bins
+            for e in self.scene.lexicon.meant(words)
+            if Feature.CONTAINS in self.scene.vocabulary.good_for.get(e.id, ())
+        }
+        if not bins:
+            raise NotUnderstood(f"{self.scene.said.clause!r}: no bin is known to throw it into")
+        where, _ = self.whereto(frame, fetching=True)
+        if where.target is None and len(bins) != 1:
+            raise NotUnderstood(f"it could be {one_of(sorted(bins))}: say which bin")
+        target = where.target or min(bins)
+        moved = self.nouns.subjects(frame.themes[0], THINGS, "an object")
+        where = replace(where, target=target, target_type="object", relation=IN)
+        return self.to_target(moved, where, False)
+
     def go(self, frame: Frame, who: Sequence[Subject] | None) -> None:
         """`go to PLACE`; any robot goes if nobody is named."""
         if frame.home or (frame.particle_words & {"back"} and not frame.places):
             raise NotUnderstood("a robot has no home: name the place where it shall go")
+        if frame.verb in ("head for", "make for", "enter"):
+            frame = self._headed_for(frame)
+        if via := [p for p in frame.places if p.role == "via" and p.nouns is not None]:
+            return self._by_way_of(frame, via, who)
         if other := [p for p in frame.places if p.role not in WHERE]:
             shown = [(word, word) for word in other[0].preposition.split()]
             text = self.scene.said.quote(other[0].first, other[0].last)
@@ -270,3 +357,19 @@ class Wishes:
         self.scene.said.moved = [robot := self.who.some_robot()]
         self.scene.said.draft.add(AT, robot, self.places.place_of(where.target), means=True)
         return None
+
+    def _headed_for(self, frame: Frame) -> Frame:
+        """The same with what is headed for, or entered, as the place to go to."""
+        places = tuple(replace(p, role="to") if p.role == "for" else p for p in frame.places)
+        for nouns in frame.themes:
+            first, last = nouns.items[0].first, nouns.items[-1].last
+            places = (Place("to", "", nouns, first, last), *places)
+        return replace(frame, places=places, themes=())
+
+    def _by_way_of(self, frame: Frame, via: Sequence[Place], who: Sequence[Subject] | None) -> None:
+        """`go to the garden via the garage`: one after the other."""
+        rest = tuple(p for p in frame.places if p not in via)
+        for place in via:
+            self.go(replace(frame, places=(replace(place, role="to"),)), who)
+            self.scene.said.draft.next_stage()
+        return self.go(replace(frame, places=rest), who)

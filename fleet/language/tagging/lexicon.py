@@ -37,6 +37,8 @@ class Entity:
     """The kinds that tell who else "the other one" may be; `kinds` has wider ones, too."""
     uses: frozenset[str] = frozenset()
     person: bool = False
+    said: frozenset[Phrase] = frozenset()
+    """Words that are true of it without being its name: its colour."""
 
     @property
     def rank(self) -> tuple[int, str]:
@@ -65,7 +67,7 @@ class Lexicon:
                 self._kinds.setdefault(kind, (False, []))[1].append(entity)
                 for word in kind:
                     self._by_word[word].add(entity)
-            for name in entity.names:
+            for name in (*entity.names, *entity.said):
                 for word in name:
                     self._by_word[word].add(entity)
         for kind, (_, members) in list(self._kinds.items()):
@@ -157,6 +159,11 @@ class Lexicon:
         _, members = self._kinds.get(name, (False, []))
         return len({e for e in members if e.type in types}) > 1
 
+    def is_kin(self, words: Phrase, entity: Entity) -> bool:
+        """Whether the words are the very kind of it, or its plural."""
+        forms = {(*kind[:-1], ending) for kind in entity.kin for ending in plurals(kind[-1])}
+        return words in entity.kin or words in forms
+
     def kin(self, entity: Entity) -> tuple[Entity, ...]:
         """All of the same kind; the entity too."""
         kin = {e for kind in entity.kin for e in self._by_kin[entity.type, kind]}
@@ -216,6 +223,13 @@ def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
             kin,
             frozenset(thing.uses),
             vocabulary.is_person(thing.object),
+            _names(
+                *(
+                    value
+                    for key, value in thing.properties.items()
+                    if isinstance(value, str) and value not in vocabulary.objects
+                )
+            ),
         )
         if thing.object in vocabulary.good_for:
             kinds = _names(thing.kind, *thing.categories)
@@ -226,8 +240,9 @@ def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
             "robot",
             spec.robot,
             _names(spec.robot, spec.label),
-            _kinds("robot", spec.model),
-            kin=_names(spec.model),
+            _kinds("robot", spec.model, *_unnumbered(spec.robot, spec.label)),
+            _number(spec.robot, spec.label),
+            _names(spec.model, *_unnumbered(spec.robot, spec.label)),
         )
     for place in vocabulary.places.values():
         yield Entity(
@@ -235,7 +250,8 @@ def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
             "place",
             place.place,
             _names(place.place, place.label, *place.aliases),
-            _kinds("place"),
+            _kinds("place", *_unnumbered(place.place, place.label)),
+            _number(place.place, place.label),
         )
         for surface in place.surfaces:
             if surface.surface in vocabulary.objects:
@@ -243,6 +259,23 @@ def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:
             yield Entity(
                 surface.surface, "surface", place.place, _names(surface.surface), frozenset()
             )
+
+
+def _unnumbered(*names: str) -> tuple[str, ...]:
+    """What numbered names are called without their numbers: `carrier` of `carrier_2`."""
+    found = [words[:-1] for words in map(words_of, names) if len(words) > 1]
+    numbered = [words_of(name)[-1].isdecimal() for name in names if len(words_of(name)) > 1]
+    return tuple(
+        dict.fromkeys(
+            " ".join(w) for w, is_number in zip(found, numbered, strict=True) if is_number
+        )
+    )
+
+
+def _number(*names: str) -> int | None:
+    """The number at the end of a name."""
+    ends = [words_of(name)[-1] for name in names if len(words_of(name)) > 1]
+    return next((int(end) for end in ends if end.isdecimal() and len(end) < 7), None)
 
 
 def _names(*names: str) -> frozenset[Phrase]:

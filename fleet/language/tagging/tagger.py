@@ -91,6 +91,8 @@ class Tagger:
         if named > at and named >= phrase:
             single = tags & _VERBAL if named == phrase == at + 1 else frozenset()
             return lexeme(named, single | {"NOUN"})
+        if phrase > at + 1 and any(self._name(tokens, i) > phrase for i in range(at + 1, phrase)):
+            phrase, tags = at + 1, self.phrases.get((tokens[at].word,), frozenset())
         if phrase > at + 1:
             return lexeme(phrase, tags)
         word = tokens[at].word

@@ -35,15 +35,16 @@ def determined(groups: Sequence[Sequence[Lexeme]]) -> Noun | None:
         noun = replace(noun, quantity=Quantity.ALL, count=2 if word.word == "both" else None)
         walk.take("SINGLE")
         walk.take("OF")
-        walk.take("DET")
+        if word := walk.take("DET"):
+            noun = replace(noun, determiner=word.word)
     elif word := walk.take("INDEF"):
-        noun = replace(noun, quantity=Quantity.ANY)
+        noun = replace(noun, quantity=Quantity.ANY, determiner=word.word)
         walk.take("SINGLE")
         if walk.take("OF"):
             walk.take("DET")
             noun = replace(noun, part=word.word != "some")
-    elif walk.take("DET"):
-        noun = replace(noun, quantity=Quantity.THE)
+    elif word := walk.take("DET"):
+        noun = replace(noun, quantity=Quantity.THE, determiner=word.word)
         walk.take("SINGLE")
     elif walk.take("ANOTHER"):
         noun = replace(noun, quantity=Quantity.ANY, other="another")
@@ -63,6 +64,9 @@ def determined(groups: Sequence[Sequence[Lexeme]]) -> Noun | None:
     adjectives = []
     while word := walk.take("ADJ", "SUP"):
         adjectives.append(word)
+    if adjectives and "SUP" in adjectives[-1].tags and walk.take("OF"):  # "the larger of the two"
+        walk.take("DET")
+        walk.take("NUM")
     noun = replace(noun, adjectives=tuple(adjectives))
     return noun if walk.at == len(walk.groups) else None
 
@@ -87,7 +91,7 @@ def _ordinals(walk: _Walk) -> tuple[int, ...]:
         return ()
     group = walk.groups[walk.at]
     found = tuple(
-        0 if "LAST" in word.tags else ordinal_of(word.words[0]) or 0
+        0 if "LAST" in word.tags else ordinal_of(word.words[0]) or 1
         for word in group
         if word.tags & {"ORD", "LAST"}
     )

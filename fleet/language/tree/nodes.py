@@ -45,6 +45,9 @@ class Noun:
     but: Nouns | None = None
     words: tuple[str, ...] = ()
     """Of a pronoun."""
+    whose: Noun | None = None
+    """Whose it is: "Anna's mug"."""
+    determiner: str = ""
 
 
 @dataclass(frozen=True)

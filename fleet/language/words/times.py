@@ -11,7 +11,7 @@ from fleet.language.words.tokens import Token, number_of
 _UNITS_S = {"second": 1.0, "sec": 1.0, "minute": 60.0, "min": 60.0, "hour": 3600.0, "day": 86400.0}
 _UNITS_S |= {"week": 604800.0}
 _HOURS = {"noon": 12, "midday": 12, "midnight": 0}
-_PARTS = {"morning": 8, "afternoon": 14, "evening": 18, "night": 22, "day": 8}
+_PARTS = {"morning": 8, "afternoon": 15, "evening": 18, "night": 22, "day": 8}
 _DAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
 _DAILY = {"daily": "day", "hourly": "hour", "weekly": "week", "nightly": "night"}
 
@@ -33,6 +33,8 @@ class TimePhrase:
     weekday: int | None = None
     every_s: float | None = None
     part: str = ""
+    exact: bool = True
+    """Whether the half of the day was said."""
 
     def seconds(self, now: datetime) -> float:
         """How long from now, in seconds; a time of day that is over today is tomorrow's."""
@@ -44,6 +46,8 @@ class TimePhrase:
             at += timedelta(days=(self.weekday - at.weekday()) % 7)
             if at <= now:
                 at += timedelta(days=7)
+        elif at <= now and not self.exact and at + timedelta(hours=12) > now:
+            at += timedelta(hours=12)
         elif at <= now:
             at += timedelta(days=1)
         return (at - now).total_seconds()
@@ -55,10 +59,20 @@ class TimePhrase:
             whole = int(self.every_s)
             return f"PT{whole // 3600}H" if whole % 3600 == 0 else f"PT{whole // 60}M"
         day = "*" if self.weekday is None else str((self.weekday + 1) % 7)
+        day = "1-5" if self.part == "weekdays" else day
         return f"{self.minute} {self.hour or 0} * * {day}"
 
 
-def _clock(words: Sequence[str], at: int) -> tuple[int, int, int] | None:
+def _part_of_day(words: Sequence[str], at: int) -> tuple[int, str]:
+    """`in the morning`: where it ends, and `am` or `pm`."""
+    for said, half in (("in the morning", "am"), ("in the afternoon", "pm"),
+                       ("in the evening", "pm"), ("at night", "pm")):  # fmt: skip
+        if list(words[at : at + len(said.split())]) == said.split():
+            return at + len(said.split()), half
+    return at, ""
+
+
+def _clock(words: Sequence[str], at: int, bare: bool = False) -> tuple[int, int, int] | None:
     """`5 pm`, `17 , 30`, `5 o'clock`, `noon`: hour, minute, and where it ends."""
     word = words[at] if at < len(words) else ""
     if word in _HOURS:
@@ -82,7 +96,10 @@ def _clock(words: Sequence[str], at: int) -> tuple[int, int, int] | None:
     elif rest[:1] in (["oclock"], ["o'clock"], ["hours"]):
         return hour % 24, minute, at + 1
     else:
-        return (hour % 24, minute, at) if marked else None
+        end, half = _part_of_day(words, at)
+        if not half:
+            return (hour % 24, minute, at) if marked or bare else None
+        at = end
     return hour % 12 + (12 if half == "pm" else 0), minute, at
 
 
@@ -109,6 +126,8 @@ def _every(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
     first = words[0]
     if first in _DAILY:
         unit, end = _DAILY[first], 1
+    elif list(words[:2]) == ["on", "weekdays"]:
+        unit, end = "weekdays", 2
     elif first in ("every", "each") and len(words) > 1:
         if (period := _period(words, 1)) is not None:
             return period[1], TimePhrase("every", every_s=period[0])
@@ -118,12 +137,13 @@ def _every(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
     if unit in ("hour", "minute", "second"):
         return end, TimePhrase("every", every_s=_UNITS_S[unit])
     weekday = _DAYS.index(unit) if unit in _DAYS else 0 if unit == "week" else None
-    if unit not in (*_PARTS, *_DAYS, "week"):
+    if unit not in (*_PARTS, *_DAYS, "week", "weekday", "weekdays"):
         return None
     hour, minute = _PARTS.get(unit, 8), 0
-    if words[end : end + 1] == ["at"] and (clock := _clock(words, end + 1)) is not None:
+    if words[end : end + 1] == ["at"] and (clock := _clock(words, end + 1, bare=True)) is not None:
         hour, minute, end = clock
-    return end, TimePhrase("every", hour=hour, minute=minute, weekday=weekday)
+    part = "weekdays" if unit in ("weekday", "weekdays") else unit
+    return end, TimePhrase("every", hour=hour, minute=minute, weekday=weekday, part=part)
 
 
 def _relative(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
@@ -160,7 +180,7 @@ def _of_day(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
         return end, TimePhrase("start", hour=hour, minute=minute, weekday=day)
     kinds = {"at": "start", "after": "start", "from": "start", "before": "due", "by": "due"}
     meant = kinds.get(words[0])
-    on_clock = _clock(words, 1) if meant else None
+    on_clock = _clock(words, 1, bare=True) if meant else None
     if meant is None or on_clock is None:
         return None
     days = 0

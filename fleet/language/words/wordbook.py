@@ -90,6 +90,7 @@ class Wordbook:
         self.rooms = tuple(tuple(map(phrase_of, group)) for group in verbs["rooms"])
         self.uses = frozenset(verbs["uses"])
         self.offering = frozenset(verbs["offering"])
+        self.bins = tuple(map(phrase_of, verbs["bins"]))
         self.fetching = frozenset(verbs["fetching"])
         self.searched = frozenset(verbs["searched"])
         self.same_verbs = {verb: tuple(same) for verb, same in verbs["same_verbs"].items()}

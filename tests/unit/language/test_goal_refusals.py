@@ -17,7 +17,7 @@ from tests.support.language_house import WORDS
         ("Bring the third cup to the hallway", "there is no 'the third cup'"),
         ("Bring the cup to the hallway", "'the cup' could be cup_1 or cup_2: say which object"),
         ("Bring the first cup to the attic", "'the attic' is not a known place"),
-        ("Sing a song", "'Sing a song' is not understood as a goal"),
+        ("Sing a song", "'Sing' is not understood as a goal"),
         ("Bring the first cup to the hallway and dance", "'dance' is not understood as a goal"),
         (
             "Bring cup 1 to the hallway and cup 1 to the kitchen",
@@ -73,9 +73,8 @@ from tests.support.language_house import WORDS
         ("fetch the book", "it does not say where to bring book"),
         (
             "brign the book to the kitchen",
-            "'brign the book' is not understood as a goal (did you mean 'bring'?)",
+            "'brign' is not understood as a goal (did you mean 'bring'?)",
         ),
-        ("second cup to the kitchen", "'second cup' is not understood as a goal"),
         ("Bring cups to the lounge", "'cups' does not say how many: say all of them or which ones"),
         (
             "Bring some cups to the lounge",
@@ -106,10 +105,6 @@ from tests.support.language_house import WORDS
         (
             "bring the book here",
             "'here' names somebody whose place is not known; name a place or a robot",
-        ),
-        (
-            "Bring the book to the HSR and bring it to the hallway",
-            "'it' could be book or hsr: name what you mean",
         ),
         (
             "send the hsr to the kitchen and bring it to the hallway",
@@ -162,7 +157,7 @@ from tests.support.language_house import WORDS
             "'twice' asks for repetition, which a goal cannot: give it again when it was reached",
         ),
         ("bring all 3 cups to the kitchen", "'all 3 cups': there are only 2"),
-        ("get rid of the book", "'rid of the book' is not a known object; known are"),
+        ("get rid of the book", "no bin is known to throw it into"),
         (
             "bring the first elf to the kitchen",
             "'the first elf' is not a known object; known",
@@ -181,10 +176,6 @@ from tests.support.language_house import WORDS
         (
             "bring the book to the kitchen, and the first cup, too",
             "'the first cup' does not say where to",
-        ),
-        (
-            "Put the first cup on the locobot and send it to the hallway",
-            "'it' could be cup_1 or locobot: name what you mean",
         ),
         (
             "bring everything in the kitchen to the hallway",

@@ -16,6 +16,11 @@ from tests.support.language_house import WORDS, shown
         ("deliver the second cup to the lounge!", "at(cup_2) = living_room"),
         ("put the book in the cooking area", "at(book) = kitchen"),
         (
+            "Put the first cup on the locobot and send it to the hallway",
+            "at(cup_1) = locobot; at(locobot) = hallway",
+        ),
+        ("second cup to the kitchen", "at(cup_2) = kitchen"),
+        (
             "Bring everything except the book to the kitchen",
             "at(cup_1) = kitchen; at(cup_2) = kitchen",
         ),

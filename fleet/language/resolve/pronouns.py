@@ -1,0 +1,85 @@
+"""Pronouns: whom "it", "them", "him" and "me" mean."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fleet.errors import NotUnderstood
+from fleet.language.refusals import one_of
+from fleet.language.resolve.mentions import Mention, NounPhrase, Subject, WhichOne
+from fleet.language.resolve.scene import Scene
+from fleet.language.tagging.lexicon import EntityType
+from fleet.language.tree.nodes import (
+    Noun,
+    Quantity,
+)
+
+_PLURAL = frozenset({"them", "they", "these", "those", "both", "all", "each"})
+PERSONAL = frozenset({"him", "her", "he", "she"})
+
+
+class Pronouns:
+    """Finds out whom pronouns mean."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+
+    def speaker(self, noun: Noun, as_type: EntityType = "surface") -> NounPhrase:
+        """Who says "me".
+
+        Raises:
+            NotUnderstood: nobody knows.
+        """
+        text = self.scene.said.quote(noun.first, noun.last)
+        found = tuple(
+            e
+            for e in self.scene.lexicon.entities
+            if e.type == as_type and e.id == self.scene.vocabulary.speaker
+        )
+        if not found:
+            raise NotUnderstood(
+                f"{text!r} names somebody whose place is not known; name a place or a robot"
+            )
+        return NounPhrase(found, text, noun.first, exact=True)
+
+    def pronoun(self, noun: Noun, types: Sequence[EntityType]) -> Mention:
+        """Whom a pronoun means.
+
+        Raises:
+            NotUnderstood: nobody was spoken of, or it could be several.
+        """
+        word = noun.words[0]
+        said = self.scene.said
+        if word in PERSONAL and said.person is not None:
+            return Mention((said.person,), "object", noun.first)
+        if (chosen := said.chosen.get(noun.first)) is not None:
+            of_type = next(m.type for m in said.recent if chosen in m.subjects)
+            return Mention((chosen,), of_type, noun.first)
+        if "object" not in types and "place" in types and word == "it" and said.last_place:
+            return Mention((said.last_place,), "place", noun.first)
+        plural = word in _PLURAL or len(noun.words) > 1
+        meant = [m for m in self.scene.said.recent if m.single != plural]
+        count = 2 if word == "both" else int(word) if word.isdecimal() else None
+        if len(meant) == 1 and count in (None, len(meant[0].subjects)):
+            return meant[0]
+        names = sorted({s for m in self.scene.said.recent for s in m.subjects})
+        reason = f"could be {one_of(names)}" if names else "refers to nothing before it"
+        text = self.scene.said.quote(noun.first, noun.last)
+        sentence = f"{text!r} {reason}: name what you mean"
+        raise WhichOne(sentence, noun.first, tuple(names) if len(meant) > 1 else ())
+
+
+def either(first: Subject, second: Subject) -> NounPhrase:
+    """Any of what the two mean: "cup 1 or cup 2".
+
+    Raises:
+        NotUnderstood: one of them leaves open whom it means, or is no name.
+    """
+    if not isinstance(first, NounPhrase) or not isinstance(second, NounPhrase):
+        raise NotUnderstood('"or" is understood between names only: name both')
+    if first.type != second.type or not (first.resolve().single and second.resolve().single):
+        raise NotUnderstood(f"{first.text!r} or {second.text!r} leaves too much open")
+    both = (
+        first.among(first.resolve().subjects).found + second.among(second.resolve().subjects).found
+    )
+    return NounPhrase(both, f"{first.text} or {second.text}", first.key, Quantity.ANY)

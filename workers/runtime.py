@@ -232,10 +232,13 @@ class Worker:
             self._state_publisher.set_activity(RobotActivity.IDLE)
             await self._carry_out(await self._order_queue.next())
 
-    async def _carry_out(self, order: Order, finished: tuple[FinishedCall, ...] = ()) -> None:
+    async def _carry_out(
+        self, order: Order, finished: tuple[FinishedCall, ...] | None = None
+    ) -> None:
+        """With the calls that had `finished`, an attempt goes on that an earlier run had begun."""
         ctx = self._context()
         try:
-            work = self._work_of(order, ctx, finished)
+            work = self._work_of(order, ctx, finished or ())
         except (UnknownSkill, BadArguments) as error:
             refused, reason = ReportState.REFUSED, str(error)
             self._end(order, make_report(order, self.incarnation, refused, reason, retryable=False))
@@ -243,8 +246,9 @@ class Worker:
         report = make_report(
             order, self.incarnation, ReportState.STARTED, started_s=self._embodiment.now_s()
         )
-        self._journal.started(order, report)  # before anything moves
-        self._outbox.wake()
+        if finished is None:
+            self._journal.started(order, report)  # before anything moves
+            self._outbox.wake()
         self._state_publisher.set_activity(RobotActivity.BUSY, order)
         program = work if isinstance(work, ProgramRun) else None
         try:

@@ -5,6 +5,8 @@ These keep the indexes up, and note what they touched, as `fleet.core.state_upda
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import immutables
 from msgspec.structs import replace
 
@@ -103,6 +105,16 @@ def conclude(state: State, fact: Fact) -> State:
     if believed is state:
         return state
     return replace(believed, concluded=state.concluded.set(fact.key, fact))
+
+
+def take_word(
+    state: State, said: Iterable[Literal], source: str, time_s: float
+) -> tuple[State, tuple[Fact, ...]]:
+    """Believe what a person says, in one sentence; where the same is known more finely, that."""
+    facts = tuple(as_written(state, Fact.of(literal, source, time_s)) for literal in said)
+    for fact in facts:
+        state = conclude(state, replace(fact, value=known_finer(state, fact.literal, aboard=True)))
+    return state, facts
 
 
 def forget_fact(state: State, key: FactKey) -> State:

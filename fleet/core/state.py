@@ -64,6 +64,9 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     monotonic_s: float = 0.0
     """On a clock that nobody sets; see `Event.monotonic_s`."""
     goals: Table[str, Goal] = Table()
+    """What people want, with all that their sentences say."""
+    goal_specs: Table[str, Goal] = Table()
+    """Of these, as they were put, those whose sentence adds something."""
     goal_states: Table[str, GoalStatus] = Table()
     statements: Table[str, Statement] = Table()
     statement_states: Table[str, StatementStatus] = Table()

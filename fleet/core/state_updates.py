@@ -51,10 +51,13 @@ def set_goal(state: State, status: GoalStatus) -> State:
     return _goal_changed(state, status.goal, goal_states)
 
 
-def set_spec(state: State, goal: Goal) -> State:
-    """Keep what somebody wants; plans for it may get another priority."""
+def set_spec(state: State, spec: Goal, in_force: Goal | None = None) -> State:
+    """Keep what somebody wants, with what the sentence adds; plans may get another priority."""
+    goal = in_force or spec
     state = _constraints_changed(state, goal.goal, goal)
-    state = replace(state, goals=state.goals.set(goal.goal, goal))
+    specs = state.goal_specs
+    specs = specs.without(goal.goal) if goal == spec else specs.set(goal.goal, spec)
+    state = replace(state, goals=state.goals.set(goal.goal, goal), goal_specs=specs)
     active = state.index.active
     for plan in state.index.plans_of.get(goal.goal, ()):
         active = active.set(plan, priority_of(state.plans[plan], state.goals))
@@ -74,7 +77,8 @@ def _constraints_changed(state: State, goal: str, spec: Goal | None) -> State:
 def forget_goal(state: State, goal: str) -> State:
     """Drop a goal."""
     state = _constraints_changed(state, goal, None)
-    state = replace(state, goals=state.goals.without(goal))
+    goals, specs = state.goals.without(goal), state.goal_specs.without(goal)
+    state = replace(state, goals=goals, goal_specs=specs)
     return _goal_changed(state, goal, state.goal_states.without(goal))
 
 

@@ -18,7 +18,7 @@ from msgspec.structs import replace
 from fleet.core.state import State
 from fleet.core.table import Table, decode_table, encode_table
 
-SNAPSHOT_FORMAT = 4
+SNAPSHOT_FORMAT = 5
 """Counts up whenever a field of the state gets another name or meaning."""
 _READABLE = frozenset({2, 3, SNAPSHOT_FORMAT})
 """Formats that decode; in format 2 a state had no skills, before format 4 no reasons and wishes."""

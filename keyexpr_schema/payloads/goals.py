@@ -78,6 +78,8 @@ class Goal(Payload, frozen=True, kw_only=True):
     always: tuple[Condition, ...] = ()
     never: tuple[Condition, ...] = ()
     sometime_before: tuple[Precedence, ...] = ()
+    meant: str | None = None
+    """Of several things that the text can mean, this one: a candidate of `GoalStatus`."""
 
     @property
     def constraints(self) -> tuple[Condition, ...]:
@@ -128,6 +130,10 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     reason: str | None = None
     note: str | None = None
     passed: tuple[Condition, ...] = ()
+    understood: str | None = None
+    """What the sentence was understood as, said back in words."""
+    candidates: tuple[str, ...] = ()
+    """What the sentence can mean, where that is several things; somebody has to say which."""
     given_s: float | None = None
     given_wall_s: float | None = None
     time_s: float = 0.0

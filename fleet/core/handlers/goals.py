@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace as changed
-
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.belief_updates import conclude
+from fleet.core.belief_updates import conclude, take_word
 from fleet.core.effects import PLANNER_SOURCE
-from fleet.core.indexes.fact_views import FactValues
 from fleet.core.indexes.touches import Part, Touch
-from fleet.core.model.declarations import misfit, relations_of
-from fleet.core.model.derived import holds
 from fleet.core.over import goal_taken_back
 from fleet.core.plan_entry import PlanEntry
 from fleet.core.replan_reasons import GoalsAdded, ReplanScope
@@ -25,17 +20,17 @@ from fleet.core.state_updates import (
     touch,
     without_goal,
 )
-from fleet.errors import NotUnderstood
-from fleet.language import Reading, WantedGoal, read_goal
-from keyexpr_schema.facts import AT, IN, NOTHING, ON, SEARCHED, Value
-from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
+from fleet.core.understanding import understood
+from fleet.language import Reading
+from keyexpr_schema.facts import AT, IN, ON, SEARCHED
+from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
 from keyexpr_schema.payloads.world import Fact
 
 
 def goal_put(state: State, event: events.GoalPut) -> State:
     """Keep the goal and say what it is understood to mean; a changed goal begins anew."""
     goal = event.goal
-    if state.goals.get(goal.goal) == goal:
+    if state.goal_specs.get(goal.goal, state.goals.get(goal.goal)) == goal:
         return state
     known_ended = goal.goal not in state.goals and goal.goal in state.goal_states
     state = set_spec(state, goal)
@@ -105,11 +100,17 @@ def understand_again(state: State) -> State:
     names = [name for known in state.index.in_state.values() for name in known]
     for goal in sorted((state.goals[n] for n in names if n in state.goals), key=_in_order):
         status = state.goal_states[goal.goal]
-        read, _ = _understand(state, goal, status)
-        if status.state is GoalState.REJECTED and read.reason != status.reason:
+        goal = state.goal_specs.get(goal.goal, goal)
+        read = understood(state, goal, status)
+        if status.state is GoalState.REJECTED and read.status.reason != status.reason:
             state = _take_goal(state, goal, status)
-        elif status.state is GoalState.WAITING and read.stages and read.stages != status.stages:
-            state = set_goal(state, read)  # "some robot" now has more to choose from
+        elif (
+            status.state is GoalState.WAITING
+            and read.status.stages
+            and read.status.stages != status.stages
+        ):
+            # "some robot" now has more to choose from
+            state = set_goal(set_spec(state, goal, read.goal), read.status)
     return state
 
 
@@ -132,10 +133,12 @@ def next_stage(state: State, goal: str) -> State:
 
 def _take_goal(state: State, goal: Goal, known: GoalStatus | None = None) -> State:
     """Say what a goal means; a sentence that the grammar refuses may go to a language model."""
-    status, reading = _understand(state, goal, known)
-    state = set_goal(state, status)
-    if reading is not None:
-        state = _presume(state, goal.goal, reading)
+    read = understood(state, goal, known)
+    status = read.status
+    state = set_goal(set_spec(state, goal, read.goal), status)
+    state = _presume(state, goal.goal, read.reading)
+    source = f"{PLANNER_SOURCE}:{goal.goal}"
+    state, _ = take_word(state, read.reading.facts, source, goal.said_s or state.time_s)
     if status.state is GoalState.REJECTED and state.policy.interpreter and not goal.conditions:
         state = set_goal(state, replace(status, state=GoalState.READING))
         interpreting = tuple(dict.fromkeys([*state.interpreting, goal.goal]))
@@ -169,59 +172,6 @@ def _in_order(goal: Goal) -> tuple[int, str]:
     return goal.ordinal, goal.goal
 
 
-def _understand(
-    state: State, goal: Goal, known: GoalStatus | None
-) -> tuple[GoalStatus, Reading | None]:
-    """How a goal stands, read now, and its reading if it has one; `known` is how it stood, if it is
-    not a new one."""
-    status = GoalStatus(
-        goal=goal.goal,
-        state=GoalState.WAITING,
-        given_s=state.time_s if known is None else known.given_s,
-        given_wall_s=state.wall_time_s if known is None else known.given_wall_s,
-    )
-    try:
-        reading = _reading(state, goal)
-        stages = reading.stages
-        for condition in (condition for stage in stages for condition in stage):
-            _check_condition(state, condition)
-        for condition in goal.constraints:
-            _check_relation(state, condition)
-            _check_condition(state, condition)
-    except NotUnderstood as error:
-        return replace(status, state=GoalState.REJECTED, reason=str(error)), None
-    status = replace(status, conditions=stages[0], stages=stages, note=_note(state, reading))
-    return status, reading
-
-
-def _reading(state: State, goal: Goal) -> Reading:
-    if goal.conditions:
-        return Reading(goal.text, (WantedGoal((goal.conditions,)),))
-    if goal.speaker is not None and not state.vocabulary().is_person(goal.speaker):
-        known = sorted(filter(state.vocabulary().is_person, state.objects))
-        raise NotUnderstood(
-            f"{goal.speaker!r}, who says it, is no person that is known; "
-            f"known are {', '.join(known) or 'none'}"
-        )
-    return read_goal(goal.text, changed(state.vocabulary(), speaker=goal.speaker))
-
-
-def _note(state: State, reading: Reading) -> str | None:
-    """What a goal's sentence says besides what must hold, so that no word is lost unseen."""
-    notes = [f"{remark!r} asks for nothing" for remark in reading.remarks]
-    facts = FactValues(state.facts)
-    for literal in reading.presumed:
-        (relation, subject), value = literal
-        fact = state.fact(relation, subject)
-        if (
-            fact is not None
-            and fact.value not in (None, value)
-            and not holds(literal, facts.get, state, aboard=True)
-        ):
-            notes.append(f"it takes {subject} to be at {value}; believed is {fact.value}")
-    return "; ".join(notes) or None
-
-
 def _presume(state: State, goal: str, reading: Reading) -> State:
     """Believe what a goal takes for granted where nothing is known, as if it had been stated."""
     for literal in reading.presumed:
@@ -230,40 +180,3 @@ def _presume(state: State, goal: str, reading: Reading) -> State:
             source = f"{PLANNER_SOURCE}:{goal}"
             state = conclude(state, Fact.of(literal, source, state.time_s))
     return state
-
-
-def _check_condition(state: State, condition: Condition) -> None:
-    for name in condition.subjects:
-        _check_name(state, name)
-    for literal in condition.literals:
-        if (wrong := misfit(literal, state.world())) is not None:
-            raise NotUnderstood(wrong)
-    if condition.value not in _words(state, condition.relation):
-        _check_name(state, condition.value)
-
-
-def _check_relation(state: State, condition: Condition) -> None:
-    known = relations_of(state.world())
-    if condition.relation not in known:
-        raise NotUnderstood(
-            f"{condition}: {condition.relation!r} is no relation that skills or facts speak of; "
-            f"those are {', '.join(sorted(known))}"
-        )
-
-
-def _words(state: State, relation: str) -> tuple[str, ...]:
-    """The words that skills declare as a relation's values: "hot", "cold"."""
-    for skill in state.skills.values():
-        if (known := skill.relations.get(relation)) is not None:
-            return known.values if isinstance(known.values, tuple) else ()
-    return ()
-
-
-def _check_name(state: State, name: Value) -> None:
-    if not isinstance(name, str) or name == NOTHING:
-        return
-    if not any(name in known for known in (state.places, state.objects, state.robots)):
-        known = (*state.places, *state.objects, *state.robots)
-        raise NotUnderstood(
-            f"{name!r} is nothing that is known; known are {', '.join(sorted(known)) or 'none'}"
-        )

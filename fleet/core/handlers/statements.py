@@ -5,7 +5,7 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fleet.core import events
-from fleet.core.belief_updates import as_written, conclude, known_finer
+from fleet.core.belief_updates import take_word
 from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.model.declarations import misfit
@@ -15,7 +15,7 @@ from fleet.core.state_updates import (
 )
 from fleet.errors import NotUnderstood
 from fleet.language import statement_facts
-from keyexpr_schema.payloads.world import Fact, Statement, StatementStatus
+from keyexpr_schema.payloads.world import Statement, StatementStatus
 
 
 def statement_put(state: State, event: events.StatementPut) -> State:
@@ -66,12 +66,7 @@ def _read_statement(state: State, statement: Statement) -> State:
     except NotUnderstood as error:
         status = StatementStatus(statement=name, reason=str(error), said_s=said_s)
         return _set_status(state, status)
-    source = f"{PLANNER_SOURCE}:{name}"
-    facts = tuple(
-        as_written(state, Fact.of(literal, source, said_s or state.time_s)) for literal in read
-    )
-    for fact in facts:
-        state = conclude(state, replace(fact, value=known_finer(state, fact.literal, aboard=True)))
+    state, facts = take_word(state, read, f"{PLANNER_SOURCE}:{name}", said_s or state.time_s)
     return _set_status(state, StatementStatus(statement=name, facts=facts, said_s=said_s))
 
 

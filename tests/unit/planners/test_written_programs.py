@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from msgspec.structs import replace
 
 from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.core.model.programs import program_model
@@ -13,8 +14,9 @@ from fleet.planners.programs.joining import joined
 from fleet.planners.programs.writer import write_program
 from keyexpr_schema.facts import Literal
 from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.programs import Program
-from tests.support.household import at, bring, fact, home
+from tests.support.household import at, bring, checked, fact, home
 
 
 def program(world: WorldModel, *wanted: Condition, robot: str = "hsr") -> Program | NoPlan:
@@ -119,3 +121,20 @@ def test_calls_that_others_wait_for_are_not_joined_with_what_comes_after() -> No
         assert handed.program is None and len(handed.after) == 2
     else:
         pytest.fail("the plan hands nothing over any more: choose another world")
+
+
+def test_a_program_that_a_person_wrote_stands_in_a_plan_and_is_checked() -> None:
+    code = 'for room in ("kitchen", "hallway"):\n    search(place=room)\n'
+    after = (Condition(relation="searched", subject="kitchen", value=True),)
+    program_ = Program(text="look around", code=code, after=after)
+    args = {"robot": "?a1", "text": "look around"}
+    task = Task(task="t1", skill="do", args=args, actor="a1", program=program_)
+    plan = Plan(plan="p", goals=(), conditions=after, tasks=(task,))
+    found = checked(plan, home())
+    assert set(found.able["a1"]) == {"hsr", "locobot"}
+    picks = replace(program_, code='pick(object="cup_1", place="kitchen")')
+    found = checked(replace(plan, tasks=(replace(task, program=picks),)), home())
+    assert found.able["a1"] == ("hsr",)
+    unwritten = replace(plan, tasks=(replace(task, program=replace(program_, code="")),))
+    refused = check_plan(unwritten, home())
+    assert refused.violations[0].code == "no-program"

@@ -215,6 +215,8 @@ def test_a_robot_that_cannot_drive_is_refused(tmp_path: Path) -> None:
     path.write_text("robot: r\nmodel: hsr\nskills: [navigate]\ncapabilities: {see: 4.0}\n")
     with pytest.raises(BadFile, match=r"it lacks `drive`, the robot's top speed in m/s"):
         load_robot(path)
+    path.write_text("robot: r\nmodel: bench_arm\nskills: [pick]\ncapabilities: {grip: 1.0}\n")
+    assert load_robot(path).skills == ("pick",)  # one that does not have to is not
     path.write_text("robot: r\nmodel: hsr\nskills: navigate\ncapabilities: {drive: 1}\n")
     with pytest.raises(BadFile, match=r"skills: expected a list, got text"):
         load_robot(path)

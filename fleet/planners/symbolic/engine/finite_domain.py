@@ -21,6 +21,7 @@ from fleet.core.model.formulas.nodes import (
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, room_left
 from fleet.jobshop.time_budget import TimeBudget, Watch
+from fleet.planners.symbolic.engine.conditions import Conditions
 from fleet.planners.symbolic.engine.instantiation import Facts
 from fleet.planners.symbolic.engine.nodes import Nodes, Stands, State, merged
 from fleet.planners.symbolic.engine.travel import Moves, Travel
@@ -100,6 +101,7 @@ class FiniteDomainTask:
         counted = {effect.variable for of in conditional for effect in of if effect.add is not None}
         able = [robot for robot in robots if robot in free]
         self.nodes = Nodes(world, start, able, changed, counted, travel)
+        self.conditions = Conditions(self.nodes)
         self.initial = self.nodes.initial
         self.position = self.nodes.position
         written = [self._written(a, of) for a, of in zip(actions, conditional, strict=True)]
@@ -273,10 +275,10 @@ class FiniteDomainTask:
         there = set(stands.values())
         for literal in rest:
             innermost = literal.value in there
-            nodes.append(self.nodes.literal(literal, aboard=False, innermost=innermost))
+            nodes.append(self.conditions.literal(literal, aboard=False, innermost=innermost))
         for condition in action.conditions:
             for part in conjuncts(expanded(condition, self.world)):
-                nodes.append(self.nodes.formula(part))
+                nodes.append(self.conditions.formula(part))
         if any(node is False for node in nodes):
             return None
         needs = tuple(dict.fromkeys(node for node in nodes if node is not True))
@@ -297,7 +299,7 @@ class FiniteDomainTask:
                     self.impossible = literal
                 stands.append((variable.subject, str(place)))
                 continue
-            node = self.nodes.literal(literal, aboard=True, innermost=False)
+            node = self.conditions.literal(literal, aboard=True, innermost=False)
             if node is False:
                 self.impossible = literal
             elif node is not True:

@@ -62,7 +62,9 @@ class _Missing:
         """Whether a literal of the goal is out of reach."""
         if self._is_position(literal):
             return self._task.travel.action(literal.variable[1], str(literal.value)) is None
-        return not self._can_be(self._task.nodes.literal(literal, aboard=True, innermost=False))
+        return not self._can_be(
+            self._task.conditions.literal(literal, aboard=True, innermost=False)
+        )
 
     def why(self, literal: Literal | Formula) -> str:
         """What is missing first for something that can never hold."""
@@ -146,7 +148,7 @@ class _Missing:
 
     def _missing_for(self, action: Action) -> Iterator[Literal | Formula]:
         """What an action needs that can never hold."""
-        nodes = self._task.nodes
+        conditions = self._task.conditions
         there = {literal.value for literal in action.before if self._is_position(literal)}
         for literal in action.before:
             if self._is_position(literal):
@@ -155,11 +157,11 @@ class _Missing:
                     yield literal
             else:
                 innermost = literal.value in there
-                if not self._can_be(nodes.literal(literal, aboard=False, innermost=innermost)):
+                if not self._can_be(conditions.literal(literal, aboard=False, innermost=innermost)):
                     yield literal
         for condition in action.conditions:
             for part in conjuncts(expanded(condition, self._world)):
-                if not self._can_be(nodes.formula(part)):
+                if not self._can_be(conditions.formula(part)):
                     yield part
 
     def _is_position(self, literal: Literal) -> bool:

@@ -1,0 +1,192 @@
+"""What goals' sentences are understood to mean: what must hold, and what besides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from dataclasses import replace as changed
+
+from msgspec.structs import replace
+
+from fleet.core.indexes.fact_views import FactValues
+from fleet.core.model.declarations import misfit, relations_of
+from fleet.core.model.derived import holds
+from fleet.core.state import State
+from fleet.errors import NotUnderstood
+from fleet.language import Ambiguity, Reading, WantedGoal, read
+from keyexpr_schema.facts import NOTHING, Value
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus, Precedence
+
+NO_READING = Reading("")
+
+
+@dataclass(frozen=True)
+class Understood:
+    """A goal as its sentence is read now: how it stands, and what of it is in force.
+
+    `goal` is what was put with what the sentence adds to it: what must always or never hold, and
+    in which order, how urgent it is, and when it is due.
+    """
+
+    status: GoalStatus
+    goal: Goal
+    reading: Reading = NO_READING
+
+
+def understood(state: State, goal: Goal, known: GoalStatus | None) -> Understood:
+    """What a goal that was put means; `known` is how it stood, if it is not a new one."""
+    status = GoalStatus(
+        goal=goal.goal,
+        state=GoalState.WAITING,
+        given_s=state.time_s if known is None else known.given_s,
+        given_wall_s=state.wall_time_s if known is None else known.given_wall_s,
+    )
+    try:
+        reading = _reading(state, goal)
+        if isinstance(reading, Ambiguity):
+            words = tuple(words for words, _ in reading.candidates)
+            asked = replace(status, candidates=words)
+            return Understood(_rejected(asked, reading.sentence), goal)
+        wanted = _one_goal(reading)
+        for stage in wanted.stages:
+            for condition in stage:
+                _check_condition(state, condition)
+        in_force = _in_force(state, goal, wanted)
+        for condition in in_force.constraints:
+            _check_relation(state, condition)
+            _check_condition(state, condition)
+    except NotUnderstood as error:
+        return Understood(_rejected(status, str(error)), goal)
+    status = replace(
+        status,
+        conditions=wanted.stages[0],
+        stages=wanted.stages,
+        understood=None if goal.conditions else reading.understood_as,
+        note=_note(state, reading),
+    )
+    return Understood(status, in_force, reading)
+
+
+def _rejected(status: GoalStatus, reason: str) -> GoalStatus:
+    return replace(status, state=GoalState.REJECTED, reason=reason)
+
+
+def _reading(state: State, goal: Goal) -> Reading | Ambiguity:
+    if goal.conditions:
+        return Reading(goal.text, (WantedGoal((goal.conditions,)),))
+    vocabulary = state.vocabulary()
+    if goal.speaker is not None and not vocabulary.is_person(goal.speaker):
+        known = sorted(filter(vocabulary.is_person, state.objects))
+        raise NotUnderstood(
+            f"{goal.speaker!r}, who says it, is no person that is known; "
+            f"known are {', '.join(known) or 'none'}"
+        )
+    found = read(goal.text, changed(vocabulary, speaker=goal.speaker))
+    if isinstance(found, Ambiguity) and goal.meant is not None:
+        return dict(found.candidates).get(goal.meant, found)
+    return found
+
+
+def _one_goal(reading: Reading) -> WantedGoal:
+    """What a reading wants, if that is something which the fleet can carry out.
+
+    Raises:
+        NotUnderstood: it is no wish, or one for another time.
+    """
+    text = reading.text
+    if reading.question is not None:
+        raise NotUnderstood(f"{text!r} is a question: ask it with `robotctl ask`")
+    if not reading.goals:
+        raise NotUnderstood(
+            f"{text!r} says what holds, and asks for nothing: tell it with `robotctl world add`"
+        )
+    if reading.goals[1:]:
+        raise NotUnderstood(f"{text!r} is several goals, each for a time of its own: say one each")
+    (goal,) = reading.goals
+    late = [
+        (goal.when, f"waits until {' and '.join(map(str, goal.when))}"),
+        (goal.not_before_s is not None, "is for later"),
+        (goal.every is not None, "is to be done again and again"),
+    ]
+    for given, what in late:
+        if given:
+            raise NotUnderstood(f"{text!r} {what}, which goals cannot: give it when it is time")
+    if goal.by:
+        raise NotUnderstood(
+            f"{text!r} says that {' and '.join(goal.by)} shall do it; who does what is found by "
+            "the allocator, so leave it out"
+        )
+    if not goal.stages:
+        raise NotUnderstood(
+            f"{text!r} says what to keep or to avoid, and nothing to do: say it along with a goal, "
+            "for which it then holds"
+        )
+    return goal
+
+
+def _in_force(state: State, goal: Goal, wanted: WantedGoal) -> Goal:
+    """What was put, with what its sentence adds."""
+    due_s = goal.due_s
+    if due_s is None and wanted.due_s is not None:
+        due_s = (goal.said_s or state.time_s) + wanted.due_s
+    rows = [Precedence(first=first, then=then) for first, then in wanted.before]
+    return replace(
+        goal,
+        priority=goal.priority or wanted.priority,
+        due_s=due_s,
+        always=tuple(dict.fromkeys((*goal.always, *wanted.always))),
+        never=tuple(dict.fromkeys((*goal.never, *wanted.never))),
+        sometime_before=tuple(dict.fromkeys((*goal.sometime_before, *rows))),
+    )
+
+
+def _note(state: State, reading: Reading) -> str | None:
+    """What a goal's sentence says besides what must hold, so that no word is lost unseen."""
+    notes = [f"{remark!r} asks for nothing" for remark in reading.remarks]
+    facts = FactValues(state.facts)
+    for literal in reading.presumed:
+        (relation, subject), value = literal
+        fact = state.fact(relation, subject)
+        if (
+            fact is not None
+            and fact.value not in (None, value)
+            and not holds(literal, facts.get, state, aboard=True)
+        ):
+            notes.append(f"it takes {subject} to be at {value}; believed is {fact.value}")
+    return "; ".join(notes) or None
+
+
+def _check_condition(state: State, condition: Condition) -> None:
+    for name in condition.subjects:
+        _check_name(state, name)
+    for literal in condition.literals:
+        if (wrong := misfit(literal, state.world())) is not None:
+            raise NotUnderstood(wrong)
+    if condition.value not in _words(state, condition.relation):
+        _check_name(state, condition.value)
+
+
+def _check_relation(state: State, condition: Condition) -> None:
+    known = relations_of(state.world())
+    if condition.relation not in known:
+        raise NotUnderstood(
+            f"{condition}: {condition.relation!r} is no relation that skills or facts speak of; "
+            f"those are {', '.join(sorted(known))}"
+        )
+
+
+def _words(state: State, relation: str) -> tuple[str, ...]:
+    """The words that skills declare as a relation's values: "hot", "cold"."""
+    for skill in state.skills.values():
+        if (known := skill.relations.get(relation)) is not None:
+            return known.values if isinstance(known.values, tuple) else ()
+    return ()
+
+
+def _check_name(state: State, name: Value) -> None:
+    if not isinstance(name, str) or name == NOTHING:
+        return
+    if not any(name in known for known in (state.places, state.objects, state.robots)):
+        known = (*state.places, *state.objects, *state.robots)
+        raise NotUnderstood(
+            f"{name!r} is nothing that is known; known are {', '.join(sorted(known)) or 'none'}"
+        )

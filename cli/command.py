@@ -57,6 +57,11 @@ class Call:
     settings: Settings
 
     @property
+    def interactive(self) -> bool:
+        """Whether somebody sits at a terminal who can be asked back."""
+        return not self.json and sys.stdin.isatty() and sys.stderr.isatty()
+
+    @property
     def json(self) -> bool:
         """Whether data goes to stdout as JSON."""
         return self.settings.json

@@ -20,6 +20,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "status": ("cli.commands.overview:status", "The whole fleet on one page."),
     "watch": ("cli.commands.overview:watch", "Follow goals, plans and tasks as they change."),
     "goal": ("cli.commands.goals:app", "Say what you want, in a sentence; see what became of it."),
+    "ask": ("cli.commands.questions:ask", "Ask where things are, what is so, who does what."),
     "plan": ("cli.commands.plans:app", "Make, look at, check, compare, start and cancel plans."),
     "task": ("cli.commands.tasks:app", "Look at tasks, or add one to a plan."),
     "replan": ("cli.commands.plans:replan", "Plan again from what is known now."),

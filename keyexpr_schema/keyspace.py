@@ -16,6 +16,7 @@ from keyexpr_schema.payloads import (
     history,
     motions,
     plans,
+    questions,
     requests,
     robots,
     simulation,
@@ -192,6 +193,12 @@ RETIREMENT = Key(
     delivery=QUERY, writers=PERSON, readers=PLANNER,
     about="Deletes the keys of what is over at once; the history keeps it.",
     reply=history.Retired,
+)
+QUESTION = Key(
+    "question", "planner/question", system.PlannerAddress, questions.QuestionQuery,
+    delivery=QUERY, writers=PERSON, readers=PLANNER,
+    about="A question in words, answered from what is believed.",
+    reply=questions.QuestionReply,
 )
 STORE_JOURNAL = Key(
     "store_journal", "store/journal", system.StoreAddress, system.StoreQuery,

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from msgspec.structs import replace
+
 from cli.client.names import TakenMeanwhile, free_name, next_number, put_if_unchanged
 from cli.errors import BadArgument, check_known
 from keyexpr_schema.facts import AT, IN, ON, parse_value
@@ -23,7 +25,7 @@ from keyexpr_schema.keyspace import (
     SIM_SCENE,
     STATEMENT,
 )
-from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress, Precedence
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalAddress, GoalStatus, Precedence
 from keyexpr_schema.payloads.world import (
     Fact,
     FactAddress,
@@ -170,3 +172,22 @@ async def put_goal(
                 "use another --id"
             )
         taken.add(spec.goal)
+
+
+async def answer_goal(session: Session, spec: Goal, status: GoalStatus, which: str) -> Goal:
+    """Store, confirmed, which of the things that a goal's sentence can mean is meant.
+
+    Raises:
+        BadArgument: its sentence is plain, or `which` is no number or words of a candidate.
+    """
+    candidates = status.candidates
+    if not candidates:
+        raise BadArgument(f"goal {spec.goal} does not ask anything: it is {status.state.value}")
+    number = int(which) if which.isdecimal() else 0
+    meant = candidates[number - 1] if 1 <= number <= len(candidates) else which
+    if meant not in candidates:
+        listed = "; ".join(f"{i} ({words})" for i, words in enumerate(candidates, 1))
+        raise BadArgument(f"{which!r} is none of what goal {spec.goal} can mean: {listed}")
+    spec = replace(spec, meant=meant)
+    await session.confirm(GOAL_SPEC, GoalAddress(spec.goal), spec)
+    return spec

@@ -71,7 +71,7 @@ async def add(
     from cli.client.fleet_view import fleet_view
     from cli.client.planner_requests import ask_planner, request_name
     from cli.client.presence import planner_alive
-    from cli.client.publish import put_goal
+    from cli.client.publish import answer_goal, put_goal
     from cli.errors import NotRunning, Refused
     from cli.plans.worlds import parse_condition, parse_precedence
     from cli.views.goals import GoalRow
@@ -101,7 +101,12 @@ async def add(
             return
         async with fleet_view(session, (GOAL_STATUS, {"goal": spec.goal})) as view:
             longest_s = (timeout_s, timeout_s) if wait else (READ_S, MODEL_READ_S)
-            await view.until_read((spec.goal,), f"goal {spec.goal} (it is stored)", *longest_s)
+            what = f"goal {spec.goal} (it is stored)"
+            await view.until_read((spec.goal,), what, *longest_s)
+            if view.goal_status[spec.goal].candidates and call.interactive:
+                asked = view.goal_status[spec.goal]
+                spec = await answer_goal(session, spec, asked, _asked_back(asked))
+                await view.until(lambda: not view.goal_status[spec.goal].candidates, READ_S, what)
             if plan and view.goal_status[spec.goal].state is GoalState.WAITING:
                 call.inform(sentence(spec, view.goal_status[spec.goal]))
                 answer = await ask_planner(
@@ -119,12 +124,22 @@ async def add(
                 )
             status = view.goal_status[spec.goal]
     if status.state in (GoalState.REJECTED, GoalState.FAILED):
+        if status.candidates and call.json:
+            call.show(GoalRow(goal=spec.goal, spec=spec, status=status), lambda: "")
         raise Refused(
             f"goal {spec.goal} {status.state.value}: {status.reason or 'no reason given'}"
         )
     call.show(
         GoalRow(goal=spec.goal, spec=spec, status=status), lambda: sentence(spec, status, plan)
     )
+
+
+def _asked_back(status: GoalStatus) -> str:
+    """What somebody at the terminal says to what a goal's sentence can mean."""
+    for number, words in enumerate(status.candidates, 1):
+        typer.echo(f"  {number}  {words}", err=True)
+    said: str = typer.prompt("It can mean each of these; which", err=True)
+    return said
 
 
 def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
@@ -139,6 +154,40 @@ def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
         hint = f"; plan it with `robotctl plan create big-dag makespan {spec.goal}`"
     note = f" ({status.note})" if status.note else ""
     return f"goal {spec.goal} is {status.state.value}{meaning}{note}{hint}"
+
+
+@command(app, "answer")
+async def answer(
+    call: Call,
+    goal: GoalArgument,
+    which: Annotated[
+        str,
+        typer.Argument(metavar="WHICH", help="Its number in what it can mean, or its words."),
+    ],
+) -> None:
+    """Say which of several things a goal's sentence means (`goal show` lists them)."""
+    from cli.client.fleet_view import fleet_view
+    from cli.client.planner_requests import check_planner
+    from cli.client.publish import answer_goal
+    from cli.errors import Refused, check_known
+    from cli.views.goals import GoalRow
+    from keyexpr_schema.keyspace import GOAL_SPEC, GOAL_STATUS
+    from keyexpr_schema.payloads.goals import GoalState
+
+    async with call.session() as session:
+        await check_planner(session)
+        known = {address.goal: spec for address, spec in (await session.list(GOAL_SPEC)).items()}
+        check_known("goal", goal, known)
+        async with fleet_view(session, (GOAL_STATUS, {"goal": goal})) as view:
+            await view.until_read((goal,), f"goal {goal}", READ_S, MODEL_READ_S)
+            spec = await answer_goal(session, known[goal], view.goal_status[goal], which)
+            await view.until(
+                lambda: not view.goal_status[goal].candidates, READ_S, f"goal {goal} to be read"
+            )
+            status = view.goal_status[goal]
+    if status.state is GoalState.REJECTED:
+        raise Refused(f"goal {goal} {status.state.value}: {status.reason or 'no reason given'}")
+    call.show(GoalRow(goal=goal, spec=spec, status=status), lambda: sentence(spec, status, False))
 
 
 @command(app, "list")

@@ -57,6 +57,8 @@ def goal_page(row: GoalRow) -> Group:
         if row.spec.speaker is not None:
             lines.append(Text(f"said by     {row.spec.speaker}"))
         lines.append(Text(f"priority    {row.spec.priority}"))
+        if row.spec.meant is not None:
+            lines.append(Text(f"meant       {row.spec.meant}"))
         rows = (("always", row.spec.always), ("never", row.spec.never))
         lines += [Text(f"{word:<12}{each}") for word, all_ in rows for each in all_]
         for each in row.spec.sometime_before:
@@ -72,6 +74,10 @@ def goal_page(row: GoalRow) -> Group:
         head = "understood  " if number == 0 else "then        "
         now = "  ← now" if len(found) > 1 and number == status.stage else ""
         lines.append(Text(f"{head}{' and '.join(str(each) for each in stage)}{now}"))
+    lines += [
+        Text(f"{'can mean' if number == 1 else '':<12}{number}  {words}")
+        for number, words in enumerate(status.candidates, 1)
+    ]
     if status.plan:
         lines.append(Text(f"plan        {status.plan}"))
     if status.note:

@@ -41,7 +41,7 @@ class Explanations:
     def unheard_of(self, segment: Segment) -> None:
         """Whether a word stands there that is refused wherever it stands."""
         for word in segment.words:
-            if "UNK" in word.tags and (
+            if word.tags & {"UNK", "UNTIL", "MIGHT"} and (
                 special := reason_for([(word.word, word.text)], self.what())
             ):
                 raise NotUnderstood(special)
@@ -49,7 +49,7 @@ class Explanations:
     def ungrammatical(self, segment: Segment, at: int) -> NotUnderstood:
         """Why nothing was made of the words: the first that is not known, or where it ends."""
         words = segment.words
-        strange = [i for i, word in enumerate(words) if "UNK" in word.tags]
+        strange = [i for i, w in enumerate(words) if "UNK" in w.tags or w.tags <= {"USE"}]
         example = SAY_IT if self.mode == "fact" else EXAMPLE
         if strange:
             at = strange[0]
@@ -62,9 +62,10 @@ class Explanations:
         while end < len(words) and words[end - 1].tags & _BEFORE_NOUNS:
             end += 1
         shown = words[at:end] or words[-1:]
-        special = reason_for([(w.word, w.text) for w in shown], self.what())
+        odd = [w for w in shown if not w.tags & {"VERB", "NOUN"}]
+        special = reason_for([(w.word, w.text) for w in odd], self.what())
         if not special and not strange:
-            rest = [w for w in words if not w.tags & {"ME", "PEOPLE"}]
+            rest = [w for w in words if not w.tags & {"ME", "PEOPLE", "VERB", "NOUN"}]
             special = reason_for([(w.word, w.text) for w in rest], self.what())
         if special:
             return NotUnderstood(special)

@@ -30,7 +30,7 @@ from keyexpr_schema.payloads.goals import Condition
 
 MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
-MOST_WORDS_TOGETHER = 120
+MOST_WORDS_TOGETHER = 80
 _CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 _READINGS = 12
@@ -117,7 +117,7 @@ class Reader:
                 if timed or said.times or said.when:
                     with suppress(NotUnderstood):  # the last sentence says it again
                         self._close(said, now)
-                said.times = list(sentence.times)
+                said.times, said.time_words = list(sentence.times), sentence.time_words
             dangling = sentence.dangling
             if self._said_of_oneself(sentence):
                 try:
@@ -199,7 +199,10 @@ class Reader:
         scene = Scene(self.vocabulary, self.tagger, said, mode)
         resolver = Clauses(scene)
         for clause in clauses:
-            resolver.clause(clause)
+            if segment.topic and len(clauses) == 1 and clause.kind in ("bare", "named"):
+                resolver.topic(clause)
+            else:
+                resolver.clause(clause)
         said = scene.said
         if segment.always:
             said.always.extend(c for stage in said.draft.conditions() for c in stage)
@@ -310,7 +313,8 @@ class Reader:
             reason = reason_for(named, "a fact")
             raise NotUnderstood(reason or f"{self.line!r} names a time, which a fact cannot")
         elif said.times or said.when:
-            raise NotUnderstood(f"{self.line!r} names a time or a condition, but nothing to do")
+            what = f"{said.time_words!r} names a time" if said.times else '"If" names a condition'
+            raise NotUnderstood(f"{what}, but nothing is to be done then")
         said.draft = GoalDraft(self.vocabulary.is_at)
         said.always, said.never, said.when, said.times, said.by = [], [], [], [], []
 

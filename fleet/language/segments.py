@@ -25,6 +25,8 @@ class Segment:
     joint: str = ""
     role: str = ""
     always: bool = False
+    topic: bool = False
+    """Whether it only names what the next part is about."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,7 @@ class Sentence:
     times: tuple[TimePhrase, ...] = ()
     urgent: int = 0
     dangling: bool = False
+    time_words: str = ""
     telegraphic: bool = False
     """Whether it has no articles: "toys in box" are all the toys."""
 
@@ -75,6 +78,8 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             urgent = urgent or -1
         elif "POLITE" not in word.tags or word.tags & {"NOUN"}:
             kept.append(word)
+    while kept and (kept[0].words == ("but",) or "COMMA" in kept[0].tags):
+        kept.pop(0)  # "no rush, but …"
     segments: list[Segment] = []
     for role, part in _roles(_ordered(_commas(kept))):
         joint, begun = "", list[Lexeme]()
@@ -99,8 +104,15 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
         segments += _segment(begun, joint, role)
         dangling = not _content(begun) and joint in ("then", "and")
         dangling = dangling or bool(begun and "AND" in begun[-1].tags)
+    if len(segments) > 1 and not segments[0].role:  # "that blanket on the couch, fold it"
+        about = any("PRON" in word.tags for word in segments[1].words)
+        plain = not any(word.tags & (_CLAUSAL - {"PREP"}) for word in segments[0].words)
+        segments[0] = replace(segments[0], topic=about and plain)
     telegraphic = not any(word.tags & {"DET", "INDEF"} for word in words)
-    return Sentence(tuple(words), tuple(segments), tuple(times), urgent, dangling, telegraphic)
+    named = " ".join(word.text for word in words if "TIME" in word.tags)
+    return Sentence(
+        tuple(words), tuple(segments), tuple(times), urgent, dangling, named, telegraphic
+    )
 
 
 def _content(words: Sequence[Lexeme]) -> list[Lexeme]:
@@ -148,9 +160,15 @@ def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
             first = _commas(words[:i])
             return [*first, then, *rest] if tag == "BEFORE" else [*rest, then, *first]
         ends = [j for j, w in enumerate(rest) if "COMMA" in w.tags]
-        if not ends:
+        verbs = [
+            j
+            for j, w in enumerate(rest)
+            if j > 1 and "VERB" in w.tags and not w.tags & {"NOUN", "ADJ"}
+        ]
+        if not ends and (not verbs or "PEOPLE" in rest[0].tags):
             return list(words)
-        inner, outer = rest[: ends[0]], rest[ends[0] + 1 :]
+        inner = rest[: ends[0]] if ends else rest[: verbs[0]]
+        outer = rest[ends[0] + 1 :] if ends else rest[verbs[0] :]
         return [*outer, then, *inner] if tag == "BEFORE" else [*inner, then, *outer]
     return list(words)
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from fleet.core import events
+from fleet.core import answering, events
 from fleet.core.effects import DropJob, Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import At, Event
 from fleet.core.model.skills import Skills, phrases_of, state_words_of
@@ -45,12 +45,14 @@ from keyexpr_schema.keyspace import (
     FACT,
     PLANNER_ALIVE,
     PLANNER_STATUS,
+    QUESTION,
     REPORT,
     ROBOT_ALIVE,
     SIM_CLOCK,
     SIM_SCENE,
 )
-from keyexpr_schema.payloads.system import PlannerAliveAddress
+from keyexpr_schema.payloads.questions import QuestionQuery, QuestionReply
+from keyexpr_schema.payloads.system import PlannerAddress, PlannerAliveAddress
 from keyexpr_schema.payloads.world import FactAddress
 from keyexpr_schema.transport.session import Narrowed, Session, TokenWatch, Watch
 
@@ -112,6 +114,7 @@ class PlannerService:
         async with AsyncExitStack() as stack:
             await stack.enter_async_context(self._outbox.running())
             await stack.enter_async_context(self._past.running())
+            await stack.enter_async_context(self._session.serve(QUESTION, self._answered))
             scenes = await self._session.list(SIM_SCENE)
             self._clock.resume(self.state.time_s, bool(scenes))
             if first_run:  # before the watch: it asks for the reports of the plans that are open
@@ -305,6 +308,9 @@ class PlannerService:
                 self._pool.submit(effect.given)
             elif isinstance(effect, DropJob):
                 self._pool.drop(effect.job)
+
+    async def _answered(self, _: PlannerAddress, asked: QuestionQuery) -> QuestionReply:
+        return answering.answer(self.state, asked)
 
     async def _take_answers(self) -> None:
         """Answers of planning jobs are events of the moment at which they come."""

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fleet.errors import NotUnderstood
-from fleet.language import Reading, Vocabulary, read_goal, statement_facts
+from fleet.language import Reading, Vocabulary, read, read_goal, statement_facts
 from fleet.language.words.tokens import words_in
 from keyexpr_schema.payloads.world import Feature, Object, Place
 from tests.support.household import carrier, manipulator
 from tests.support.language_flat import FURNISHED
+from tests.support.language_flat_said import SPOKEN
 from tests.support.language_house import WORDS as NAMES
 from tests.support.language_house import shown
 from tests.support.reached import Reached, reaches
@@ -53,6 +56,16 @@ SENTENCES = (
     "The red book belongs in the hallway and the first cup in the kitchen",
     "Have a look round the whole flat",
 )
+SAID = (
+    "Get me the cup in the fridge",
+    "Keep the fridge closed and never open the cupboard",
+    "If the fridge is open, close it and switch off the lamp",
+    "Wash the dirty cup before you bring the fork to the hallway",
+    "Bring all cups except the first one to the hallway",
+    "The lamp should always be on",
+    "HSR, bring the fork to the kitchen table at noon",
+)
+NOW = datetime(2026, 3, 4, 9, 30, tzinfo=UTC)
 UNREADABLE = ("zorgle", "not", "never", "if", "unless", "except", "carefully", "tomorrow", "almost")
 NONSENSE = words_in("blick dax wug fep toma modi koba lorp zav nemi rul pim gazzer teeb")
 
@@ -185,6 +198,46 @@ def test_no_word_is_dropped(text: str, extra: str, data: st.DataObject) -> None:
     changed = " ".join([*words[:at], extra, *words[at:]])
     with pytest.raises(NotUnderstood):
         read_goal(changed, WORDS)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.sampled_from((*SENTENCES, *SAID)), st.data())
+def test_an_unknown_word_is_named(text: str, data: st.DataObject) -> None:
+    """A sentence of which a word is not known is refused, and the refusal names that word."""
+    words = text.split()
+    at = data.draw(st.integers(0, len(words) - 1))
+    changed = " ".join([*words[:at], "zorgle", *words[at + 1 :]])
+    with pytest.raises(NotUnderstood) as refused:
+        read(changed, SPOKEN if text in SAID else WORDS, NOW)
+    assert "zorgle" in str(refused.value).casefold()
+
+
+@reaches("hinted", "right")
+@settings(max_examples=150, deadline=None)
+@given(st.sampled_from((*SENTENCES, *SAID)), st.data())
+def test_no_hint_leads_elsewhere(reached: Reached, text: str, data: st.DataObject) -> None:
+    """What a refusal suggests for a misspelt word means what the right word means, or nothing."""
+    words = text.split()
+    at = data.draw(st.sampled_from([i for i, word in enumerate(words) if len(word) > 4]))
+    cut = data.draw(st.integers(1, len(words[at]) - 2))
+    typo = words[at][:cut] + words[at][cut + 1 :]
+    vocabulary = SPOKEN if text in SAID else WORDS
+    try:
+        read(" ".join([*words[:at], typo, *words[at + 1 :]]), vocabulary, NOW)
+    except NotUnderstood as refused:
+        hint = re.search(r"did you mean '([^']+)'", str(refused))
+        if hint is None:
+            return
+        reached["hinted"] += 1
+        try:
+            followed = read(" ".join([*words[:at], hint[1], *words[at + 1 :]]), vocabulary, NOW)
+        except NotUnderstood:
+            return
+        right = read(text, vocabulary, NOW)
+        assert isinstance(right, Reading)
+        assert isinstance(followed, Reading)
+        assert followed.goals == right.goals
+        reached["right"] += 1
 
 
 @settings(max_examples=200, deadline=None)

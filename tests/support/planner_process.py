@@ -80,7 +80,7 @@ async def planner(endpoint: str, data: Path, *options: str) -> AsyncIterator[Pla
 
 
 @asynccontextmanager
-async def person(endpoint: str) -> AsyncIterator[Session]:
+async def person(endpoint: str, cups: int = 1) -> AsyncIterator[Session]:
     """A session of somebody who has set up a household with one manipulator that is connected."""
     config = SessionConfig(endpoints=(endpoint,), realm="test", component="person")
     async with (
@@ -90,9 +90,13 @@ async def person(endpoint: str) -> AsyncIterator[Session]:
         await session.confirm(ROBOT_SPEC, RobotAddress("hsr"), manipulator())
         for place in PLACES:
             await session.confirm(PLACE, PlaceAddress(place.place), place)
-        await session.confirm(OBJECT, ObjectAddress("cup_1"), cup(1))
-        for known in (fact("cup_1", "at", "kitchen"), fact("hsr", "holding", "nothing")):
-            await session.confirm(FACT, FactAddress.of(known.key), known)
+        known = [fact("hsr", "holding", "nothing")]
+        for number in range(1, cups + 1):
+            thing = cup(number)
+            await session.confirm(OBJECT, ObjectAddress(thing.object), thing)
+            known.append(fact(thing.object, "at", "kitchen"))
+        for each in known:
+            await session.confirm(FACT, FactAddress.of(each.key), each)
         yield session
 
 

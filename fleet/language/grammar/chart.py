@@ -180,8 +180,12 @@ class _Evaluation:
         if (known := self.known.get(id(node))) is not None:
             return known
         self.known[id(node)] = []
+        rows = list(self._derivations(node))
+        if len(rows) < 2:
+            self.known[id(node)] = rows
+            return rows
         best: dict[Any, int] = {}
-        for cost, value in self._derivations(node):
+        for cost, value in rows:
             if cost < best.get(value, cost + 1):
                 best[value] = cost
         found = sorted(((cost, value) for value, cost in best.items()), key=lambda row: row[0])

@@ -97,7 +97,7 @@ class Claims:
             if mention.type == "robot" and target in self.scene.vocabulary.robots:
                 raise NotUnderstood("a robot is at a place, not on a robot: name the place")
             if target in mention.subjects:
-                raise NotUnderstood(f"{self.scene.said.clause!r}: nothing can be on or in itself")
+                raise NotUnderstood("nothing can be on or in itself: say where else it shall be")
             for name in mention.subjects:
                 robot = mention.type == "robot"
                 self.fact(AT, name, self.places.place_of(target) if robot else target)
@@ -204,6 +204,12 @@ class Claims:
         if not self.nouns.can_be(clause.subject, PLACES):
             raise NotUnderstood(f"{self.scene.said.clause!r}: only places are searched")
         return self.looked_around(clause.subject, value)
+
+    def on_gone_to(self, clause: Clause) -> None:
+        """`the guest has gone to the bathroom`."""
+        self.check_mode()
+        assert clause.subject is not None
+        self.placed(clause.subject, clause.arguments)
 
     def on_gone(self, clause: Clause) -> None:
         """`the pizza has gone cold`."""

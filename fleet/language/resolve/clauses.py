@@ -52,6 +52,7 @@ class Clauses:
             scene, who, nouns, places, wishes, looking, skilled, tidiness, questions
         )
         ellipsis = Continuations(scene, who, nouns, wishes, claims, commands)
+        self.topic = ellipsis.topic
         self._by_kind: dict[str, Callable[[Clause], None]] = {
             name.removeprefix("on_"): getattr(part, name)
             for part in (claims, questions, shall, commands, ellipsis)

@@ -59,6 +59,7 @@ class Discourse:
     when: list[Condition] = field(default_factory=list)
     times: list[TimePhrase] = field(default_factory=list)
     urgent: int = 0
+    time_words: str = ""
     telegraphic: bool = False
     """Whether the sentence has no articles."""
     done: bool = False

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.frames import EXAMPLE, framed
 from fleet.language.resolve.mentions import Subject
 from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import Where
+from fleet.language.resolve.places import WHERE, Where
 from fleet.language.resolve.referents import Referents
 from fleet.language.resolve.scene import PLACES, THINGS, Scene
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import (
     Clause,
     Nouns,
+    Place,
 )
 
 
@@ -44,6 +47,10 @@ class Continuations:
             return self.claims.placed(clause.subject, clause.arguments)
         if self.scene.mode == "fact":
             return self.claims.placed(clause.subject, clause.arguments)
+        said = self.scene.said
+        self.places_are_known(clause)
+        if not said.elliptic:
+            said.telegraphic = True
         frame, beneficiary = self.wishes.for_whom(framed(clause.arguments))
         if beneficiary is not None and not frame.places:
             return self._to_person(clause.subject, beneficiary)
@@ -55,6 +62,7 @@ class Continuations:
 
     def on_whereto(self, clause: Clause) -> None:
         """`and then to the kitchen`."""
+        self.places_are_known(clause)
         if not self.scene.said.elliptic or not (self.scene.said.recent or self.scene.said.moved):
             raise NotUnderstood(
                 f"{self.scene.said.clause!r} is not understood as a goal: {EXAMPLE}"
@@ -83,6 +91,26 @@ class Continuations:
             return self._to_person(clause.subject, speaker)
         shown = self.scene.said.clause
         raise NotUnderstood(f"{shown!r} is not understood as a goal: {EXAMPLE}")
+
+    def places_are_known(self, clause: Clause) -> None:
+        """Refuse what is under or beside something first.
+
+        Raises:
+            NotUnderstood: a phrase of place has a relation that is not known.
+        """
+        for place in clause.arguments:
+            if isinstance(place, Place) and place.role not in ("for", *WHERE):
+                self.wishes.places.locative(place)
+
+    def topic(self, clause: Clause) -> None:
+        """`that blanket on the couch, fold it`: what the rest of the sentence is about."""
+        assert clause.subject is not None
+        places = tuple(a for a in clause.arguments if isinstance(a, Place))
+        last = replace(clause.subject.items[-1], places=places)
+        nouns = replace(clause.subject, items=(*clause.subject.items[:-1], last))
+        types = THINGS if self.nouns.can_be(nouns, THINGS) else PLACES
+        found = self.nouns.subjects(nouns, types, "an object, robot or place")
+        self.scene.said.remember([self.who.resolve(subject) for subject in found])
 
     def _to_person(self, nouns: Nouns, person: str) -> None:
         things = self.nouns.subjects(nouns, ("object",), "an object")

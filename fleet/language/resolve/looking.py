@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.frames import Frame
-from fleet.language.resolve.mentions import Mention, Subject
+from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.nouns import NounResolver
 from fleet.language.resolve.places import WHERE, PlaceResolver
 from fleet.language.resolve.referents import Referents
@@ -61,11 +61,31 @@ class Looking:
         found = self.nouns.subjects(nouns, ("object",), "an object")
         if any(isinstance(s, Mention) and s.type == "robot" for s in found):
             raise NotUnderstood(ROBOTS_TELL)
-        mentions = [self.who.resolve(subject) for subject in found]
+        places = [p for p in places if p.special != "anywhere"]
+        if (there := self._believed_there(found, places)) is not None:
+            mentions, places = there, []
+        else:
+            mentions = [self.who.resolve(subject) for subject in found]
         self._look_in([p for p in places if p.special != "anywhere"])
         for mention in mentions:
             self.scene.said.draft.add(LOCATED, mention, True)
         self.scene.said.remember(mentions)
+
+    def _believed_there(
+        self, found: Sequence[Subject], places: Sequence[Place]
+    ) -> list[Mention] | None:
+        """Who is meant by "a mug in the kitchen", where some of several are believed there."""
+        if len(found) != 1 or not isinstance(found[0], NounPhrase) or len(found[0].names) < 2:
+            return None
+        if not places or any(p.special or p.role not in ("in", "from") for p in places):
+            return None
+        try:
+            where = self.places.where([self.places.locative(p) for p in places], fetching=True)
+        except NotUnderstood:
+            return None
+        source = where.source or where.target or ""
+        there = [n for n in found[0].names if self.scene.vocabulary.is_at(n, source)]
+        return [found[0].among(there).resolve()] if there else None
 
     def _look_in(self, places: Sequence[Place]) -> None:
         if not places:

@@ -39,6 +39,8 @@ class Mention:
     surfaces: tuple[str, ...] = ()
     least: int = 1
     """Of an open one, how many of them."""
+    each: bool = False
+    """Whether it is each of several: "it" may mean them after "every cup"."""
 
     @property
     def single(self) -> bool:
@@ -110,7 +112,8 @@ class NounPhrase:
             raise NotUnderstood(f"{self.text!r}: {reason}; known are {listing}")
         if self.quantity is Quantity.ALL or self.count is not None:
             selective = len(names) > 1 and not self.exact and self.count is None
-            return Mention(names, self.type, self.key, selective=selective)
+            each = self.count is None and not self.plural and len(names) > 1
+            return Mention(names, self.type, self.key, selective=selective, each=each)
         if self.plural and self.quantity in (Quantity.ANY, Quantity.BARE):
             raise NotUnderstood(
                 f"{self.text!r} does not say how many: say all of them or which ones; "

@@ -37,6 +37,10 @@ class NounResolver:
         Raises:
             NotUnderstood: one of them is nothing known of these types.
         """
+        if len(nouns.items) == 1 and nouns.items[0].words[:1] in (("them",), ("they",)):
+            recent = [m for m in self.scene.said.recent if m.type in types]
+            if len(recent) > 1:
+                return list(recent)
         found = [self.subject(noun, types, what) for noun in nouns.items]
         if nouns.either:
             one_of_them = found[0]
@@ -155,7 +159,8 @@ class NounResolver:
         if noun.form != "noun" and noun.form != "one":
             raise self.unknown(noun, types, what)
         head = noun.head[0].words
-        if any("UNK" in word.tags for word in noun.head):
+        two = len(noun.head) > 1 and noun.form == "noun"
+        if two or any("UNK" in word.tags for word in noun.head):
             raise self.unknown(noun, types, what)
         named = self._named(head, noun.head[0].text, types)
         if named and not noun.numbers:

@@ -23,6 +23,7 @@ from keyexpr_schema.facts import (
     AT,
     IN,
     ON,
+    FactKey,
 )
 from keyexpr_schema.payloads.world import Feature
 
@@ -148,7 +149,7 @@ class PlaceResolver:
 
     def _here(self, text: str) -> NounPhrase:
         speaker = self.scene.vocabulary.speaker
-        place = None if speaker is None else self.scene.vocabulary.place_of(speaker)
+        place = None if speaker is None else self._now_in(speaker)
         found = tuple(e for e in self.scene.lexicon.entities if e.type == "place" and e.id == place)
         if not found:
             raise NotUnderstood(
@@ -294,13 +295,19 @@ class PlaceResolver:
             source_surface=where.target_surface or where.source_surface,
         )
 
+    def _now_in(self, name: str) -> str | None:
+        """The place where somebody is, as was just said, or as is believed."""
+        told = self.scene.said.facts.get(FactKey(AT, name))
+        known = self.scene.vocabulary.place_of
+        return known(told) if isinstance(told, str) else known(name)
+
     def place_of(self, target: str) -> str:
         """The place where somebody goes who goes there.
 
         Raises:
             NotUnderstood: it is a thing, and not known where.
         """
-        place = self.scene.vocabulary.place_of(target)
+        place = self._now_in(target)
         if place is None:
             raise NotUnderstood(f"it is not known in which place {target} is: name the place")
         return place

@@ -58,7 +58,7 @@ class Pronouns:
         if "object" not in types and "place" in types and word == "it" and said.last_place:
             return Mention((said.last_place,), "place", noun.first)
         plural = word in _PLURAL or len(noun.words) > 1
-        meant = [m for m in self.scene.said.recent if m.single != plural]
+        meant = [m for m in self.scene.said.recent if m.single != plural or m.each]
         count = 2 if word == "both" else int(word) if word.isdecimal() else None
         if len(meant) == 1 and count in (None, len(meant[0].subjects)):
             return meant[0]

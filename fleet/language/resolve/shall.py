@@ -188,6 +188,8 @@ class Shall:
         words = [w for w in clause.words if "ADJ" in w.tags]
         if self.scene.said.elliptic in ("is", "are") or self.scene.mode == "fact":
             return self.claims.are(clause.subject, words, False)
+        if not self.scene.said.elliptic:
+            self.scene.said.telegraphic = True
         self.scene.said.elliptic = "be"
         subject = clause.subject
         if clause.arguments:

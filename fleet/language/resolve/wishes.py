@@ -271,7 +271,7 @@ class Wishes:
             return self.scene.said.draft.add(AT, mention, self.places.place_of(target))
         kept = tuple(name for name in mention.subjects if name != target)
         if not kept:
-            raise NotUnderstood(f"{self.scene.said.clause!r}: nothing can be on or in itself")
+            raise NotUnderstood("nothing can be on or in itself: say where else it shall be")
         others = replace(mention, subjects=kept, open=mention.open and len(kept) > 1)
         handed = where.target_type == "robot" or self.scene.vocabulary.is_person(target)
         return self.scene.said.draft.add(where.relation, others, target, on_robot=handed)

@@ -14,7 +14,7 @@ from fleet.language.words.tokens import Phrase, Token, number_of, ordinal_of
 _VERBAL = frozenset({"VERB", "FIN", "PART", "GER", "ADJ"})
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lexeme:
     """A word, or words that stand together as one, with all that it can be.
 
@@ -84,6 +84,10 @@ class Tagger:
             words = tuple(token.word for token in tokens[at:end])
             return Lexeme(words, tags, at, end, shown, tokens[at].spoken, time)
 
+        if (ranked := self._ranked(tokens, at)) is not None:
+            end, words = ranked
+            shown = " ".join(text[tokens[at].start : tokens[end - 1].end].split())
+            return Lexeme(words, frozenset({"NOUN"}), at, end, shown, tokens[at].spoken)
         named = self._name(tokens, at)
         phrase, tags = self._phrase(tokens, at)
         if named <= at + 1 and (timed := time_at(tokens, at)) is not None and timed[0] > phrase:
@@ -112,6 +116,19 @@ class Tagger:
             return lexeme(at + 1, frozenset({"END"}))
         return lexeme(at + 1, tags or frozenset({"UNK"}))
 
+    def _ranked(self, tokens: Sequence[Token], at: int) -> tuple[int, Phrase] | None:
+        """`top drawer of the dresser`, where a "first drawer of the dresser" is known."""
+        tags = self.book.phrases.get((tokens[at].word,), frozenset())
+        if not tags & {"ORD", "LAST"}:
+            return None
+        ranks = ("1st",) if "ORD" in tags else tuple(f"{n}th" for n in range(12, 3, -1))
+        for rank in ranks if "ORD" in tags else (*ranks, "3rd", "2nd", "1st"):
+            named = [Token(rank, rank, 0, 0), *tokens[at + 1 : at + 8]]
+            end, _ = self.lexicon.exact(named, 0, ENTITY_TYPES)
+            if end > 2:
+                return at + end, tuple(token.word for token in named[:end])
+        return None
+
     def _name(self, tokens: Sequence[Token], at: int) -> int:
         """Where the longest name ends that starts here.
 
@@ -121,6 +138,8 @@ class Tagger:
         end, found = lexicon.exact(tokens, at, ENTITY_TYPES)
         if end == at:
             return at
+        if any(entity.type in ("place", "robot") for entity in found):
+            return end
         ordinal = ordinal_of(tokens[at].word)
         number = number_of(tokens[end - 1].word)
         if ordinal is not None and end > at + 1:

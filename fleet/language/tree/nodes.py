@@ -4,8 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import TypeVar
 
 from fleet.language.tagging.tagger import Lexeme
+
+_Node = TypeVar("_Node")
+
+
+def _hashed_once(cls: type[_Node]) -> type[_Node]:
+    """Have a frozen tree remember its hash: a chart compares each of its values many times."""
+    deep = cls.__hash__
+
+    def remembered(self: _Node) -> int:
+        known: int | None = self.__dict__.get("_hash")
+        if known is None:
+            known = deep(self)
+            object.__setattr__(self, "_hash", known)
+        return known
+
+    cls.__hash__ = remembered  # type: ignore[method-assign, assignment]
+    return cls
 
 
 class Quantity(Enum):
@@ -17,6 +35,7 @@ class Quantity(Enum):
     ALL = "all cups"
 
 
+@_hashed_once
 @dataclass(frozen=True)
 class Noun:
     """A noun phrase. `first` and `last` are tokens of the text, `last` excluded.
@@ -50,6 +69,7 @@ class Noun:
     determiner: str = ""
 
 
+@_hashed_once
 @dataclass(frozen=True)
 class Nouns:
     """One noun phrase or several, all of them or (`either`) one of them."""
@@ -58,6 +78,7 @@ class Nouns:
     either: bool = False
 
 
+@_hashed_once
 @dataclass(frozen=True)
 class Relative:
     """`that is on the table`, `which are clean`."""
@@ -67,6 +88,7 @@ class Relative:
     negated: bool = False
 
 
+@_hashed_once
 @dataclass(frozen=True)
 class Place:
     """A phrase of place, or another phrase with a preposition in front.
@@ -99,6 +121,7 @@ class Except:
 Argument = Nouns | Place | Particle | Except
 
 
+@_hashed_once
 @dataclass(frozen=True)
 class Predicate:
     """What is said of a subject: states, something done, or places."""
@@ -108,6 +131,7 @@ class Predicate:
     arguments: tuple[Argument, ...] = ()
 
 
+@_hashed_once
 @dataclass(frozen=True)
 class Clause:
     """A clause, by the name that the grammar gives its kind."""

@@ -30,6 +30,7 @@ class NounBuilder:
 
     def __init__(self, words: Sequence[Lexeme], tagger: Tagger) -> None:
         self.words, self.tagger = words, tagger
+        self._types: dict[tuple[int, int, str], frozenset[EntityType]] = {}
 
     def make_sep(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         """What joins the items of a list."""
@@ -43,7 +44,11 @@ class NounBuilder:
             types = [self.types(item) for item in items]
             if not (all(t & _THINGS for t in types) or all(t & SPOTS for t in types)):
                 return None
-        unknown = sum("UNK" in word.tags for item in items for word in item.head)
+        unknown = sum(
+            "UNK" in word.tags or (len(item.head) == 2 and "ONE" not in item.head[-1].tags)
+            for item in items
+            for word in item.head
+        )
         bare = len(items) > 1 and items[-1].quantity is Quantity.BARE
         strange = bare and any("UNK" in word.tags for word in items[-1].head)
         cost = COSTS["unknown"] * (bool(unknown) + 2 * strange)  # rather a verb that is not known
@@ -219,6 +224,12 @@ class NounBuilder:
 
     def types(self, noun: Noun) -> frozenset[EntityType]:
         """What the noun can be, as far as its words say it."""
+        key = (noun.first, noun.last, noun.form)
+        if (known := self._types.get(key)) is None:
+            known = self._types[key] = self._types_of(noun)
+        return known
+
+    def _types_of(self, noun: Noun) -> frozenset[EntityType]:
         if noun.form == "basket":
             return frozenset({"robot", "surface", "object"})
         if noun.form == "whatever":

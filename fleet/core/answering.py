@@ -1,0 +1,235 @@
+"""Answers to questions, from what is believed: with who said so, and how long ago."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace as changed
+
+from msgspec.structs import replace
+
+from fleet.core.indexes.fact_views import FactValues
+from fleet.core.model.derived import carriers, is_located
+from fleet.core.state import State
+from fleet.errors import NotUnderstood
+from fleet.language import Ambiguity, Question, read
+from keyexpr_schema.facts import AT, HELD, IN, ON, FactKey, Value, render_value
+from keyexpr_schema.payloads.goals import Condition
+from keyexpr_schema.payloads.questions import AnsweredFact, QuestionQuery, QuestionReply
+from keyexpr_schema.payloads.world import Fact
+
+ANYBODY = "?"
+"""In a question's conditions: each of those that it is asked of."""
+_PLACED = frozenset({AT, ON, IN, HELD})
+MOST_NAMED = 20
+
+
+def answer(state: State, asked: QuestionQuery) -> QuestionReply:
+    """What is believed of what is asked; or why it is not understood."""
+    words = changed(state.vocabulary(), speaker=asked.speaker)
+    if asked.speaker is not None and not words.is_person(asked.speaker):
+        return QuestionReply(reason=f"{asked.speaker!r}, who asks, is no person that is known")
+    try:
+        reading = read(asked.text, words)
+    except NotUnderstood as error:
+        return QuestionReply(reason=str(error))
+    if isinstance(reading, Ambiguity):
+        candidates = tuple(words for words, _ in reading.candidates)
+        return QuestionReply(reason=reading.sentence, candidates=candidates)
+    if reading.question is None:
+        return QuestionReply(
+            reason=f"{asked.text!r} is no question: a goal is given with `robotctl goal add`, "
+            "a fact with `robotctl world add`"
+        )
+    return _Answers(state).to(reading.question)
+
+
+class _Answers:
+    """What is believed in one state."""
+
+    def __init__(self, state: State) -> None:
+        self._state = state
+        self._values = FactValues(state.facts)
+
+    def to(self, question: Question) -> QuestionReply:
+        """What is believed of what is asked."""
+        if question.of == "where":
+            return self._where(question.subjects)
+        if question.of == "what doing":
+            return self._doing(question.subjects)
+        if question.of == "whether":
+            return self._whether(question)
+        if question.of == "who" and any(c.value == ANYBODY for c in question.holds):
+            return self._who_has(question.holds)
+        return self._which(question)
+
+    # --- where ------------------------------------------------------------------------------------
+    def _where(self, subjects: Sequence[str]) -> QuestionReply:
+        rows = [self._whereabouts(subject) for subject in subjects]
+        lost = [s for s in subjects if not self._located(s)]
+        return QuestionReply(
+            answer="; ".join(rows),
+            subjects=tuple(subjects),
+            facts=tuple(self._facts(FactKey(AT, subject) for subject in subjects)),
+            offer=f"find {lost[0]}" if lost else None,
+        )
+
+    def _located(self, name: str) -> bool:
+        return is_located(name, self._values.get, self._state)
+
+    def _whereabouts(self, name: str) -> str:
+        if name in self._state.places:
+            return f"{self._named(name)} is a place"
+        if not self._located(name):
+            return f"nobody knows where {self._named(name)} is"
+        around = list(carriers(name, self._values.get, self._state, aboard=True))
+        there = ", ".join(self._at(each) for each in around) or "somewhere"
+        fact = self._state.facts.get(FactKey(AT, name))
+        return f"{self._named(name)} is {there}{self._heard(fact)}"
+
+    def _at(self, carrier: str) -> str:
+        state = self._state
+        if carrier in state.robots:
+            return f"with {carrier}"
+        thing = state.objects.get(carrier)
+        if thing is None:
+            return f"in the {self._named(carrier)}"
+        if thing.is_a("person"):
+            return f"with {self._named(carrier)}"
+        return f"{'in' if thing.is_a('contains') else 'on'} {self._named(carrier)}"
+
+    def _named(self, name: str) -> str:
+        state = self._state
+        place, thing = state.places.get(name), state.objects.get(name)
+        label = place.label if place is not None else thing.label if thing is not None else ""
+        return label or name
+
+    def _heard(self, fact: Fact | None) -> str:
+        if fact is None:
+            return ""
+        return f" (said {_ago(self._age_s(fact))} ago by {fact.source})"
+
+    def _age_s(self, fact: Fact) -> float:
+        return max(0.0, self._state.time_s - fact.time_s)
+
+    def _facts(self, keys: Iterable[FactKey]) -> Iterator[AnsweredFact]:
+        for key in dict.fromkeys(keys):
+            fact = self._state.facts.get(key)
+            if fact is not None:
+                yield AnsweredFact(
+                    relation=fact.relation,
+                    subject=fact.subject,
+                    value=fact.value,
+                    source=fact.source,
+                    age_s=round(self._age_s(fact), 3),
+                )
+
+    # --- whether, which, how many ----------------------------------------------------------------
+    def _believed(self, condition: Condition) -> bool | None:
+        """Whether it holds, as far as is known."""
+        if self._state.world().holds(condition):
+            return True
+        return False if any(map(self._known, self._bases(condition))) else None
+
+    def _bases(self, condition: Condition) -> list[FactKey]:
+        relation = AT if condition.relation in _PLACED else condition.relation
+        return [FactKey(relation, subject) for subject in condition.subjects]
+
+    def _known(self, key: FactKey) -> bool:
+        if key.relation == AT:
+            return self._located(key.subject)
+        return self._values.get(key) is not None
+
+    def _whether(self, question: Question) -> QuestionReply:
+        found = [self._believed(condition) for condition in question.holds]
+        holds = False if False in found else None if None in found else True
+        keys = [key for condition in question.holds for key in self._bases(condition)]
+        word = {True: "yes", False: "no", None: "nobody knows"}[holds]
+        said = [self._said(key) for key in keys]
+        unknown = [k.subject for k in keys if k.relation == AT and not self._known(k)]
+        return QuestionReply(
+            answer=f"{word}: {'; '.join(said)}" if said else word,
+            holds=holds,
+            facts=tuple(self._facts(keys)),
+            offer=f"find {unknown[0]}" if unknown else None,
+        )
+
+    def _said(self, key: FactKey) -> str:
+        if key.relation == AT:
+            return self._whereabouts(key.subject)
+        fact = self._state.facts.get(key)
+        if fact is None or fact.value is None:
+            return f"nobody knows {key.relation} of {self._named(key.subject)}"
+        shown = render_value(fact.value)
+        return f"{key.relation}({key.subject}) is {shown}{self._heard(fact)}"
+
+    def _which(self, question: Question) -> QuestionReply:
+        subjects = question.subjects or self._anybody(question.holds)
+        rows = {subject: self._all(question.holds, subject) for subject in subjects}
+        found = [subject for subject, holds in rows.items() if holds]
+        open_ = [subject for subject, holds in rows.items() if holds is None]
+        names = ", ".join(map(self._named, found[:MOST_NAMED]))
+        more = f" and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""
+        text = f"{len(found)}: {names}{more}" if found else "none"
+        if question.of != "how many":
+            text = f"{names}{more}" if found else "none that is known"
+        if open_ and question.subjects:
+            text += f"; of {len(open_)} more nobody knows: {', '.join(open_[:MOST_NAMED])}"
+        keys = [key for s in found for c in question.holds for key in self._bases(_bound(c, s))]
+        return QuestionReply(
+            answer=text,
+            subjects=tuple(found),
+            facts=tuple(self._facts(keys)),
+            offer=f"find {open_[0]}" if open_ and question.subjects else None,
+        )
+
+    def _anybody(self, conditions: Sequence[Condition]) -> list[str]:
+        relations = {AT if c.relation in _PLACED else c.relation for c in conditions}
+        names = [key.subject for key in self._state.facts if key.relation in relations]
+        return sorted(dict.fromkeys(names))
+
+    def _all(self, conditions: Sequence[Condition], subject: str) -> bool | None:
+        found = [self._believed(_bound(condition, subject)) for condition in conditions]
+        return False if False in found else None if None in found else True
+
+    def _who_has(self, conditions: Sequence[Condition]) -> QuestionReply:
+        keys = [key for condition in conditions for key in self._bases(condition)]
+        holders: list[str] = []
+        for key in keys:
+            around = carriers(key.subject, self._values.get, self._state, aboard=True)
+            holders += [c for c in around if c in self._state.robots or self._is_person(c)]
+        said = [self._named(holder) for holder in holders]
+        rest = [self._said(key) for key in keys] if not said else []
+        return QuestionReply(
+            answer=", ".join(said) or f"nobody: {'; '.join(rest)}",
+            subjects=tuple(holders),
+            facts=tuple(self._facts(keys)),
+        )
+
+    def _is_person(self, name: Value) -> bool:
+        thing = self._state.objects.get(str(name))
+        return thing is not None and thing.is_a("person")
+
+    # --- what doing ------------------------------------------------------------------------------
+    def _doing(self, subjects: Sequence[str]) -> QuestionReply:
+        robots = subjects or sorted(self._state.robots)
+        work: dict[str, list[str]] = {robot: [] for robot in robots}
+        for plan, entry in self._state.plans.items():
+            for record in entry.outstanding():
+                if record.robot in work:
+                    args = ", ".join(v for v in record.args.values() if v != record.robot)
+                    work[record.robot].append(f"{record.skill}({args}) for {plan}")
+        rows = [f"{robot}: {', '.join(tasks) or 'nothing'}" for robot, tasks in work.items()]
+        return QuestionReply(answer="; ".join(rows) or "no robot is known", subjects=tuple(robots))
+
+
+def _bound(condition: Condition, subject: str) -> Condition:
+    if condition.subject != ANYBODY:
+        return condition
+    return replace(condition, subject=subject, any_of=())
+
+
+def _ago(seconds: float) -> str:
+    for size_s, unit in ((86_400.0, "d"), (3_600.0, "h"), (60.0, "min")):
+        if seconds >= 2 * size_s:
+            return f"{seconds / size_s:.0f} {unit}"
+    return f"{seconds:.0f} s"

@@ -1,0 +1,85 @@
+"""Questions are answered from what is believed, with who said so and how long ago."""
+
+from __future__ import annotations
+
+from fleet.core import events
+from fleet.core.answering import answer
+from keyexpr_schema.facts import AT
+from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.questions import QuestionQuery, QuestionReply
+from keyexpr_schema.payloads.world import Fact
+from tests.support.fleet_model import FleetModel, fleet
+
+
+def _asked(model: FleetModel, text: str) -> QuestionReply:
+    return answer(model.state, QuestionQuery(text=text))
+
+
+def _told(model: FleetModel, subject: str, value: str | None) -> None:
+    fact = Fact(subject=subject, relation=AT, value=value, source="anna", time_s=model.state.time_s)
+    model.receive(events.FactPut, fact=fact)
+
+
+def test_where_a_thing_is_with_who_said_so() -> None:
+    model = fleet()
+    _told(model, "cup_1", "hallway")
+    reply = _asked(model, "Where is cup 1?")
+    assert reply.subjects == ("cup_1",)
+    assert "in the hallway" in (reply.answer or "").casefold()
+    (fact,) = reply.facts
+    assert (fact.value, fact.source) == ("hallway", "anna")
+    assert fact.age_s >= 0.0
+    assert reply.offer is None
+
+
+def test_what_nobody_knows_comes_with_a_goal_that_would_find_out() -> None:
+    model = fleet()
+    _told(model, "cup_1", None)
+    reply = _asked(model, "Where is cup 1?")
+    assert "nobody knows where" in (reply.answer or "")
+    assert reply.offer == "find cup_1"
+    model.receive(events.GoalPut, goal=Goal(goal="g", text=reply.offer))
+    assert model.goal_states["g"].reason is None
+
+
+def test_how_many_and_which_count_those_that_are_known() -> None:
+    model = fleet()
+    _told(model, "cup_1", "hallway")
+    _told(model, "cup_2", "hallway")
+    reply = _asked(model, "How many cups are in the hallway?")
+    assert reply.subjects == ("cup_1", "cup_2")
+    assert (reply.answer or "").startswith("2:")
+    _told(model, "cup_2", None)
+    reply = _asked(model, "Which cups are in the hallway?")
+    assert reply.subjects == ("cup_1",)
+    assert "nobody knows" in (reply.answer or "")
+
+
+def test_whether_something_is_so_is_yes_no_or_unknown() -> None:
+    model = fleet()
+    _told(model, "cup_1", "hallway")
+    assert _asked(model, "Is cup 1 in the hallway?").holds is True
+    assert _asked(model, "Is cup 1 in the kitchen?").holds is False
+    _told(model, "cup_1", None)
+    unknown = _asked(model, "Is cup 1 in the kitchen?")
+    assert unknown.holds is None
+    assert unknown.offer == "find cup_1"
+
+
+def test_who_has_a_thing_and_what_robots_do() -> None:
+    model = fleet()
+    _told(model, "cup_1", "locobot")
+    assert _asked(model, "Who has cup 1?").subjects == ("locobot",)
+    assert _asked(model, "What are you doing?").answer is not None
+    model.plan(Goal(goal="g", text="Bring cup 2 to the hallway"))
+    reply = _asked(model, "What is the hsr doing?")
+    assert "plan-1" in (reply.answer or "")
+
+
+def test_what_is_no_question_is_said_so() -> None:
+    model = fleet()
+    assert "robotctl goal add" in (_asked(model, "Bring cup 1 to the hallway").reason or "")
+    assert _asked(model, "Where is the unicorn?").answer is None
+    assert "unicorn" in (_asked(model, "Where is the unicorn?").reason or "")
+    reply = answer(model.state, QuestionQuery(text="Where is my cup?", speaker="nobody"))
+    assert "nobody" in (reply.reason or "")

@@ -1,0 +1,193 @@
+"""What sentences mean besides a goal that is reached once: times, who, questions, choices."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from fleet.errors import BadLanguageFile, NotUnderstood
+from fleet.language import Ambiguity, read, read_goal
+from fleet.language.words.wordbook import read_language
+from tests.support.language_flat import FURNISHED
+from tests.support.language_flat_said import SPOKEN, told
+
+NOW = datetime(2026, 3, 4, 9, 30, tzinfo=UTC)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("Get me the cup in the fridge", "at(cup_2) = anna"),
+        ("Bring me the cup on the kitchen table", "at(cup_1) = anna"),
+        ("Bring the lamp on the coffee table to the kitchen", "at(lamp) = kitchen"),
+        ("I'd like the fork", "at(fork) = anna"),
+        ("Anna needs a cup", "at(cup_1 or cup_2) = anna"),
+        ("Wash the cups", "clean(cup_1) = true and clean(cup_2) = true"),
+        ("Rinse the first cup off", "clean(cup_1) = true"),
+        ("Clean the dirty cup", "clean(cup_1) = true"),
+        ("Bring a clean cup to the hallway", "at(cup_2) = hallway"),
+        ("The first cup should be clean", "clean(cup_1) = true"),
+        ("Bring all cups but the first one to the hallway", "at(cup_2) = hallway"),
+        ("Lamp off", "is_on(lamp) = false"),
+        ("That lamp on the coffee table, switch it off", "is_on(lamp) = false"),
+        ("First close the fridge, then the cupboard",
+         "is_open(fridge) = false, then is_open(cupboard) = false"),
+        ("Close the fridge before you switch off the lamp",
+         "is_open(fridge) = false, then is_on(lamp) = false"),
+        ("After closing the fridge go to the hallway",
+         "is_open(fridge) = false, then at(hsr or locobot) = hallway"),
+        ("Open the fridge, put the fork inside and close it",
+         "is_open(fridge) = true and in(fork) = fridge, then is_open(fridge) = false"),
+        ("Put the fork into the fridge and close it",
+         "in(fork) = fridge and is_open(fridge) = false"),
+        ("Keep the fridge closed", "always is_open(fridge) = false"),
+        ("The fridge should stay closed", "always is_open(fridge) = false"),
+        ("The lamp should always be on", "always is_on(lamp) = true"),
+        ("Never open the cupboard", "never is_open(cupboard) = true"),
+        ("The hsr must never go to the hallway", "never at(hsr) = hallway"),
+        ("Go to the hallway without entering the kitchen",
+         "at(hsr or locobot) = hallway, never at(hsr) = kitchen, never at(locobot) = kitchen"),
+        ("If the fridge is open, close it", "is_open(fridge) = false, when is_open(fridge) = true"),
+        ("Close the fridge if it is open", "is_open(fridge) = false, when is_open(fridge) = true"),
+        ("Should the lamp be on, switch it off", "is_on(lamp) = false, when is_on(lamp) = true"),
+        ("Unless the lamp is on, switch it on", "is_on(lamp) = true, when is_on(lamp) = false"),
+        ("Switch on the lamp at 5 pm", "is_on(lamp) = true | not_before_s 27000"),
+        ("Switch on the lamp in ten minutes", "is_on(lamp) = true | not_before_s 600"),
+        ("Close the fridge before noon", "is_open(fridge) = false | due_s 9000"),
+        ("The fridge should be closed by 11", "is_open(fridge) = false | due_s 5400"),
+        ("Close the fridge every evening", "is_open(fridge) = false, every 0 18 * * *"),
+        ("On weekdays at 6:45, close the fridge", "is_open(fridge) = false, every 45 6 * * 1-5"),
+        ("Hoover the hallway every two hours", "vacuumed(hallway) = true, every PT2H"),
+        ("Bring the fork to the kitchen at once", "at(fork) = kitchen | priority 1"),
+        ("No rush, but close the fridge", "is_open(fridge) = false | priority -1"),
+        ("HSR, bring the fork to the kitchen", "at(fork) = kitchen | by hsr"),
+        ("Have the locobot close the fridge", "is_open(fridge) = false | by locobot"),
+    ],
+)  # fmt: skip
+def test_goals_say_more_than_what_is_reached(text: str, expected: str) -> None:
+    assert told(read(text, SPOKEN, NOW)) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("The fork is in the bowl. Bring it to the hallway",
+         "at(fork) = bowl is so; at(fork) = hallway"),
+        ("I am in the kitchen. Bring the fork here",
+         "at(anna) = kitchen is so; at(fork) = kitchen"),
+        ("The lamp is not on", "is_on(lamp) = false is so"),
+        ("Somebody left the fridge open", "is_open(fridge) = true is so"),
+        ("Anna has washed the first cup", "clean(cup_1) = true is so"),
+        ("We moved the lamp to the hallway", "at(lamp) = hallway is so"),
+    ],
+)  # fmt: skip
+def test_facts_are_said_in_the_same_breath(text: str, expected: str) -> None:
+    assert told(read(text, SPOKEN, NOW)) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "of", "subjects", "holds"),
+    [
+        ("Where is the fork?", "where", ["fork"], []),
+        ("Which room is the fork in?", "where", ["fork"], []),
+        ("How many cups are in the kitchen?", "how many", ["cup_1", "cup_2"], ["at(?) = kitchen"]),
+        ("Which cups are dirty?", "which", ["cup_1", "cup_2"], ["clean(?) = false"]),
+        ("What is in the fridge?", "which", [], ["in(?) = fridge"]),
+        ("Is the fridge open?", "whether", [], ["is_open(fridge) = true"]),
+        ("Who has the fork?", "who", [], ["at(fork) = ?"]),
+        ("What are you doing?", "what doing", [], []),
+        ("What is the hsr doing?", "what doing", ["hsr"], []),
+    ],
+)
+def test_questions_are_data(text: str, of: str, subjects: list[str], holds: list[str]) -> None:
+    reading = read(text, SPOKEN, NOW)
+    assert not isinstance(reading, Ambiguity)
+    assert reading.question is not None
+    assert reading.question.of == of
+    assert list(reading.question.subjects) == subjects
+    assert list(map(str, reading.question.holds)) == holds
+    assert not reading.goals
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("Bring the cup to the hallway", "asks at(cup_1) = hallway | at(cup_2) = hallway"),
+        ("Put the fork on the table", "asks on(fork) = coffee_table | on(fork) = kitchen_table"),
+    ],
+)
+def test_what_can_be_several_things_is_asked(text: str, expected: str) -> None:
+    reading = read(text, SPOKEN, NOW)
+    assert told(reading) == expected
+    assert isinstance(reading, Ambiguity)
+    assert "could be" in reading.sentence
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("Bring the zorgle to the kitchen", "'the zorgle' is not a known object"),
+        ("Zorgle the fork", "'Zorgle' is not understood as a goal"),
+        ("Bring the fork to the kitchen with a zorgle", "'a zorgle' is not a known"),
+        ("Turn off the lamb", "'the lamb' is not a known object (did you mean 'lamp'?)"),
+        ("Put the fork under the coffee table", "'under' names a relation that is not known"),
+        ("The fridge might be open", "'might' is uncertain"),
+        ("Close the fridge until noon", "'until' makes it depend on something else"),
+        ("Throw away the fork", "no bin is known to throw it into"),
+        ("Vacuum Anna", "anna is no place"),
+    ],
+)
+def test_refusals_name_what_is_not_understood_first(text: str, says: str) -> None:
+    with pytest.raises(NotUnderstood) as refused:
+        read(text, SPOKEN, NOW)
+    assert str(refused.value).startswith(says) or says in str(refused.value)
+    assert str(refused.value).count(", ") < 8
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["Keep the fridge closed", "If the fridge is open, close it", "HSR, bring the fork to the box",
+     "Switch on the lamp at 5 pm", "The fork is in the bowl. Bring it to the hallway"],
+)  # fmt: skip
+def test_a_goal_that_is_reached_once_has_none_of_that(text: str) -> None:
+    with pytest.raises(NotUnderstood):
+        read_goal(text, FURNISHED)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["x " * 100_000, "a" * 120_000, "bring the fork to the kitchen and " * 3_000, "fork " * 200],
+)
+def test_what_is_too_long_is_refused_at_once(text: str) -> None:
+    with pytest.raises(NotUnderstood, match=r"at most|too many"):
+        read(text, SPOKEN)
+
+
+def test_words_can_be_added(tmp_path: Path) -> None:
+    own = tmp_path / "own.yaml"
+    own.write_text("verbs: {move: [schlep]}\nPOLITE: [prithee]\n", encoding="utf-8")
+    words = replace(SPOKEN, language=read_language(own))
+    assert told(read("Prithee schlep the fork to the kitchen", words)) == "at(fork) = kitchen"
+    with pytest.raises(NotUnderstood, match="'Prithee' is not understood"):
+        read("Prithee schlep the fork to the kitchen", SPOKEN)
+
+
+@pytest.mark.parametrize(
+    ("written", "says"),
+    [
+        ("[", "cannot be read"),
+        ("- a", "there must be a mapping"),
+        ("NOSUCH: [a]", "there is no 'NOSUCH'"),
+        ("POLITE: please", "must be a list of phrases"),
+    ],
+)
+def test_a_file_of_words_that_is_wrong_is_refused(tmp_path: Path, written: str, says: str) -> None:
+    own = tmp_path / "own.yaml"
+    own.write_text(written, encoding="utf-8")
+    with pytest.raises(BadLanguageFile) as refused:
+        read_language(own)
+    assert says in str(refused.value)
+    assert "\n" not in str(refused.value)

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from fleet.planners.deordering import deordered as deordered
     from fleet.planners.llm.interpreter import LlmInterpreter as LlmInterpreter
     from fleet.planners.llm.planner import LlmPlanner as LlmPlanner
+    from fleet.planners.programs.base import ProgramTask as ProgramTask
+    from fleet.planners.programs.base import ProgramWriter as ProgramWriter
     from fleet.planners.symbolic.planner import SymbolicPlanner as SymbolicPlanner
 else:
     __all__, __getattr__, __dir__ = lazy_names(
@@ -22,6 +24,7 @@ else:
             "deordering": "ActionSequence deordered",
             "llm.interpreter": "LlmInterpreter",
             "llm.planner": "LlmPlanner",
+            "programs.base": "ProgramTask ProgramWriter",
             "symbolic.planner": "SymbolicPlanner",
             ".core.checker.plan_checker": "CheckedPlan",
         },

@@ -5,6 +5,7 @@ An installed package adds its own as plug-ins; one that is broken is logged and 
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,13 +24,20 @@ from fleet.llm.conversation import LanguageModel
 from fleet.planners.base import Planner
 from fleet.planners.llm.interpreter import LlmInterpreter
 from fleet.planners.llm.planner import LlmPlanner
+from fleet.planners.programs.base import ProgramWriter
+from fleet.planners.programs.model import ModelWriter
 from fleet.planners.symbolic.planner import SymbolicPlanner
+from keyexpr_schema.errors import BrokenPlugIn
 from keyexpr_schema.ids import Id
-from keyexpr_schema.plug_ins import load_plug_ins
+from keyexpr_schema.plug_ins import load_plug_in, load_plug_ins, plug_in_names
 
 PLANNERS = "robotfleet.planners"
 ALLOCATORS = "robotfleet.allocators"
-"""Entry-point groups: each entry is a class (of a `Planner`, an `Allocator`) without arguments."""
+PROGRAM_WRITERS = "robotfleet.program_writers"
+"""Entry-point groups: each entry is a class (of a `Planner`, an `Allocator`, a `ProgramWriter`)
+without arguments. A writer of programs is named for the model of the robots that it writes for."""
+
+_log = logging.getLogger("robotfleet.plug_ins")
 
 
 @dataclass(frozen=True)
@@ -41,6 +49,9 @@ class Composition:
     language_model: LanguageModel
     interpreter: LlmInterpreter
     feasibility: Planner
+    model_writer: ProgramWriter
+    program_writers: Mapping[str, ProgramWriter]
+    """Those that robots bring, by the robot's model."""
 
     @property
     def strategies(self) -> tuple[str, ...]:
@@ -72,7 +83,33 @@ def compose(llm_file: Path | None = None) -> Composition:
     allocators = {allocator.name: allocator for allocator in own}
     load_plug_ins(PLANNERS, lambda offered: _add(offered, Planner, planners))
     load_plug_ins(ALLOCATORS, lambda offered: _add(offered, Allocator, allocators))
-    return Composition(planners, allocators, model, LlmInterpreter(model), symbolic)
+    return Composition(
+        planners,
+        allocators,
+        model,
+        LlmInterpreter(model),
+        symbolic,
+        ModelWriter(model),
+        _program_writers(),
+    )
+
+
+def _program_writers() -> dict[str, ProgramWriter]:
+    """The writers that installed packages bring, by the name of their entry point."""
+
+    def accept(offered: Any) -> ProgramWriter:
+        if not isinstance(made := offered(), ProgramWriter):
+            raise TypeError(f"it makes {made!r}, which is no ProgramWriter")
+        msgspec.convert(getattr(made, "name", None), Id)
+        return made
+
+    found: dict[str, ProgramWriter] = {}
+    for name in plug_in_names(PROGRAM_WRITERS):
+        try:
+            found[name] = load_plug_in(PROGRAM_WRITERS, name, accept)
+        except BrokenPlugIn as error:
+            _log.warning("%s", error)
+    return found
 
 
 def _add(offered: Any, kind: type[Planner] | type[Allocator], known: dict[str, Any]) -> None:

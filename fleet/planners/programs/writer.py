@@ -6,6 +6,7 @@ to be looked for first, it looks round by round, and goes on as planned for wher
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as changed
@@ -19,6 +20,7 @@ from fleet.core.model.task_graph import TaskGraph
 from fleet.core.model.world import WorldModel
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import MONOLITHIC, NoPlan, Planner, PlanningProblem
+from fleet.planners.programs.base import ProgramTask, ProgramWriter
 from fleet.planners.programs.text import Steps, Writer, branches, written
 from keyexpr_schema.facts import AT, FactKey, Value
 from keyexpr_schema.ids import actor_arg
@@ -26,14 +28,20 @@ from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan, Task
 from keyexpr_schema.payloads.programs import Program, ProgramStep
 
+_log = logging.getLogger(__name__)
+
 MADE_BY = "symbolic"
 MOST_HYPOTHESES = 40
 """Where something may be found that has to be looked for; beyond them a program plans anew."""
 Stages = tuple[tuple[Condition, ...], ...]
 
 
+Writers = Mapping[str, Sequence[ProgramWriter]]
+"""By the model of a robot, who is asked for its programs before the symbolic writer is."""
+
+
 def with_programs(
-    plan: Plan, world: WorldModel, planner: Planner, budget: TimeBudget
+    plan: Plan, world: WorldModel, planner: Planner, budget: TimeBudget, writers: Writers
 ) -> Plan | NoPlan:
     """The plan with a program for every sentence that has none yet, for a robot that can run it."""
     tasks: list[Task] = []
@@ -43,7 +51,8 @@ def with_programs(
         if program is not None and not program.code:
             facts = _facts_before(plan, task, world)
             pinned = pins.get(task.actor)
-            made = _for_some_robot(program, changed(world, facts=facts), pinned, planner, budget)
+            now = changed(world, facts=facts)
+            made = _for_some_robot(program, now, pinned, planner, budget, writers)
             if isinstance(made, NoPlan):
                 return made
             pins[task.actor], program = made
@@ -53,14 +62,25 @@ def with_programs(
 
 
 def _for_some_robot(
-    program: Program, world: WorldModel, pinned: str | None, planner: Planner, budget: TimeBudget
+    program: Program,
+    world: WorldModel,
+    pinned: str | None,
+    planner: Planner,
+    budget: TimeBudget,
+    writers: Writers,
 ) -> tuple[str, Program] | NoPlan:
     refusal: NoPlan | None = None
     for robot in (pinned,) if pinned is not None else world.team:
         if robot not in world.available:
-            made: Program | NoPlan = NoPlan(f"{robot} is not connected")
-        else:
-            made = write_program(program, world, robot, planner, budget)
+            refusal = refusal or NoPlan(f"{robot} is not connected")
+            continue
+        alone = changed(world, available=frozenset({robot}))
+        for writer in writers.get(world.robots[robot].model, ()):
+            written = writer.write(ProgramTask(program, alone, robot))
+            if isinstance(written, Program):
+                return robot, written
+            _log.info("%s", written.reason)
+        made = write_program(program, alone, robot, planner, budget)
         if isinstance(made, Program):
             return robot, made
         refusal = refusal or made

@@ -22,8 +22,9 @@ from fleet.planners.contradictions import contradictions, reasons_of
 from fleet.planners.mission_bound import mission_bound_s
 from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
 from fleet.planners.plan_repair import repair_plan
+from fleet.planners.programs.base import ProgramWriter
 from fleet.planners.programs.joining import joined
-from fleet.planners.programs.writer import with_programs
+from fleet.planners.programs.writer import Writers, with_programs
 from fleet.service.composition import Composition
 from fleet.service.planning.job_context import context_of, robots_under_way
 from keyexpr_schema.payloads.plans import Plan
@@ -96,8 +97,24 @@ def _result(
     if planner is None:
         choices = ", ".join(sorted(composition.planners))
         return NoPlan(f"there is no planner {job.planner}: choose one of {choices}")
-    run = _Run(given, given.world(), planner, composition.feasibility, allocator, budget, limit)
+    world = given.world()
+    writers = _writers(composition, world, with_model=planner.name == composition.model_writer.name)
+    feasibility = composition.feasibility
+    run = _Run(given, world, planner, feasibility, allocator, budget, limit, writers)
     return run.repaired() or run.planned()
+
+
+def _writers(composition: Composition, world: WorldModel, with_model: bool) -> Writers:
+    """Who writes programs: a robot's own writer first, then, in a plan of the language model's, the
+    language model."""
+    found: dict[str, tuple[ProgramWriter, ...]] = {}
+    for spec in world.robots.values():
+        own = composition.program_writers.get(spec.model)
+        found[spec.model] = (
+            *((own,) if own is not None else ()),
+            *((composition.model_writer,) if with_model else ()),
+        )
+    return found
 
 
 def _goals_for_robots(
@@ -153,6 +170,7 @@ class _Run:
     allocator: Allocator
     budget: TimeBudget
     limit: TimeBudget
+    writers: Writers
 
     def repaired(self) -> PlanningSucceeded | None:
         """The residual plan, repaired if need be, with another allocation, if that will do."""
@@ -242,7 +260,9 @@ class _Run:
         job = self.given.job
         if job.proposal is not None:
             proposed = self._with_goal_conditions(job.proposal)
-            written = with_programs(proposed, self.world, self.feasibility, self.budget)
+            written = with_programs(
+                proposed, self.world, self.feasibility, self.budget, self.writers
+            )
             if isinstance(written, NoPlan):
                 return written
             checked = check_plan(written, self.world)

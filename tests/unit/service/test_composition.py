@@ -14,7 +14,7 @@ from tests.support.plug_in_site import plug_in_site
 CODE = """
 from pathlib import Path
 from fleet.allocators import Assignment, RoundRobinAllocator
-from fleet.planners import NoPlan, Planner
+from fleet.planners import NoPlan, Planner, ProgramWriter
 
 class Lazy(Planner):
     name, strategies = "lazy", ("siesta",)
@@ -33,6 +33,11 @@ class Nameless(RoundRobinAllocator):
 class Impostor(Lazy):
     name = "symbolic"
 
+class Scribe(ProgramWriter):
+    name = "scribe"
+    def _write(self, task):
+        return "navigate('kitchen')"
+
 class OneWord(Lazy):
     name, strategies = "one-word", "siesta"
 
@@ -48,6 +53,7 @@ ENTRIES = {
         "one-word": "OneWord",
     },
     "robotfleet.allocators": {"turns": "Turns", "lazy": "Lazy", "nameless": "Nameless"},
+    "robotfleet.program_writers": {"hsr": "Scribe", "locobot": "Lazy"},
     "robotfleet.skill_models": {"wave": "FILE", "again": "AGAIN"},
 }
 WAVE = "skills: {wave: {parameters: {robot: robot}, after: [waved(robot) = true]}}\n"
@@ -70,7 +76,8 @@ def test_sound_plug_ins_are_there_and_each_broken_one_is_named(
     assert {"makespan", "turns"} <= set(made.allocators) and "lazy" not in made.allocators
     assert {"navigate", "wave"} <= set(load_all_skills())
     warnings = [record.getMessage() for record in caplog.records]
-    assert len(warnings) == 7
+    assert [writer.name for writer in made.program_writers.values()] == ["scribe"]
+    assert len(warnings) == 8
     for entry, what in (
         ("theirs:Needy as 'needy'", "missing 1 required positional argument: 'wish'"),
         ("theirs:Turns as 'turns' in robotfleet.planners", "which is no Planner"),
@@ -78,6 +85,7 @@ def test_sound_plug_ins_are_there_and_each_broken_one_is_named(
         ("theirs:Impostor as 'impostor'", "there is a Planner called 'symbolic' already"),
         ("theirs:OneWord as 'one-word'", "Expected `array`, got `str`"),
         ("theirs:Nameless as 'nameless'", "Expected `str`, got `null`"),
+        ("theirs:Lazy as 'locobot'", "which is no ProgramWriter"),
         ("theirs:AGAIN as 'again'", "skill wave is already modelled elsewhere"),
     ):
         (warning,) = [each for each in warnings if entry in each]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import MutableMapping, Sequence
 from contextlib import suppress
@@ -33,6 +34,8 @@ MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 80
 _CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
+_NAMING = re.compile(r"not a known|as a goal")
+"""What a refusal says that names a word nobody knows."""
 _READINGS = 12
 """Readings of what was read so far that are followed up."""
 _KEPT: deque[tuple[Vocabulary, Tagger]] = deque(maxlen=4)
@@ -164,7 +167,8 @@ class Reader:
             found = self._each(which, segment, states)
         if not found:
             strange = [w for w in segment.words if "UNK" in w.tags]
-            if not problems or (strange and strange[0].text not in str(which)):
+            named = strange and strange[0].text in str(which) and _NAMING.search(str(which))
+            if not problems or (strange and not named):
                 raise self.why.ungrammatical(segment, 0)
             raise min(problems, key=lambda row: row[0])[1]
         found.sort(key=lambda state: state.cost)

@@ -40,6 +40,8 @@ class Explanations:
 
     def unheard_of(self, segment: Segment) -> None:
         """Whether a word stands there that is refused wherever it stands."""
+        if any("UNK" in w.tags and not reason_for([(w.word, w.text)]) for w in segment.words):
+            return  # what nobody knows comes first
         for word in segment.words:
             if word.tags & {"UNK", "UNTIL", "MIGHT"} and (
                 special := reason_for([(word.word, word.text)], self.what())
@@ -52,7 +54,8 @@ class Explanations:
         strange = [i for i, w in enumerate(words) if "UNK" in w.tags or w.tags <= {"USE"}]
         example = SAY_IT if self.mode == "fact" else EXAMPLE
         if strange:
-            at = strange[0]
+            unheard = [i for i in strange if not reason_for([(words[i].word, words[i].text)])]
+            at = (unheard or strange)[0]
         elif at >= len(words) and "PREP" in words[-1].tags:
             known = listed(self.tagger.lexicon.known(("place",)))
             return NotUnderstood(

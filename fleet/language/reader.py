@@ -333,6 +333,9 @@ class Reader:
             if time.after_s is None and now is None:
                 raise NotUnderstood("a time of day is named, and what time it is now is not known")
             seconds = time.after_s if now is None or time.after_s is not None else time.seconds(now)
+            if time.until is not None and now is not None:
+                end = replace(time, hour=time.until[0], minute=time.until[1])
+                goal = replace(goal, due_s=end.seconds(now))
             if time.kind == "due" or (time.hour is not None and not said.done):
                 goal = replace(goal, due_s=seconds)
             else:

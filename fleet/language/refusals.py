@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from rapidfuzz import fuzz, process
+from rapidfuzz.distance import OSA
 
 _NEAR = 75
+_SHORT, _LONG = 3, 7
 _SHOWN = 5
 """Names that a refusal lists."""
 
@@ -82,11 +84,15 @@ def reason_for(words: Iterable[tuple[str, str]], what: str = "a goal") -> str | 
 
 
 def suggestion(phrase: str, names: Iterable[str]) -> str:
-    """` (did you mean 'hallway'?)` for a near miss, else nothing."""
-    close = process.extractOne(
-        phrase.casefold(), sorted(set(names)), scorer=fuzz.ratio, score_cutoff=_NEAR
-    )
-    return f" (did you mean {close[0]!r}?)" if close else ""
+    """` (did you mean 'hallway'?)` for a near miss, else nothing.
+
+    One letter of a short word may be wrong or two neighbours swapped, two in a long one.
+    """
+    said = phrase.casefold()
+    known = sorted(set(names) - {said})
+    slips = 1 if len(said) < _LONG else 2
+    close = process.extractOne(said, known, scorer=OSA.distance, score_cutoff=slips)
+    return f" (did you mean {close[0]!r}?)" if close and len(said) > _SHORT else ""
 
 
 def nearest(names: Sequence[str], phrase: str) -> str:

@@ -142,6 +142,8 @@ def _opens(rest: Sequence[Lexeme]) -> bool:
         rest = rest[1:]
     if not rest:
         return False
+    if len(rest) > 1 and "ORD" in rest[0].tags and "VERB" in rest[1].tags:
+        rest = rest[1:]
     tags = rest[0].tags
     if tags & _OPENING:
         return True

@@ -27,6 +27,8 @@ class Discourse:
     """Whom "it" and "them" may mean."""
     mentioned: list[Mention] = field(default_factory=list)
     """Whom "the other cup" does not mean."""
+    named: list[tuple[str, ...]] = field(default_factory=list)
+    """Whom and what was named, the last one last: "the bowl" is the one that was named."""
     kind_of: Entity | None = None
     """Of whose kind "the second one" is."""
     kind_type: EntityType = "object"
@@ -72,6 +74,7 @@ class Discourse:
             draft=self.draft.copy(),
             recent=list(self.recent),
             mentioned=list(self.mentioned),
+            named=list(self.named),
             moved=list(self.moved),
             addressees=list(self.addressees),
             facts=dict(self.facts),
@@ -111,6 +114,8 @@ class Discourse:
         self.mentioned.extend(mentions)
         for mention in mentions:
             self.spoken_of(mention.subjects)
+            if not mention.open:
+                self.named.append(mention.subjects)
         if len(mentions) > 1 and not any(m.open for m in mentions):
             names = tuple(dict.fromkeys(s for m in mentions for s in m.subjects))
             self.recent = [Mention(names, mentions[0].type, mentions[0].key)]

@@ -105,9 +105,9 @@ class NounResolver:
             return made
         if made.ordinal is not None or made.count is not None or len(made.names) < 2:
             return made
-        for mention in reversed(self.scene.said.mentioned):
-            named = [name for name in made.names if name in mention.subjects]
-            if len(named) == 1 and not mention.open and len(mention.subjects) == 1:
+        for subjects in reversed(self.scene.said.named):
+            named = [name for name in made.names if name in subjects]
+            if len(named) == 1 == len(subjects):
                 return made.among(named)
             if named:
                 return made
@@ -283,6 +283,8 @@ class NounResolver:
             raise NotUnderstood(f"{made.text!r}: {one_of(stray)} is none of {one_of(made.names)}")
         left = made.among(names - gone)
         several = made.quantity is Quantity.ALL or (made.quantity is Quantity.THE and made.plural)
+        if made.quantity is Quantity.ANY and not made.plural and left.found:
+            return left
         if not left.found or not several or made.count is not None:
             raise NotUnderstood(f"{made.text!r} leaves nothing, or does not say all of what")
         return replace(left, quantity=Quantity.ALL)
@@ -339,7 +341,7 @@ class NounResolver:
         strange = [word for word in noun.head if "UNK" in word.tags]
         shown = self.scene.said.quote(noun.first, noun.last)
         names = self.scene.lexicon.names_in(types) | set(ORDINALS)
-        single = [word.text for word in strange] or shown.split()
+        single = [word.text for word in strange] or [word.text for word in noun.head]
         hint = ""
         for part in (shown, " ".join(words_of(shown)), *single):
             if part.casefold() not in ORDINALS and not hint:

@@ -289,6 +289,8 @@ class PlaceResolver:
                     [n for n in made.names if not self.scene.vocabulary.is_at(n, gone)]
                 )
         where = self.where([self.locative(place) for place in places])
+        for name in filter(None, (where.source, where.target)):
+            self.scene.said.named.append((name,))
         return replace(
             made,
             source=where.target or where.source,
@@ -342,6 +344,7 @@ class PlaceResolver:
             if mention.open or mention.type not in PLACES:
                 raise NotUnderstood(f"it does not say which place: {EXAMPLE}")
             surfaces = subject.surfaces
+            self.scene.said.named.append(mention.subjects)
             mentions.append(replace(mention, surfaces=surfaces))
         return mentions
 

@@ -13,6 +13,7 @@ from fleet.language.tree.nodes import (
     Noun,
     Quantity,
 )
+from keyexpr_schema.payloads.world import Feature
 
 _PLURAL = frozenset({"them", "they", "these", "those", "both", "all", "each"})
 PERSONAL = frozenset({"him", "her", "he", "she"})
@@ -42,6 +43,17 @@ class Pronouns:
             )
         return NounPhrase(found, text, noun.first, exact=True)
 
+    def _vessel(self, meant: Sequence[Mention]) -> str | None:
+        """What can be moved, and something was put in or on it just now: "it" may be either."""
+        carrier = self.scene.said.carrier
+        thing = self.scene.vocabulary.objects.get(carrier or "")
+        if thing is None or len(meant) != 1 or len(meant[0].subjects) != 1:
+            return None
+        placed = self.scene.said.draft.stages[-1][-1:]
+        just = [wish for wish in placed if wish.value == carrier]
+        movable = thing.is_a(Feature.MOVABLE) and thing.object not in meant[0].subjects
+        return thing.object if just and movable else None
+
     def pronoun(self, noun: Noun, types: Sequence[EntityType]) -> Mention:
         """Whom a pronoun means.
 
@@ -53,13 +65,19 @@ class Pronouns:
         if word in PERSONAL and said.person is not None:
             return Mention((said.person,), "object", noun.first)
         if (chosen := said.chosen.get(noun.first)) is not None:
-            of_type = next(m.type for m in said.recent if chosen in m.subjects)
+            types_of = [m.type for m in said.recent if chosen in m.subjects]
+            of_type: EntityType = types_of[0] if types_of else "object"
             return Mention((chosen,), of_type, noun.first)
         if "object" not in types and "place" in types and word == "it" and said.last_place:
             return Mention((said.last_place,), "place", noun.first)
         plural = word in _PLURAL or len(noun.words) > 1
         meant = [m for m in self.scene.said.recent if m.single != plural or m.each]
         count = 2 if word == "both" else int(word) if word.isdecimal() else None
+        if word == "it" and (vessel := self._vessel(meant)) is not None:
+            text = self.scene.said.quote(noun.first, noun.last)
+            either_of = (*meant[0].subjects, vessel)
+            sentence = f"{text!r} could be {one_of(either_of)}: name what you mean"
+            raise WhichOne(sentence, noun.first, either_of)
         if len(meant) == 1 and count in (None, len(meant[0].subjects)):
             return meant[0]
         names = sorted({s for m in self.scene.said.recent for s in m.subjects})

@@ -145,6 +145,7 @@ class Wishes:
         subject = self.nouns.subject(frame.themes[0].items[0], THINGS, "a robot")
         mention = subject if isinstance(subject, Mention) else subject.resolve()
         name = mention.subjects[0]
+        self.scene.said.spoken_of(mention.subjects)
         if mention.open or len(mention.subjects) != 1:
             text = subject.text if isinstance(subject, NounPhrase) else self.scene.said.clause
             raise NotUnderstood(f"{text!r} does not say which {mention.type}: name it")
@@ -206,6 +207,8 @@ class Wishes:
         locatives, home = self.locatives(frame)
         where = self.places.where(locatives, fetching)
         good_for = self.scene.vocabulary.good_for.get(where.target or "", frozenset())
+        for name in filter(None, (where.source, where.target)):
+            self.scene.said.named.append((name,))
         if good_for - {Feature.PERSON}:
             self.scene.said.carrier = where.target
         if where.each and not each:

@@ -76,6 +76,7 @@ class NounBuilder:
 
     def make_np(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         noun = children[0]
+        children = tuple(c for c in children if not (isinstance(c, Lexeme) and "COMMA" in c.tags))
         if len(children) == 2:
             return replace(noun, relatives=(*noun.relatives, children[1]))
         if len(children) < 3:

@@ -33,6 +33,8 @@ class TimePhrase:
     weekday: int | None = None
     every_s: float | None = None
     part: str = ""
+    until: tuple[int, int] | None = None
+    """Hour and minute by which it shall be done: "between 10 and 11"."""
     exact: bool = True
     """Whether the half of the day was said."""
 
@@ -178,6 +180,12 @@ def _of_day(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
         clock_at = _clock(words, 3) if words[2:3] == ["at"] else None
         hour, minute, end = clock_at or (8, 0, end)
         return end, TimePhrase("start", hour=hour, minute=minute, weekday=day)
+    if words[0] == "between":
+        first = _clock(words, 1, bare=True)
+        last = _clock(words, first[2] + 1, bare=True) if first else None
+        if first and last and words[first[2]] == "and":
+            return last[2], TimePhrase("start", hour=first[0], minute=first[1], until=last[:2])
+        return None
     kinds = {"at": "start", "after": "start", "from": "start", "before": "due", "by": "due"}
     meant = kinds.get(words[0])
     on_clock = _clock(words, 1, bare=True) if meant else None

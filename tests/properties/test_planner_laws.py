@@ -39,6 +39,7 @@ class Undisturbed(RuleBasedStateMachine):
 
     reaches_everything = True
     late = False
+    programs = False
     met: Counter[str] = Counter()
 
     @initialize(
@@ -58,7 +59,7 @@ class Undisturbed(RuleBasedStateMachine):
         """Requests, and goals that they want taken in."""
         goals = [bring(n, rooms[n - 1]) for n in range(1, cups + 1)]
         for share in [goals] if together else [[goal] for goal in goals]:
-            self.model.plan(*share)
+            self.model.plan(*share, programs=self.programs)
         if first and self.model.answers:
             self.model.answer(first)
 
@@ -116,6 +117,23 @@ class Undisturbed(RuleBasedStateMachine):
             skill="navigate",
             args={"to": "kitchen"},
             after=tuple(entry.records)[-1:] if entry is not None and after else (),
+            robot=robot,
+        )
+        self.asked[request.request] = ()
+        self.model.receive(events.ControlRequested, request=request)
+
+    @precondition(lambda self: self.programs)
+    @rule(
+        robot=st.sampled_from(["hsr", "locobot", None]),
+        text=st.sampled_from(["search the hallway", "look around in every room"]),
+    )
+    def a_person_says_a_sentence(self, robot: str | None, text: str) -> None:
+        request = ControlRequest(
+            request=f"say-{len(self.model.journal)}",
+            control=Control.ADD_TASK,
+            plan="plan-1",
+            skill="do",
+            args={"text": text},
             robot=robot,
         )
         self.asked[request.request] = ()
@@ -247,6 +265,18 @@ class Disturbed(Undisturbed):
 def test_the_laws_hold_whatever_comes(machine: type[Undisturbed], examples: int) -> None:
     how = settings(max_examples=examples, stateful_step_count=25, deadline=None)
     run_state_machine_as_test(machine, settings=how)
+
+
+@pytest.mark.parametrize(("machine", "examples"), [(Undisturbed, 20), (Disturbed, 30)])
+def test_the_laws_hold_where_plans_are_carried_out_as_programs(
+    machine: type[Undisturbed], examples: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    met: Counter[str] = Counter()
+    monkeypatch.setattr(machine, "met", met)
+    monkeypatch.setattr(machine, "programs", True)
+    how = settings(max_examples=examples, stateful_step_count=25, deadline=None)
+    run_state_machine_as_test(machine, settings=how)
+    assert met["programs"]
 
 
 @pytest.mark.parametrize(("machine", "examples"), [(Undisturbed, 40), (Disturbed, 50)])

@@ -197,6 +197,7 @@ class FleetModel:
         entry = self.state.plans[order.plan]
         record = entry.records[order.task]
         if new:
+            self.met["programs"] += order.program is not None
             self.met["ordered while a plan was made"] += entry.job is not None
             assert record.goal in (None, *self.state.goals), "ordered for a goal that is no more"
         for before in (*record.after, *record.behind):

@@ -195,12 +195,23 @@ def _with_another_program(entry: PlanEntry, record: TaskRecord, report: Report) 
 
 def _hopeless(state: State, record: TaskRecord, report: Report) -> Hopeless | None:
     """The task's call, if the facts still say that it could be done: what its worker knows better,
-    a new plan has to know, or it would be the same again."""
-    action = action_of(record, state.skills)
+    a new plan has to know, or it would be the same again. Of a program, that call which failed."""
+    reason = report.reason or "it did not say why"
+    if record.program is not None:
+        last = report.program.calls[-1:] if report.program is not None else ()
+        skill = state.skills.get(last[0].name) if last else None
+        if skill is None or last[0].reason is None:
+            return None
+        args = {name: str(value) for name, value in last[0].args.items()}
+        args[skill.actor_parameter] = report.robot
+        reason = last[0].reason
+        action = skill.ground(args) if args.keys() == skill.parameters.keys() else None
+    else:
+        action = action_of(record, state.skills)
     if action is None or unmet_before(action, state.world()) is not None:
         return None
-    reason = report.reason or "it did not say why"
-    return Hopeless(record.skill, record.args, report.robot, reason)
+    name = record.skill if record.program is None else action.skill.name
+    return Hopeless(name, dict(action.args), report.robot, reason)
 
 
 def _interrupted(state: State, entry: PlanEntry, record: TaskRecord, report: Report) -> State:

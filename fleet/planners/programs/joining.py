@@ -60,7 +60,9 @@ def _runs(row: Sequence[Task], checked: CheckedPlan) -> Iterable[list[Task]]:
 
 
 def _is_alone(task: Task, checked: CheckedPlan) -> bool:
-    """Whether it is a call that needs nobody but its robot."""
+    """Whether it is a call that needs nobody but its robot, and any that has the skill will do."""
+    if any(known.skill == task.skill for known in checked.world.hopeless):
+        return False
     return task.program is None and len(checked.actions[task.task].participants) == 1
 
 

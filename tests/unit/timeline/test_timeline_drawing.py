@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from fleet.timeline.clock import Clock, wall_of
+from fleet.timeline.drawing import event_log
 from fleet.timeline.drawing.gantt import Bar, Lane, Lanes, call_text
 from fleet.timeline.drawing.graph import Node, layout
 from fleet.timeline.drawing.palette import Palette
@@ -19,8 +21,9 @@ from fleet.timeline.drawing.trails import CORNERS, Trail
 from fleet.timeline.drawing.utilisation import Utilisation
 from fleet.timeline.drawing.world import World
 from fleet.timeline.reader import rows
+from keyexpr_schema.payloads.programs import ProgramCall, ProgramTrace
 from keyexpr_schema.payloads.robots import RobotActivity, RobotSpec, RobotState
-from keyexpr_schema.payloads.tasks import TaskState
+from keyexpr_schema.payloads.tasks import Report, ReportState, TaskState
 from tests.support.reached import Reached, reaches
 from tests.support.timeline_mission import STEPS, record
 
@@ -237,3 +240,31 @@ def test_a_label_that_is_drawn_anew_keeps_what_the_robot_does(tmp_path: Path) ->
     labels = [row.value for row in rows(path, "/world/robots/hsr/label", "labels")]
     assert ["hsr: pick cup_1"] in labels
     assert ["HSR: pick cup_1"] in labels
+
+
+def test_each_call_of_a_program_is_told_once_where_it_ended() -> None:
+    asked = ProgramCall(
+        number=1, name="ask", args={"relation": "at", "subject": "c"}, line=2, ended_s=1.0
+    )
+    failed = ProgramCall(
+        number=2, name="pick", args={"object": "c"}, line=3, reason="it slipped", ended_s=5.0
+    )
+    base = Report(
+        robot="hsr",
+        plan="p",
+        revision=1,
+        task="t1",
+        attempt=1,
+        epoch=1,
+        incarnation="i",
+        state=ReportState.STARTED,
+    )
+    before = replace(base, program=ProgramTrace(code="…", calls=(asked,)))
+    now = replace(base, program=ProgramTrace(code="…", calls=(asked, failed)))
+    assert list(event_log.calls(before, None)) == [
+        (1.0, (event_log.INFO, "hsr: program line 2: ask(at, c) = unknown"))
+    ]
+    assert list(event_log.calls(now, before)) == [
+        (5.0, (event_log.WARN, "hsr: program line 3: pick(c) failed: it slipped"))
+    ]
+    assert list(event_log.calls(base, None)) == []

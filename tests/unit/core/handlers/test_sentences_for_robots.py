@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from fleet.core import events
 from keyexpr_schema.payloads.plans import PlanState
-from keyexpr_schema.payloads.programs import ProgramEnd, ProgramTrace
+from keyexpr_schema.payloads.programs import ProgramCall, ProgramEnd, ProgramTrace
 from keyexpr_schema.payloads.requests import Answer, Control, ControlRequest
 from keyexpr_schema.payloads.tasks import Order, ReportState, TaskState
 from tests.support.fleet_model import FleetModel, fleet
-from tests.support.household import bring
+from tests.support.household import bring, manipulator
 
 
 def say(model: FleetModel, request: str = "c", /, **args: str) -> Answer:
@@ -123,5 +123,28 @@ def test_a_sentence_that_cannot_be_a_task_is_refused_with_the_reason() -> None:
     for request, (args, sentence) in refusals.items():
         answer = say(model, request, **args)
         assert not answer.accepted and sentence in answer.sentence
+    model.finish()
+    assert model.plans["plan-1"].state is PlanState.SUCCEEDED
+
+
+def test_what_a_call_of_a_program_shows_to_be_hopeless_is_left_to_another_robot() -> None:
+    model = FleetModel((manipulator("r1"), manipulator("r2")), cups=1)
+    model.plan(bring(1, "hallway"), programs=True)
+    (order,) = model.orders()
+    assert order.program is not None
+    other = {"r1": "r2", "r2": "r1"}[order.robot]
+    model.start(order)
+    model.learn(order.robot, "at", "kitchen")
+    call = ProgramCall(
+        number=2,
+        name="pick",
+        args={"object": "cup_1", "place": "kitchen"},
+        reason="too slippery for it",
+        retryable=False,
+    )
+    trace = ProgramTrace(code="…", calls=(call,), end=ProgramEnd.FAILED)
+    model.report(order, ReportState.FAILED, reason="no", retryable=False, program=trace)
+    (again,) = model.wanted()
+    assert again.robot == other
     model.finish()
     assert model.plans["plan-1"].state is PlanState.SUCCEEDED

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from fleet.core.model.derived import holds
 from fleet.core.model.skills import Action
@@ -26,6 +27,13 @@ class Requirement:
     space: int = 0
     """Room needed in its basket, in objects."""
     pinned_to: str | None = None
+
+
+class _Asks(NamedTuple):
+    """Which list of robots comes into question for an actor, and what must hold of its robot."""
+
+    fitting: int
+    facts: frozenset[Left]
 
 
 class Candidates:
@@ -55,30 +63,44 @@ class Candidates:
         self._kinds = list(alike.values())
         self._playable: dict[tuple[object, ...], list[str]] = {}
         fitting = {actor: self._fitting(each) for actor, each in requirements.items()}
+        asks = {
+            actor: _Asks(
+                id(fitting[actor]),
+                frozenset((name, row[0]) for name, row in each.facts.items()),
+            )
+            for actor, each in requirements.items()
+        }
+        first = {asked: actor for actor, asked in reversed(asks.items())}
+        """What many actors ask alike is answered once."""
         unmet = {
-            actor: {robot: list(self._unmet(robot, requirements[actor])) for robot in robots}
-            for actor, robots in fitting.items()
+            asked: {
+                robot: list(self._unmet(robot, requirements[actor])) for robot in fitting[actor]
+            }
+            for asked, actor in first.items()
         }
         offered: dict[str, set[Left]] = {robot: set() for robot in world.team}
-        for actor, rows in unmet.items():
-            for robot, missing in rows.items():
+        for asked, left in {(asks[actor], frozenset(leaves.get(actor, ()))) for actor in asks}:
+            states = {
+                (relation, value)
+                for relation, value in left
+                if not isinstance(value, str) or world.kind_of(value) is None
+            }
+            for robot, missing in unmet[asked].items() if states else ():
                 if not missing:
-                    offered[robot] |= {
-                        (relation, value)
-                        for relation, value in leaves.get(actor, ())
-                        if not isinstance(value, str) or world.kind_of(value) is None
-                    }
-        self.able: dict[str, tuple[str, ...]] = {
-            actor: tuple(
+                    offered[robot] |= states
+        able = {
+            asked: tuple(
                 robot
                 for robot, missing in rows.items()
                 if all(
-                    (relation, requirements[actor].facts[relation][0]) in offered[robot]
-                    for relation in missing
+                    (name, value) in offered[robot]
+                    for name, value in asked.facts
+                    if name in missing
                 )
             )
-            for actor, rows in unmet.items()
+            for asked, rows in unmet.items()
         }
+        self.able: dict[str, tuple[str, ...]] = {actor: able[asks[actor]] for actor in asks}
 
     def reasons(self, actor: str) -> Iterator[str]:
         """Why each robot of the team that cannot be the actor cannot."""

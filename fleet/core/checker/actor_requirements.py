@@ -61,6 +61,7 @@ class Candidates:
             kind = spec.skills, tuple(spec.capabilities.items()), marked
             alike.setdefault(kind, []).append(robot)
         self._kinds = list(alike.values())
+        self._room: dict[str, float] = {}
         self._playable: dict[tuple[object, ...], list[str]] = {}
         fitting = {actor: self._fitting(each) for actor, each in requirements.items()}
         asks = {
@@ -161,7 +162,9 @@ class Candidates:
             if (has := known_value(variable, self._world.facts, self._world)) != robot:
                 return f"{task} needs {variable} = {robot}, and it is {has}"
         if requirement.space > 0:
-            room = room_left(robot, self._world.facts, self._world)
+            if robot not in self._room:
+                self._room[robot] = room_left(robot, self._world.facts, self._world)
+            room = self._room[robot]
             if room < requirement.space:
                 needed = f"{requirement.space} are needed"
                 return f"{robot}'s basket has room for {room} more and {needed}"

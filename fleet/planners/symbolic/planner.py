@@ -20,11 +20,11 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from fleet.core.checker.plan_checker import CheckedPlan
-from fleet.core.model.derived import is_located
-from fleet.core.model.world import WorldModel, condition_holds
+from fleet.core.model.world import condition_holds
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, Planner, PlanningProblem
 from fleet.planners.symbolic.action_sequences import (
+    Exploration,
     GaveUp,
     Impossible,
     Subgoal,
@@ -35,7 +35,7 @@ from fleet.planners.symbolic.action_sequences import (
 from fleet.planners.symbolic.choosing import Choice, choose
 from fleet.planners.symbolic.engine.finite_domain import Trajectory
 from fleet.planners.symbolic.engine.instantiation import Facts
-from keyexpr_schema.facts import AT, HELD, HOLDING, IN, ON, FactKey
+from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.payloads.goals import Condition, Precedence
 
 MAX_RESTORATIONS = 2
@@ -77,25 +77,21 @@ class SymbolicPlanner(Planner):
         world = problem.world
         searching = problem.budget.until(SEARCH_SHARE)
         reached = _Reached(problem, dict(world.facts), searching, set_down)
-        unlocated: list[Subgoal] = []
+        lost: dict[Subgoal, tuple[str, ...]] = {}
         late: set[str] = set()
         if (failed := reached.pass_first(in_order)) is not None:
             return failed
         subgoals = subgoals_in_order(problem, reached.facts)
         subgoals.sort(key=lambda subgoal: subgoal not in first)
         for subgoal in subgoals:
-            if _is_of_lost_things(subgoal, reached.facts, world):
-                # Nobody takes anywhere what is nobody knows where: no need to search for a way.
-                unlocated.append(subgoal)
-                continue
             # One that is hard leaves half of the time to those after it.
             share = 1.0 if subgoal is subgoals[-1] else 0.5
             if not searching.over and reached.add(subgoal, share):
                 continue
             if searching.over or isinstance(reached.failure, GaveUp):
                 late.add(subgoal.goal)
-            elif _needs_locating(subgoal, reached.facts, world):
-                unlocated.append(subgoal)
+            elif reached.failure.unlocated:
+                lost[subgoal] = reached.failure.unlocated
             elif reached.options and subgoal not in first:
                 # What was done for others before may be what makes it impossible.
                 return self._one_by_one(problem, (subgoal, *first), in_order, set_down)
@@ -106,17 +102,21 @@ class SymbolicPlanner(Planner):
         if late and len(problem.goals) == 1 and isinstance(reached.failure, GaveUp):
             return NoPlan(reached.failure.reason, postponed=True)
         if late:
-            return _in_time(problem, reached.options, unlocated, late)
-        explored = exploration_for(unlocated, problem, searching) if unlocated else None
-        if unlocated and explored is None:
-            if searching.over:
+            return _in_time(problem, reached.options, late | {subgoal.goal for subgoal in lost})
+        explored: Exploration | None = None
+        if lost:
+            seeks = tuple(dict.fromkeys(thing for things in lost.values() for thing in things))
+            first_lost = next(iter(lost))
+            explored = exploration_for(seeks, first_lost.goal, problem, searching)
+            if explored is None and searching.over:
                 return NoPlan(problem.not_in_time, postponed=True)
-            return NoPlan(_not_found(unlocated[0], problem))
+            if explored is None:
+                return NoPlan(_not_found(lost[first_lost], problem))
         made = choose(problem, reached.options, explored)
         for _ in range(MAX_RESTORATIONS):
             if problem.budget.over:
                 break
-            undone = [s for s in subgoals_in_order(problem, reached.facts) if s not in unlocated]
+            undone = [s for s in subgoals_in_order(problem, reached.facts) if s not in lost]
             if isinstance(made, CheckedPlan) or not (undone and all(map(reached.add, undone))):
                 break
             restored = choose(problem, reached.options, explored)
@@ -126,7 +126,12 @@ class SymbolicPlanner(Planner):
                 return replace(made, postponed=True)  # not all choices were looked at
             if reached.any_set_down:
                 return self._one_by_one(problem, first, in_order, set_down=False)
-            if not unlocated and any(goal.conditions[1:] for goal in problem.goals):
+            if problem.strategy != MONOLITHIC and len(problem.goals) > 1:
+                # What one goal leaves in a hand may be what another begins with.
+                in_a_row = choose(replace(problem, strategy=MONOLITHIC), reached.options, explored)
+                if isinstance(in_a_row, CheckedPlan):
+                    return in_a_row
+            if not lost and any(goal.conditions[1:] for goal in problem.goals):
                 return self._each_goal_at_once(problem, in_order, made)
         return made
 
@@ -247,11 +252,9 @@ class _Reached:
 def _in_time(
     problem: PlanningProblem,
     options: Sequence[Choice],
-    unlocated: Sequence[Subgoal],
     late: Set[str],
 ) -> CheckedPlan | NoPlan:
     """A plan for those goals for which everything was found before the time was over."""
-    late = late | {subgoal.goal for subgoal in unlocated}
     goals = tuple(goal for goal in problem.goals if goal.goal not in late)
     found = [sequences for sequences in options if sequences[0].goal not in late]
     none = NoPlan(problem.not_in_time, postponed=True)
@@ -272,21 +275,6 @@ def _is_wanted(condition: Condition, problem: PlanningProblem) -> bool:
     )
 
 
-def _needs_locating(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
-    return any(
-        subject in world.objects and not is_located(subject, facts.get, world)
-        for subject in subgoal.condition.subjects
-    )
-
-
-def _is_of_lost_things(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
-    """Whether it says where things shall be, and of none it is known where it is."""
-    return subgoal.condition.relation in (AT, ON, IN, HELD) and not any(
-        subject not in world.objects or is_located(subject, facts.get, world)
-        for subject in subgoal.condition.subjects
-    )
-
-
 def _no_way(subgoal: Subgoal, why: Impossible | GaveUp, problem: PlanningProblem) -> str:
     world = problem.world
     kept = [f"{condition} must always hold" for condition in problem.always]
@@ -300,8 +288,8 @@ def _no_way(subgoal: Subgoal, why: Impossible | GaveUp, problem: PlanningProblem
     )
 
 
-def _not_found(subgoal: Subgoal, problem: PlanningProblem) -> str:
-    things = " or ".join(subgoal.condition.subjects)
+def _not_found(lost: Sequence[str], problem: PlanningProblem) -> str:
+    things = " or ".join(lost)
     if problem.searched:
         places = ", ".join(sorted(problem.searched))
         return f"nobody knows where {things} is; looked for in {places}, and not found"

@@ -6,10 +6,11 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from fleet.core.model.parameter_types import OBJECT
+from fleet.core.model.preconditions import spoken_of
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.planners.symbolic.engine.relevance import related_skills
-from fleet.planners.symbolic.engine.travel import only_drives
+from fleet.planners.symbolic.engine.travel import can_be_put_off
 from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -55,7 +56,7 @@ def representatives(
                 continue
         alone = named or robot in world.marked
         drives = any(
-            name in world.skills and only_drives(world.skills[name]) for name in spec.skills
+            name in world.skills and can_be_put_off(world.skills[name]) for name in spec.skills
         )
         relations = asked - {AT} if drives else asked
         known = tuple(facts.get(FactKey(relation, robot)) for relation in sorted(relations))
@@ -69,9 +70,12 @@ def representatives(
 
 def _asked_of_robots(skills: Sequence[SkillModel]) -> frozenset[str]:
     """The relations that skills ask of their robots, but for what they hold."""
-    plain = (row.variable for skill in skills for row in skill.before)
-    robots = {name for skill in skills for name in skill.robot_parameters}
-    asked = {variable.relation for variable in plain if variable.subject in robots}
+    asked = set[str]()
+    for skill in skills:
+        formulas = (*skill.conditions, *(effect.when for effect in skill.conditional))
+        read = [row.variable for row in skill.before]
+        read += [key for formula in formulas for key in spoken_of(formula)]
+        asked |= {key.relation for key in read if key.subject in skill.robot_parameters}
     return frozenset(asked - {HOLDING})
 
 

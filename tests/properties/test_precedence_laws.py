@@ -33,10 +33,9 @@ def wanted(draw: st.DrawFn) -> tuple[Goal, ...]:
 
 
 @reaches(
-    "not possible",
-    least={"reached": 20, "first and then": 10, "never then": 5, "at the same time": 5},
+    least={"reached": 30, "first and then": 10, "never then": 5, "at the same time": 5},
 )
-@settings(max_examples=700, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(wanted(), st.booleans(), st.data())
 def test_nothing_holds_too_early(
     reached: Reached, goals: tuple[Goal, ...], helper: bool, data: st.DataObject
@@ -65,9 +64,7 @@ def test_nothing_holds_too_early(
         reached["too late"] += 1
         return
     if not made.orders():
-        # Only where it is both first and second, or each of two waits for the other.
-        print("NOPLAN", goals, made.replies["r0"].sentence)
-        reached["not possible"] += 1
+        reached["no plan"] += 1  # as where each of two waits for the other
         return
     look()
     for _ in range(200):
@@ -83,3 +80,4 @@ def test_nothing_holds_too_early(
     reached["reached"] += 1
     reached["first and then"] += any(came[row] and passed[row] for row in rows)
     reached["never then"] += not all(came.values())
+    assert reached["no plan"] <= max(10, reached["reached"])

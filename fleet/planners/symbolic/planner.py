@@ -33,7 +33,8 @@ from fleet.planners.symbolic.action_sequences import (
     exploration_for,
     subgoals_in_order,
 )
-from fleet.planners.symbolic.choosing import Choice, choose
+from fleet.planners.symbolic.candidates import Choice
+from fleet.planners.symbolic.choosing import choose
 from fleet.planners.symbolic.engine.finite_domain import Trajectory
 from fleet.planners.symbolic.engine.instantiation import Facts
 from keyexpr_schema.facts import AT, HOLDING, FactKey

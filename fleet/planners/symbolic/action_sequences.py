@@ -114,13 +114,15 @@ def alternatives_for(
     budget: TimeBudget,
     settled: frozenset[str] = frozenset(),
     on_the_way: Trajectory = ANYHOW,
+    patient: bool = False,
 ) -> tuple[tuple[ActionSequence, ...], Facts] | Impossible | GaveUp:
     """Different sequences for a subgoal, the cheapest first, and the facts after that one; or why
     there is none, or none was found within the `budget`.
 
     Where a robot stands is left open at the start, so that every actor begins with the way to its
     work, whatever its robot does before; `settled` robots are taken to be where `facts` say.
-    What has to hold, or not, `on_the_way` does so in every state of a sequence.
+    What has to hold, or not, `on_the_way` does so in every state of a sequence. If `patient`, more
+    time is spent on finding the cheapest.
     """
     failure: Impossible | GaveUp | None = None
     sought: list[_Sought] = []
@@ -139,10 +141,11 @@ def alternatives_for(
     for one in sought:
         if len(found) >= ALTERNATIVES and one.least_s >= _dearest_s(found):
             break
-        results = _different_solutions(one, budget)
+        results = _different_solutions(one, budget, patient)
         if not results and not one.thorough:
             again = _sought(one.conditions, facts, world, settled, on_the_way, thorough=True)
-            results = _different_solutions(again, budget) if isinstance(again, _Sought) else []
+            if isinstance(again, _Sought):
+                results = _different_solutions(again, budget, patient)
         if isinstance(results, Unfinished):
             failure = GaveUp(_gave_up(subgoal, results, budget))
             break
@@ -218,7 +221,9 @@ class _Sought:
     thorough: bool
 
 
-def _different_solutions(sought: _Sought, budget: TimeBudget) -> list[Solution] | Unfinished:
+def _different_solutions(
+    sought: _Sought, budget: TimeBudget, patient: bool
+) -> list[Solution] | Unfinished:
     """The cheapest sequence, and others made different by charging for what was used before."""
     charge_s = [0.0] * len(sought.task.operators)
     same: dict[object, list[int]] = {}
@@ -226,7 +231,9 @@ def _different_solutions(sought: _Sought, budget: TimeBudget) -> list[Solution] 
     for number, operator in enumerate(sought.task.operators):
         for use in _uses(operator.action, world):
             same.setdefault(use, []).append(number)
-    found: Solution | Unreachable | Unfinished | None = sought.solver.solve(charge_s, budget)
+    found: Solution | Unreachable | Unfinished | None = sought.solver.solve(
+        charge_s, budget, patient
+    )
     if isinstance(found, Unfinished):
         return found
     solutions: list[Solution] = []

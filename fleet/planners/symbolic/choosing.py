@@ -16,7 +16,14 @@ from math import inf, prod
 
 from fleet.core.actors import carried_at_end
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
-from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, PlanningProblem
+from fleet.planners.base import (
+    BIG_DAG,
+    LEAST_WORK,
+    MONOLITHIC,
+    PER_GOAL,
+    NoPlan,
+    PlanningProblem,
+)
 from fleet.planners.deordering import ActionSequence, deordered
 from fleet.planners.symbolic.action_sequences import UNLOADING_S, Exploration
 from fleet.planners.symbolic.flat_list import Team, in_one_list
@@ -40,7 +47,8 @@ FEW = 32
 
 Choice = Sequence[ActionSequence]
 Cost = tuple[float, float]
-"""The makespan [s], with a charge for what is left in baskets, and the work of all robots [s]."""
+"""The makespan [s], with a charge for what is left in baskets, and the work of all robots [s]; for
+the least work the other way round."""
 
 
 def choose(
@@ -88,7 +96,10 @@ def _allocated(
 
 def _cost(schedule: PlanSchedule, checked: CheckedPlan) -> Cost:
     unloading_s = UNLOADING_S * len(carried_at_end(checked))
-    return round(schedule.makespan_s + unloading_s, 3), sum(schedule.durations_s.values())
+    makespan_s, work_s = schedule.makespan_s, sum(schedule.durations_s.values())
+    if checked.plan.strategy == LEAST_WORK:
+        return round(work_s + unloading_s, 3), makespan_s
+    return round(makespan_s + unloading_s, 3), work_s
 
 
 def _by_cost(candidate: _Candidate) -> Cost:
@@ -157,7 +168,7 @@ class _Choosing:
             best = self._best(options)
         if isinstance(best, NoPlan):
             return best
-        if self.problem.strategy == BIG_DAG:
+        if self.problem.strategy in (BIG_DAG, LEAST_WORK):
             best = self._with_joint_trips(best, options)
         return best.allocated.checked
 

@@ -13,8 +13,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from fleet.core.model import derived
-from fleet.core.model.formulas.evaluation import evaluate
-from fleet.core.model.formulas.nodes import Formula, Holds, Not
+from fleet.core.model.formulas.evaluation import conjuncts, evaluate
+from fleet.core.model.formulas.nodes import Formula, Holds, Not, Or
 from fleet.core.model.world import WorldModel, known_value
 from fleet.planners.symbolic.engine.instantiation import Facts
 from fleet.planners.symbolic.engine.readings import (
@@ -31,6 +31,8 @@ from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
 State = tuple[int, ...]
 Stands = tuple[tuple[str, str], ...]
 """Robots, each with the place where it must be."""
+FEW_VALUES = 4
+"""That a variable has not a value is listed as those that it has then, if those are few."""
 _ELSEWHERE = "?"
 """Any place, where it does not matter which."""
 
@@ -214,6 +216,13 @@ class Nodes:
                 yield {FactKey(AT, robot): place}, True
 
     def _read_formula(self, formula: Formula) -> int | bool:
+        match formula:
+            case Or(rows):
+                return self._any_of(rows)
+            case Not(Holds(literal)) if not is_read_off(literal, self.world):
+                if len(self._domain(literal.variable) or ()) > FEW_VALUES:
+                    return self._only_evaluated(formula, aboard=False)
+
         def domain(key: FactKey) -> Sequence[Value] | None:
             if key in self._counted:
                 raise TooManyWays
@@ -226,6 +235,21 @@ class Nodes:
             return self._reading(list(ways(read, domain, self.known)))
         except TooManyWays:
             return self._only_evaluated(formula, aboard=False)
+
+    def _any_of(self, alternatives: Sequence[Formula]) -> int | bool:
+        """The node of a disjunction: each alternative by itself makes it hold."""
+        rows: dict[tuple[int, ...], None] = {}
+        for alternative in alternatives:
+            needs = {self.formula(part) for part in conjuncts(alternative)}
+            if all(need is True for need in needs):
+                return True
+            if not any(need is False for need in needs):
+                rows[tuple(sorted(need for need in needs if need is not True))] = None
+        if not rows:
+            return False
+        node = self._new(-1, None)
+        self.axioms[node] = [Axiom(needs, (), node) for needs in rows]
+        return node
 
     def _only_evaluated(self, formula: Formula, aboard: bool) -> int:
         def values_of(key: FactKey) -> Sequence[Value]:

@@ -89,7 +89,7 @@ class SkillContext:
 
         Raises:
             SkillFailed: it failed or was stopped, with the driver's own sentence; retryable unless
-                something is in the way that is open, which is then a fact.
+                the driver says otherwise, or something that is open is in the way: then a fact.
         """
         motion = Motion(
             kind=kind,
@@ -103,7 +103,8 @@ class SkillContext:
         if outcome.state is not MotionState.SUCCEEDED:
             reason = outcome.reason or f"{kind.value} {outcome.state.value} without a reason"
             blocked = self._blocked(object, outcome.blocked_by)
-            raise SkillFailed(reason, retryable=not blocked, facts=blocked)
+            again = outcome.retryable and not blocked
+            raise SkillFailed(reason, retryable=again, facts=blocked)
         return outcome
 
     def _blocked(self, object: str | None, by: str | None) -> tuple[Observation, ...]:
@@ -187,10 +188,10 @@ class SkillContext:
             SkillFailed: the way is not open.
         """
         senses = await self.embodiment.senses()
-        if senses.place != place:
+        if not self.world.within(senses.place, place):
             self.log(f"is in {senses.place or 'no place'}, not in {place}: goes there first")
             senses = (await self.do(MotionKind.GO_TO, place=place)).senses
-        self.observe(AT, self.robot, place)
+        self.observe(AT, self.robot, senses.place or place)
         return senses
 
     def known(self, relation: str, subject: str) -> Value:

@@ -75,7 +75,7 @@ class WorldCache:
                 name
                 for name in self.objects
                 if self.moves(name)
-                and self.place_of(_word(self.value_of(AT, name))) == place
+                and self.within(self.place_of(_word(self.value_of(AT, name))), place)
                 and not any(self.closed(c) or self.blocked(c) for c in self.carriers(name))
             )
         )
@@ -117,6 +117,18 @@ class WorldCache:
         found = self.carriers(where)
         return found[-1] if found and found[-1] in {*self.places, *self.specs} else None
 
+    def within(self, place: str | None, whole: str) -> bool:
+        """Whether a place is `whole`, or a part of it."""
+        return place is not None and whole in self._around(place)
+
+    def _around(self, place: str) -> tuple[str, ...]:
+        found = [place]
+        while (about := self.places.get(found[-1])) is not None and about.part_of is not None:
+            if about.part_of in found:
+                break
+            found.append(about.part_of)
+        return tuple(found)
+
     def whereabouts(self, seen: Detection) -> str | None:
         """The value of `at(object)` that a detection shows.
 
@@ -130,7 +142,8 @@ class WorldCache:
             if seen.place is not None:
                 return seen.place
             x_m, y_m, _ = seen.point_m
-            return next((p.place for p in self.places.values() if p.contains(x_m, y_m)), None)
+            found = [p.place for p in self.places.values() if p.contains(x_m, y_m)]
+            return max(found, key=lambda place: len(self._around(place)), default=None)
         for place in self.places.values():
             if any(surface.surface == seen.support for surface in place.surfaces):
                 return place.place

@@ -30,8 +30,8 @@ def rows_of(results: Sequence[MissionResult]) -> list[Row]:
     """A row for each planner, strategy and class, and one for all classes together.
 
     Tasks, revisions, rounds and makespan [simulated s] are means over those missions to be done
-    that every planner and strategy carried out, so that rows can be compared; planning [s] is of
-    all missions.
+    that every planner and strategy carried out, so that rows can be compared; planning [CPU s] is
+    of all missions.
     """
     comparable = comparable_missions(results)
     rows: list[Row] = []
@@ -112,16 +112,23 @@ def write_page(path: Path, results: Sequence[MissionResult], command: str, took_
 
 Written by `{command}` in {took_s:.0f} s on {machine()} ({packages}).
 
-{missions} missions, written by hand in `benchmarks/planning/missions`: plain sentences, a world,
-what the planner believes of it, and what must really be true at the end. They go through the
-planner's own core and planning jobs; robots carry the orders out with the workers' own skills and
-retries in a kinematic world (`sim.kinematic.backend`: drives take the route's length, things do not
-fall). A mission succeeds if that world is then as the mission file says, if nothing was moved that
-the mission does not speak of, and if the planner's own statuses agree. Those that must be refused
-succeed if nothing is done and a reason is given; those to be given up, if a reason is given. Random
-seeds are fixed; the simulated clock stands still while the planner thinks.
+{missions} missions, written by hand in `benchmarks/planning/missions`: sentences (a few goals of
+the apartment's are conditions, with what must never hold), a world, what the planner believes of
+it, and what must really be true at the end. They go through the planner's own core and planning
+jobs; robots carry the orders out with the workers' own skills and retries in a kinematic world
+(`sim.kinematic.backend`: drives take the route's length, things do not fall). Those in the
+apartment (`configs/worlds/apartment.yaml` with `benchmarks/planning/settings`) also use tools,
+water, machines that take their time and hands of two robots
+(`benchmarks/planning/household_world.py` says what that does, and to whom it does nothing); robots
+die, handles slip, people move things.
 
-`planning` is wall time for all revisions of a mission. Tasks begun, revisions and makespan
+A mission succeeds if that world is then as the mission file says, if nothing was moved or changed
+that the mission does not speak of, if what must never hold never did, and if the planner's own
+statuses agree. Those that must be refused succeed if nothing is done and the reason names what is
+missing; those to be given up, if a reason is given. Random seeds are fixed; the simulated clock
+stands still while the planner thinks.
+
+`planning` is CPU time for all revisions of a mission. Tasks begun, revisions and makespan
 (simulated) are means over the {comparable} missions to be done that succeeded in every row group,
 so that they can be compared. Rounds are answers of a language model to the planner; fallbacks are
 missions in which the symbolic planner had to take over from it.
@@ -149,7 +156,7 @@ def draw(path: Path, results: Sequence[MissionResult]) -> None:
         ("missions that came out right, %", _success_percent, False),
         ("tasks begun, mean", lambda rs: _average([r.tasks for r in rs]), True),
         ("makespan, simulated s, mean", lambda rs: _average([r.makespan_s for r in rs]), True),
-        ("planning, wall s, mean", lambda rs: _average([r.planning_s for r in rs]), False),
+        ("planning, CPU s, mean", lambda rs: _average([r.planning_s for r in rs]), False),
     )
     kinds = [kind for kind in CLASSES if any(r.kind == kind for r in results)]
     groups = variants(results)

@@ -134,7 +134,8 @@ class Demo:
             thing: fact.value for (relation, thing), fact in view.facts.items() if relation == AT
         }
         objects = {thing.object: thing for thing in object_payloads(self.mission.world)}
-        verdicts = goal_verdicts(self._statuses(), view.truths, places, beliefs, objects)
+        wholes = {name: entry.part_of for name, entry in self.mission.world.place_entries.items()}
+        verdicts = goal_verdicts(self._statuses(), view.truths, places, beliefs, objects, wholes)
         records = list(view.tasks.values())
         makespan_s, busy_s, idle_s = times(records, robots)
         recording = self.options.out / RECORDING

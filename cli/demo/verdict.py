@@ -51,6 +51,7 @@ def goal_verdicts(
     robot_places: Mapping[str, str | None],
     beliefs: Mapping[str, Value] = {},
     objects: Mapping[str, Object] = {},
+    wholes: Mapping[str, str | None] = {},
 ) -> tuple[GoalVerdict, ...]:
     """A verdict on every goal, in the order of `goals`.
 
@@ -59,12 +60,12 @@ def goal_verdicts(
     settled and in nobody's hand; lying in a robot's basket counts, as the goal's definition says,
     and so does being on or in what is there. `at`, `on` and `in` a thing, a part of it or a person
     hold when that carries the object. States (`is_open`, `is_on`, …) are as the truth says;
-    `objects` say what is part of what.
+    `objects` say what is part of what, `wholes` of places.
     `at(robot)` holds when the robot stands there, `held(object)` when a hand really holds it, and
     `located(object)` when the fleet takes it to be where it really is. Nothing else can be seen by
     the physics. Of several subjects one is enough. A goal with no conditions is not judged either.
     """
-    seen = _Seen(truths, robot_places, beliefs, objects)
+    seen = _Seen(truths, robot_places, beliefs, objects, wholes)
     return tuple(_goal_verdict(status, seen) for status in goals.values())
 
 
@@ -73,6 +74,14 @@ class _Seen(NamedTuple):
     robot_places: Mapping[str, str | None]
     beliefs: Mapping[str, Value]
     objects: Mapping[str, Object]
+    wholes: Mapping[str, str | None]
+
+    def is_in(self, place: str | None, wanted: object) -> bool:
+        """Whether a place is the one wanted, or a part of it."""
+        left = len(self.wholes)
+        while place is not None and place != wanted and left > 0:
+            place, left = self.wholes.get(place), left - 1
+        return place == wanted
 
     def carriers(self, thing: str) -> tuple[str, ...]:
         """What carries a thing directly and indirectly, and the wholes that those are part of."""
@@ -141,15 +150,16 @@ def _for_subject(condition: Condition, subject: str, seen: _Seen) -> tuple[Verdi
     relation, wanted = condition.relation, condition.value
     if relation in (AT, ON, IN) and subject in seen.truths:
         if relation == AT and wanted not in seen.objects:
-            return _object_at(seen.truths[subject], seen.root(subject), wanted)
+            return _object_at(seen.truths[subject], seen.root(subject), seen, wanted)
         return _carried(seen.truths[subject], seen, wanted)
     if subject in seen.truths and relation in seen.truths[subject].states:
         value = seen.truths[subject].states[relation]
         return _holds(value == wanted), f"{relation}({subject}) is {render_value(value)}"
     if relation == AT and subject in seen.robot_places:
         place = seen.robot_places[subject]
-        aim = "" if place == wanted else f", not in {wanted}"
-        return _holds(place == wanted), f"{subject} stands in {place or 'no known place'}{aim}"
+        there = seen.is_in(place, wanted)
+        aim = "" if there else f", not in {wanted}"
+        return _holds(there), f"{subject} stands in {place or 'no known place'}{aim}"
     if relation == HELD and subject in seen.truths:
         by = seen.truths[subject].held_by
         where = f"in the hand of {by}" if by else "in nobody's hand"
@@ -171,7 +181,7 @@ def _located(truth: Truth, seen: _Seen) -> tuple[Verdict, str]:
         return Verdict.FAILS, f"{truth.object} lies in {where}, and the fleet does not know where"
     name = str(belief)
     place = seen.robot_places.get(name, name)
-    right = place == truth.place or name in seen.carriers(truth.object)
+    right = seen.is_in(truth.place, place) or name in seen.carriers(truth.object)
     rest = "as the fleet says" if right else f"and the fleet says in {place}"
     return _holds(right), f"{truth.object} is in {where}, {rest}"
 
@@ -186,7 +196,7 @@ def _carried(truth: Truth, seen: _Seen, wanted: object) -> tuple[Verdict, str]:
     return _holds(wanted in seen.carriers(truth.object)), f"{truth.object} is at {at}"
 
 
-def _object_at(truth: Truth, root: Truth, wanted: object) -> tuple[Verdict, str]:
+def _object_at(truth: Truth, root: Truth, seen: _Seen, wanted: object) -> tuple[Verdict, str]:
     where = f"in {truth.place}" if truth.place else "in no known place"
     if root.held_by is not None:
         return (
@@ -196,6 +206,6 @@ def _object_at(truth: Truth, root: Truth, wanted: object) -> tuple[Verdict, str]
     if not truth.settled:
         return Verdict.FAILS, f"{truth.object} is {where} but has not come to rest"
     on = f" on {truth.support}" if truth.support else ""
-    if truth.place != wanted:
+    if not seen.is_in(truth.place, wanted):
         return Verdict.FAILS, f"{truth.object} lies {where}{on}, not in {wanted}"
     return Verdict.HOLDS, f"{truth.object} lies {where}{on}"

@@ -38,13 +38,13 @@ def _lines(report: IdleReport) -> list[str]:
         "unit tasks: every task a step, only robots that have tasks (0 % if one does everything)",
     ]
     if report.over_bound is not None:
-        bound = f"lower bound ({seconds(report.lower_bound_s)})"
+        bound = f"lower bound of this task graph ({seconds(report.lower_bound_s)})"
         ratio = f"makespan ÷ {bound}: {report.over_bound:.3f} predicted"
         if report.measured_over_bound is not None:
             ratio += f", {report.measured_over_bound:.3f} measured"
         lines.append(ratio)
     else:
-        lines.append("the allocator gave no lower bound of the makespan; `makespan` does")
+        lines.append("the allocator gave no lower bound of this task graph; `makespan` does")
     if report.measured is not None and not report.ended:
         lines.append("the plan has not ended: measured is up to the last task that has")
     return lines

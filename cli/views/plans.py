@@ -90,9 +90,13 @@ def making_lines(making: Making, status: PlanStatus | None) -> list[str]:
             lines.append(f"planning    {status.planning_time_s:.2f} s")
         if status.predicted_makespan_s is not None:
             makespan = f"makespan    {seconds(status.predicted_makespan_s)} predicted"
-            if status.lower_bound_s is not None:
-                makespan += f", {seconds(status.lower_bound_s)} at the least"
             lines.append(makespan)
+            if status.lower_bound_s is not None:
+                least = seconds(status.lower_bound_s)
+                lines.append(f"            this task graph cannot be done in less than {least}")
+            if status.mission_bound_s is not None:
+                least = seconds(status.mission_bound_s)
+                lines.append(f"            no plan for this mission is shorter than {least}")
         lines += [f"allocation  {note}" for note in status.notes]
         if status.change is not None:
             change = status.change

@@ -194,6 +194,7 @@ class PlanningSucceeded(Event, frozen=True, kw_only=True):
     predicted_makespan_s: float = msgspec.field(name="makespan_s")
     planning_time_s: float
     lower_bound_s: float | None = None
+    mission_bound_s: float | None = None
     notes: tuple[str, ...] = ()
     repaired: bool = msgspec.field(default=False, name="mended")
     left_out: dict[str, str] = {}

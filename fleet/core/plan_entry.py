@@ -24,6 +24,7 @@ class PlanOutcome(msgspec.Struct, frozen=True, kw_only=True):
     sequence: dict[str, tuple[str, ...]] = {}
     predicted_makespan_s: float | None = None
     lower_bound_s: float | None = None
+    mission_bound_s: float | None = None
     notes: tuple[str, ...] = ()
     planning_time_s: float | None = None
 

@@ -29,6 +29,10 @@ class StepClock:
         return self._now_s
 
 
+class OutOfTime(Exception):
+    """The time was over before there was anything to answer."""
+
+
 class TimeBudget:
     """So many seconds by `clock`, from now on."""
 
@@ -73,3 +77,24 @@ class TimeBudget:
         """From now on, `share` of what is left, and no less than `least_s` where so much is."""
         left_s = self.left_s
         return TimeBudget(min(max(share * left_s, least_s), left_s), self._clock)
+
+
+class Watch:
+    """For work that has no answer before it is done: looks at a budget now and then."""
+
+    STEPS = 64
+    """Looks for which the clock is read once."""
+
+    def __init__(self, budget: TimeBudget | None) -> None:
+        self._budget = budget
+        self._looks = 0
+
+    def look(self) -> None:
+        """One step more.
+
+        Raises:
+            OutOfTime: nothing is left of the budget.
+        """
+        self._looks += 1
+        if self._budget is not None and self._looks % self.STEPS == 0 and self._budget.over:
+            raise OutOfTime

@@ -98,7 +98,8 @@ class MotionState(str, Enum):
 class MotionOutcome(Payload, frozen=True, kw_only=True):
     """How a motion stands or ended. `reason` is a sentence where it failed or was stopped.
 
-    `blocked_by` is a thing that is in the way, and would not be if it were closed.
+    `blocked_by` is a thing that is in the way, and would not be if it were closed. `retryable` says
+    whether trying again here and now could help: not where the robot is too large, or too short.
     """
 
     state: MotionState
@@ -106,3 +107,4 @@ class MotionOutcome(Payload, frozen=True, kw_only=True):
     reason: str | None = None
     detections: tuple[Detection, ...] = ()
     blocked_by: Id | None = None
+    retryable: bool = True

@@ -142,7 +142,11 @@ class PlanStatus(Payload, frozen=True, kw_only=True):
     allocator: str = ""
     predicted_makespan_s: float | None = None
     lower_bound_s: float | None = None
-    """No allocation of this plan has a shorter schedule; where the allocator proved it."""
+    """This task graph cannot be done in less, by any robots in any order; where the allocator
+    proved it."""
+    mission_bound_s: float | None = None
+    """No plan for these goals is shorter, whatever tasks it has; where tasks of the plan were under
+    way when it was made, nothing is said."""
     notes: tuple[str, ...] = ()
     """What the allocator says of how it came to its answer."""
     planning_time_s: float | None = None

@@ -88,7 +88,10 @@ def load_robot(file: str | Path) -> RobotSpec:
     for name, value in spec.capabilities.items():
         if not (math.isfinite(value) and value >= 0.0):
             raise BadFile(f"{path}: capabilities.{name}: {value} is not a number from 0 up")
-    if spec.capabilities.get("drive", 0.0) <= 0.0:
+    # A robot that does not drive has no such skill, either.
+    if spec.capabilities.get("drive", 0.0) <= 0.0 and (
+        "navigate" in spec.skills or "drive" in spec.capabilities
+    ):
         raise BadFile(
             f"{path}: capabilities: it lacks `drive`, the robot's top speed in m/s (such as 0.6)"
         )

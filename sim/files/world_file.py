@@ -13,7 +13,7 @@ from keyexpr_schema.errors import InvalidId
 from keyexpr_schema.facts import IS_ON, IS_OPEN
 from keyexpr_schema.ids import check_id
 from sim.errors import BadFile
-from sim.files.world_schema import FLOOR, WorldFile
+from sim.files.world_schema import FLOOR, PlaceEntry, WorldFile
 from sim.files.yaml_file import find_file, read_yaml
 
 
@@ -38,6 +38,7 @@ def _check_world(path: Path, world: WorldFile) -> None:
     width, depth = world.size_m
     for name, place in world.place_entries.items():
         _check_name(path, f"places.{name}", name)
+        _check_part(path, world, name, place)
         for a, b, c, d in place.region_m:
             if not (0 <= a < c <= width and 0 <= b < d <= depth):
                 raise wrong(
@@ -59,7 +60,7 @@ def _check_world(path: Path, world: WorldFile) -> None:
             raise wrong(
                 f"furniture.{name}.place", f"there is no place {item.place!r}; there are {names}"
             )
-        if world.place_at(*item.center_m) != item.place:
+        if item.place not in world.places_around(world.place_at(*item.center_m)):
             raise wrong(
                 f"furniture.{name}.center_m", f"{list(item.center_m)} is not in {item.place!r}"
             )
@@ -76,6 +77,25 @@ def _check_world(path: Path, world: WorldFile) -> None:
                 raise wrong(f"object_kinds.{name}", f"a {kind.shape} needs `{field}`")
     _check_fixtures(path, world)
     check_objects(path, world)
+
+
+def _check_part(path: Path, world: WorldFile, name: str, place: PlaceEntry) -> None:
+    """That a place is part of another one that is there, around it, and no part of it."""
+    where, whole = f"{path}: places.{name}.part_of", place.part_of
+    if whole is None:
+        return
+    if whole not in world.place_entries:
+        names = ", ".join(other for other in world.place_entries if other != name)
+        raise BadFile(f"{where}: there is no place {whole!r}; there are {names or 'no others'}")
+    seen, here = [name], world.place_entries[whole].part_of
+    while here in world.place_entries and here not in seen and whole != name:
+        seen.append(here)
+        here = world.place_entries[here].part_of
+    if whole == name or here == name:
+        raise BadFile(f"{where}: {name} would be a part of itself")
+    for a, b, c, d in place.region_m:
+        if not world.place_entries[whole].contains((a + c) / 2, (b + d) / 2):
+            raise BadFile(f"{where}: the middle of [{a}, {b}, {c}, {d}] is not in {whole!r}")
 
 
 def _check_fixtures(path: Path, world: WorldFile) -> None:

@@ -25,6 +25,7 @@ def place_payloads(world: WorldFile) -> tuple[Place, ...]:
             region_m=entry.region_m,
             surfaces=world.surfaces(name),
             travel_m=travel[name],
+            part_of=entry.part_of,
         )
         for name, entry in world.place_entries.items()
     )

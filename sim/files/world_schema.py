@@ -29,11 +29,19 @@ Rectangle = tuple[float, float, float, float]
 
 
 class PlaceEntry(FileEntry, frozen=True):
-    """A named region of the floor: rectangles `(x_min, y_min, x_max, y_max)`."""
+    """A named region of the floor: rectangles `(x_min, y_min, x_max, y_max)`.
+
+    `part_of` is the place that it lies in: the room of a corner, the flat of a room.
+    """
 
     label: str
     region_m: Annotated[tuple[Rectangle, ...], msgspec.Meta(min_length=1)]
     aliases: tuple[str, ...] = ()
+    part_of: Id | None = None
+
+    def contains(self, x_m: float, y_m: float) -> bool:
+        """Whether the point lies in the region, borders included."""
+        return any(a <= x_m <= c and b <= y_m <= d for a, b, c, d in self.region_m)
 
 
 class WallEntry(FileEntry, frozen=True):
@@ -135,12 +143,23 @@ class WorldFile(FileEntry, frozen=True, dict=True):
     """How things are at the start: `fridge: {is_open: true}`, `plate_1: {clean: false}`."""
 
     def place_at(self, x_m: float, y_m: float) -> str | None:
-        """The place that contains the point; the first in the file where several do."""
-        for name, place in self.place_entries.items():
-            for left, low, right, high in place.region_m:
-                if left <= x_m <= right and low <= y_m <= high:
-                    return name
+        """The innermost place that contains the point; the first in the file where several do."""
+        for name in self._inner_places_first:
+            if self.place_entries[name].contains(x_m, y_m):
+                return name
         return None
+
+    @cached_property
+    def _inner_places_first(self) -> list[str]:
+        return sorted(self.place_entries, key=lambda name: -len(self.places_around(name)))
+
+    def places_around(self, place: str | None) -> tuple[str, ...]:
+        """A place, the one that it is part of, and so on; none for no place."""
+        found: list[str] = []
+        while place is not None and place not in found:
+            found.append(place)
+            place = self.place_entries[place].part_of
+        return tuple(found)
 
     def kind_of(self, object: str) -> ObjectKind:
         """What an object looks like."""
@@ -179,7 +198,7 @@ class WorldFile(FileEntry, frozen=True, dict=True):
             for name, (fixture, carrier) in self.fixtures.carriers.items()
             if not (carrier.inside or carrier.roofed)
             and fixture.name in self.furniture
-            and place in (None, self.furniture[fixture.name].place)
+            and (place is None or place in self.places_around(self.furniture[fixture.name].place))
         )
 
     def starts_open(self, thing: str) -> bool:

@@ -17,6 +17,7 @@ from keyexpr_schema.payloads.motions import (
     MotionKind,
     MotionOutcome,
     MotionState,
+    PointM,
     Senses,
 )
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
@@ -25,7 +26,7 @@ from sim.backend import Backend
 from sim.files.world_schema import WorldFile
 from sim.kinematic.scene import draw_frame, draw_scene
 from sim.kinematic.state import STATE_OF, KinematicState
-from sim.kinematic.whereabouts import KinematicObject, KinematicRobot
+from sim.kinematic.whereabouts import REACH_M, KinematicObject, KinematicRobot
 from sim.navigation.routes import Route, Routes
 from sim.states import ThingStates
 
@@ -142,7 +143,7 @@ class KinematicBackend(Backend):
         self._count += 1
         me.motion, me.number, me.seen = motion, self._count, ()
         me.state, me.reason, me.failure, me.route = MotionState.RUNNING, None, None, None
-        me.blocked_by = None
+        me.blocked_by, me.hopeless = None, False
         me.begun_s = self.time_s
         nth = me.counts[motion.kind] = me.counts.get(motion.kind, 0) + 1
         kind = motion.kind.value
@@ -150,7 +151,10 @@ class KinematicBackend(Backend):
         unlucky = me.chance.random() < self._motion_model.failure_chance.get(kind, 0.0)
         factor = math.exp(me.chance.gauss(0.0, self._motion_model.spread))
         takes_s = self._motion_model.handling_s(motion.kind)
-        if motion.kind in DRIVES:
+        if motion.kind in DRIVES and "drive" not in me.capabilities:
+            me.failure = self._out_of_reach(me, motion)
+            me.hopeless = me.failure is not None
+        elif motion.kind in DRIVES:
             me.route = self._route(me, motion)
             if me.route is None:
                 to = motion.place or motion.point_m or motion.object
@@ -188,15 +192,39 @@ class KinematicBackend(Backend):
         me.pose = self._state.pose(me, self.time_s)
         self._end(me, self._state.effect(me, me.motion, self.time_s))
 
-    def _route(self, me: KinematicRobot, motion: Motion) -> Route | None:
-        if motion.place is not None and motion.kind is MotionKind.GO_TO:
-            taken = {other.node for other in self._state.robots.values() if other is not me}
-            return self._routes.to_place(me.pose, motion.place, taken)
+    def _out_of_reach(self, me: KinematicRobot, motion: Motion) -> str | None:
+        """Why a robot that does not drive cannot do it from where it stands."""
+        if motion.kind is MotionKind.GO_TO:
+            here = self.world.places_around(self.world.place_at(*me.pose[:2]))
+            return None if motion.place in here else f"{me.name} does not drive"
+        point = self._point(motion)
+        if math.dist(point[:2], me.pose[:2]) <= self._state.reach_m(point):
+            return None
+        return f"{me.name} does not drive, and ({point[0]:.2f}, {point[1]:.2f}) is out of its reach"
+
+    def _point(self, motion: Motion) -> PointM:
+        """Where a motion is done that drives up to something."""
         point = motion.point_m
         if motion.kind is not MotionKind.APPROACH:
             assert motion.object is not None
             point = self._state.thing_point(motion.object, self.time_s)
         assert point is not None
+        return point
+
+    def _works_in(self, me: KinematicRobot, place: str) -> KinematicRobot | None:
+        """Another robot that does not drive, with a hand, and stands in a place."""
+        others = (other for other in self._state.robots.values() if other is not me)
+        arms = (o for o in others if "grip" in o.capabilities and "drive" not in o.capabilities)
+        return next((arm for arm in arms if self.world.place_at(*arm.pose[:2]) == place), None)
+
+    def _route(self, me: KinematicRobot, motion: Motion) -> Route | None:
+        if motion.place is not None and motion.kind is MotionKind.GO_TO:
+            host = self._works_in(me, motion.place)
+            if host is not None:  # who comes to it stops where its hand gets to
+                return self._routes.to_point(me.pose, host.pose, REACH_M)
+            taken = {other.node for other in self._state.robots.values() if other is not me}
+            return self._routes.to_place(me.pose, motion.place, taken)
+        point = self._point(motion)
         return self._routes.to_point(me.pose, point, self._state.reach_m(point))
 
     def _runs_still(self, robot: str) -> bool:
@@ -212,6 +240,7 @@ class KinematicBackend(Backend):
             reason=me.reason,
             detections=me.seen,
             blocked_by=me.blocked_by,
+            retryable=not me.hopeless,
         )
 
     def _senses(self, robot: str) -> Senses:

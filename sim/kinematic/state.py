@@ -99,10 +99,9 @@ class KinematicState(Whereabouts):
         place = self.world.place_at(*me.pose[:2])
 
         def see(name: str, kind: str, point: PointM, support: str) -> None:
-            if (
-                math.dist(point[:2], me.pose[:2]) > me.capabilities.get("see", 0.0)
-                or self.world.place_at(*point[:2]) != place
-            ):
+            if math.dist(point[:2], me.pose[:2]) > me.capabilities.get(
+                "see", 0.0
+            ) or not self._in_sight(place, self.world.place_at(*point[:2])):
                 return
             found.append(
                 Detection(
@@ -124,6 +123,11 @@ class KinematicState(Whereabouts):
             point = self.world.fixtures.face_m(name, self.opening(name))
             see(name, self.things[name].kind, point, FLOOR)
         return tuple(found)
+
+    def _in_sight(self, place: str | None, other: str | None) -> bool:
+        """Whether one sees from one place into another: from a room into its parts, and back."""
+        around, others = self.world.places_around(place), self.world.places_around(other)
+        return place == other or place in others or other in around
 
     def _grasp(self, me: KinematicRobot, motion: Motion, time_s: float) -> str | None:
         assert motion.object is not None and motion.point_m is not None

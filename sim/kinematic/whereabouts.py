@@ -49,6 +49,7 @@ class KinematicRobot:
     reason: str | None = None
     seen: tuple[Detection, ...] = ()
     blocked_by: str | None = None
+    hopeless: bool = False
 
 
 @dataclass

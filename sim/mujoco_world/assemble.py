@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.errors import BadFile
 from sim.files.solids import Solid, walls
 from sim.files.world_schema import ObjectKind, WorldFile
-from sim.mujoco_world.description import RobotModel
+from sim.mujoco_world.description import FixedBase, RobotModel
 from sim.mujoco_world.furnishing import add_fixture, add_hollow, add_palms
 
 STEP_S = 0.005
@@ -29,8 +29,13 @@ FLOOR_RGBA = (0.86, 0.84, 0.80, 1.0)
 WALL_RGBA = (0.94, 0.93, 0.90, 1.0)
 
 
-def compile_world(world: WorldFile, robots: Sequence[tuple[str, RobotModel]]) -> Any:
-    """The `mujoco.MjModel` of everything, robots at the origin.
+def compile_world(
+    world: WorldFile,
+    robots: Sequence[tuple[str, RobotModel]],
+    starts: Mapping[str, PoseMRad] = {},
+) -> Any:
+    """The `mujoco.MjModel` of everything, robots that drive at the origin, others at their
+    `starts`.
 
     Raises:
         BadFile: MuJoCo refuses a robot's MJCF.
@@ -64,7 +69,10 @@ def compile_world(world: WorldFile, robots: Sequence[tuple[str, RobotModel]]) ->
             child = mujoco.MjSpec.from_file(str(model.mjcf))
             bodies = [body.name for body in child.bodies if body.name != "world"]
             # Prefixed joints of a planar base keep world axes, as its frame is the world's.
-            spec.attach(child, frame=spec.worldbody.add_frame(), prefix=f"{name}/")
+            fixed = isinstance(model.description.base, FixedBase)
+            x, y, _ = starts[name] if fixed else (0.0, 0.0, 0.0)
+            frame = spec.worldbody.add_frame(pos=(x, y, 0.0))
+            spec.attach(child, frame=frame, prefix=f"{name}/")
         except (ValueError, mujoco.FatalError) as error:
             raise BadFile(f"{model.mjcf}: MuJoCo refuses this model: {_line(error)}") from None
         for one, two in itertools.combinations(bodies, 2):

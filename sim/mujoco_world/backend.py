@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+import msgspec
+
 from keyexpr_schema.payloads.motions import (
     Detection,
     Motion,
@@ -86,18 +88,22 @@ class MujocoBackend(Backend):
         super().__init__(world, tuple(spec.robot for spec, _ in robots))
         models = [load_description(spec.model, model_folders.get(spec.robot)) for spec, _ in robots]
         self._model = compile_world(
-            world, [(spec.robot, found) for (spec, _), found in zip(robots, models, strict=True)]
+            world,
+            [(spec.robot, found) for (spec, _), found in zip(robots, models, strict=True)],
+            {spec.robot: start for spec, start in robots},
         )
         self._data = mujoco.MjData(self._model)
         self._bodies = {
             spec.robot: RobotBody(self._model, self._data, spec, found, start)
             for (spec, start), found in zip(robots, models, strict=True)
         }
-        navigator = Navigator(world)
+        fixed = tuple(body.solid() for body in self._bodies.values() if not body.drives)
+        navigator = Navigator(world, fixed)
         for (spec, start), found in zip(robots, models, strict=True):
-            navigator.add_robot(
-                spec.robot, start, found.description.clearance_m, spec.capabilities["drive"]
-            )
+            if self._bodies[spec.robot].drives:
+                navigator.add_robot(
+                    spec.robot, start, found.description.clearance_m, spec.capabilities["drive"]
+                )
         self._mechanisms = Mechanisms(
             self._model, self._data, world, self._bodies, ThingStates(world)
         )
@@ -153,9 +159,9 @@ class MujocoBackend(Backend):
                     pinned.add(robot)
                 if run.guest_of is not None:
                     pinned.add(run.guest_of)
-        for robot in self.robots:
+        poses = {name: body.pose() for name, body in self._bodies.items() if body.drives}
+        for robot in poses:
             context.navigator.pin(robot, robot in pinned)
-        poses = {name: body.pose() for name, body in self._bodies.items()}
         context.legs = context.navigator.tick(self.time_s, poses)
         for robot, run in self._runs.items():
             if run.ended is None:
@@ -174,7 +180,11 @@ class MujocoBackend(Backend):
         except MotionFailed as error:
             ajar = self._mechanisms.is_ajar(error.blocked_by)
             blocker = error.blocked_by if ajar else None
-            self._end(robot, run, MotionState.FAILED, str(error), blocked_by=blocker)
+            self._end(robot, run, MotionState.FAILED, str(error))
+            assert run.ended is not None
+            run.ended = msgspec.structs.replace(
+                run.ended, blocked_by=blocker, retryable=error.retryable
+            )
             return
         if self.time_s - run.began_s >= run.motion.timeout_s:
             reason = (
@@ -190,10 +200,10 @@ class MujocoBackend(Backend):
         state: MotionState,
         reason: str | None,
         detections: tuple[Detection, ...] = (),
-        blocked_by: str | None = None,
     ) -> None:
         run.steps.close()
-        self._context.navigator.cancel(robot)
+        if run.robot.drives:
+            self._context.navigator.cancel(robot)
         self._note_stance(run, state)
         self._bodies[robot].freeze()
         run.ended = MotionOutcome(
@@ -201,7 +211,6 @@ class MujocoBackend(Backend):
             senses=self._senses(robot),
             reason=reason,
             detections=detections,
-            blocked_by=blocked_by,
         )
 
     def _note_stance(self, run: MotionRun, state: MotionState) -> None:

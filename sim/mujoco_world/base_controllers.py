@@ -8,7 +8,7 @@ from typing import Any
 
 from keyexpr_schema.payloads.robots import PoseMRad
 from sim.mujoco_world.assemble import yaw_of, yaw_quaternion
-from sim.mujoco_world.description import Description, DifferentialDrive, PlanarDrive
+from sim.mujoco_world.description import Description, DifferentialDrive, FixedBase, PlanarDrive
 
 PERIOD_S = 0.05
 """Control period."""
@@ -260,11 +260,49 @@ class Differential(Drive):
         return (-speed if backwards else speed), rate
 
 
+class Turret(Drive):
+    """A base that does not drive: it turns about the vertical where it stands."""
+
+    def __init__(self, model: Any, data: Any, prefix: str, entry: FixedBase) -> None:
+        super().__init__(data, 0.0, 0.8, entry.yaw_rate_rad_s)
+        joint = model.joint(prefix + entry.joint)
+        self._qpos, self._dof = int(joint.qposadr[0]), int(joint.dofadr[0])
+        self._ctrl = int(model.actuator(prefix + entry.actuator).id)
+        body = model.body(int(joint.bodyid[0]))
+        self._at = (float(body.pos[0]), float(body.pos[1]))
+        self._command = 0.0
+
+    def _read_pose(self) -> PoseMRad:
+        return (*self._at, wrap(float(self._data.qpos[self._qpos])))
+
+    def put(self, pose_m_rad: PoseMRad) -> None:
+        self._data.qpos[self._qpos] = pose_m_rad[2]
+        self._pose_at = None
+        self.halt()
+
+    def speed(self) -> tuple[float, float]:
+        return (0.0, abs(float(self._data.qvel[self._dof])))
+
+    def tick(self, ctrl: list[float]) -> None:
+        if self._target is None:
+            self.halt()
+        assert self._target is not None
+        yaw = self.pose()[2]
+        to_yaw = self._target[2]
+        rate = self._approach_rate(0.0 if to_yaw is None else wrap(to_yaw - yaw))
+        rate = rate if self._spin is None else self._limited(self._spin)
+        most = 3.0 * self._acceleration * PERIOD_S
+        self._command += max(-most, min(most, rate - self._command))
+        ctrl[self._ctrl] = self._command
+
+
 def make_drive(
     model: Any, data: Any, prefix: str, description: Description, speed_m_s: float
 ) -> Drive:
     """The controller for the kind of base that the description names."""
     base = description.base
+    if isinstance(base, FixedBase):
+        return Turret(model, data, prefix, base)
     if isinstance(base, PlanarDrive):
         return Planar(model, data, prefix, base, speed_m_s)
     return Differential(model, data, prefix, base, speed_m_s)

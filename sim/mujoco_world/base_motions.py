@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from keyexpr_schema.payloads.motions import Detection, PointM
-from sim.errors import NoWay
+from sim.errors import NoStance, NoWay
 from sim.mujoco_world.base_controllers import wrap
 from sim.mujoco_world.motion import MotionContext, MotionFailed, MotionRun, Step, Steps, stow
+from sim.mujoco_world.robot_body import RobotBody
 
 LOOK_RATE_RAD_S = 1.0
 REACH_MARGIN_M = 0.015
@@ -33,9 +34,19 @@ def go_to(context: MotionContext, run: MotionRun) -> Steps:
     assert place is not None
     yield from stow(run)
     run.phase = f"driving to {place}"
-    yield from navigate(context, run, lambda: context.navigator.go_to_place(run.robot.name, place))
+    host = _works_in(context, run, place)
+    if host is not None:
+        # Who comes to an arm that does not drive stops where its hand gets to.
+        x, y, _ = host.pose()
+        assert host.description.arm is not None
+        least, greatest = host.description.arm.reach_m
+        near = (least + REACH_MARGIN_M, greatest - REACH_MARGIN_M)
+        yield from stand_at(context, run, (x, y, 0.0), near)
+    elif run.robot.drives:
+        ask = context.navigator.go_to_place
+        yield from navigate(context, run, lambda: ask(run.robot.name, place))
     x, y, _ = run.robot.pose()
-    if context.world.place_at(x, y) != place:
+    if place not in context.world.places_around(context.world.place_at(x, y)):
         raise MotionFailed(f"it stopped at ({x:.2f}, {y:.2f}), which is not in {place}")
     return ()
 
@@ -54,12 +65,54 @@ def approach(context: MotionContext, run: MotionRun) -> Steps:
         yield
     reach = reach_to_m(context, run, point) if host is None else BESIDE_ROBOT_M
     in_vain = [at for other, at in run.robot.in_vain if math.dist(other, point) < SAME_POINT_M]
-    yield from navigate(
-        context,
-        run,
-        lambda: context.navigator.approach(run.robot.name, point, reach, in_vain=in_vain),
-    )
+    if not run.robot.drives:
+        reach = reach_m(run)
+    yield from stand_at(context, run, point, reach, in_vain=in_vain)
     return ()
+
+
+def _works_in(context: MotionContext, run: MotionRun, place: str) -> RobotBody | None:
+    """Another robot, with an arm, that does not drive and stands in a place."""
+    for other in context.robots.values():
+        if other.drives or other.arm is None or other is run.robot:
+            continue
+        x, y, _ = other.pose()
+        if context.world.place_at(x, y) == place:
+            return other
+    return None
+
+
+def stand_at(
+    context: MotionContext,
+    run: MotionRun,
+    point: PointM,
+    reach: tuple[float, float],
+    heading_rad: float | None = None,
+    in_vain: Sequence[tuple[float, float]] = (),
+) -> Step:
+    """Drive to where `point` is in reach, as `Navigator.approach` says.
+
+    Raises:
+        MotionFailed: there is no way there, or it is out of reach of who does not drive.
+    """
+    robot = run.robot
+    if robot.drives:
+        ask = context.navigator.approach
+        yield from navigate(
+            context, run, lambda: ask(robot.name, point, reach, heading_rad, in_vain)
+        )
+    elif not in_reach(run, point, reach):
+        raise MotionFailed(
+            f"{robot.name} does not drive, and ({point[0]:.2f}, {point[1]:.2f}) is "
+            f"{distance_m(run, point):.2f} m away: it reaches from {reach[0]:.2f} to "
+            f"{reach[1]:.2f} m",
+            retryable=False,
+        )
+
+
+def in_reach(run: MotionRun, point: PointM, reach: tuple[float, float]) -> bool:
+    """Whether a point is so far away, `REACH_MARGIN_M` more or less."""
+    return reach[0] - REACH_MARGIN_M <= distance_m(run, point) <= reach[1] + REACH_MARGIN_M
 
 
 def _robot_at(context: MotionContext, run: MotionRun, point: PointM) -> str | None:
@@ -139,7 +192,8 @@ def navigate(context: MotionContext, run: MotionRun, ask: Callable[[], None]) ->
     try:
         ask()
     except NoWay as error:
-        raise MotionFailed(str(error), error.blocked_by) from None
+        hopeless = isinstance(error, NoStance) and error.blocked_by is None
+        raise MotionFailed(str(error), error.blocked_by, not hopeless) from None
     yield
     while True:
         leg = context.legs.get(run.robot.name)

@@ -42,6 +42,14 @@ class DifferentialDrive(FileEntry, frozen=True, tag_field="kind", tag="different
     yaw_rate_rad_s: Positive = 1.2
 
 
+class FixedBase(FileEntry, frozen=True, tag_field="kind", tag="fixed"):
+    """Stands where it is put, and turns about the vertical: one joint with a velocity servo."""
+
+    joint: str
+    actuator: str
+    yaw_rate_rad_s: Positive = 1.2
+
+
 class CameraEntry(FileEntry, frozen=True):
     """A camera at `site`, looking along the base's x axis."""
 
@@ -90,7 +98,7 @@ class BasketEntry(FileEntry, frozen=True):
 class Description(FileEntry, frozen=True):
     """A robot model, for its controllers."""
 
-    base: PlanarDrive | DifferentialDrive
+    base: PlanarDrive | DifferentialDrive | FixedBase
     radius_m: Positive
     clearance_m: Positive
     camera: CameraEntry | None = None

@@ -199,6 +199,8 @@ def reach_in(
         MotionFailed: something is in the way.
     """
     robot = run.robot
+    if not robot.drives:
+        raise MotionFailed(f"{robot.name} does not drive, as one must to reach in under a roof")
     start = robot.pose()
     back = behind(start, back_m)
     run.phase = "standing back"

@@ -47,12 +47,16 @@ WAY_STEP_M = 0.05
 class MotionFailed(Exception):
     """A motion fails. The message is one sentence for a person.
 
-    `blocked_by` is what was in the way; if it is open, it could be closed.
+    `blocked_by` is what was in the way; if it is open, it could be closed. `retryable`: trying
+    again could help.
     """
 
-    def __init__(self, sentence: str, blocked_by: str | None = None) -> None:
+    def __init__(
+        self, sentence: str, blocked_by: str | None = None, retryable: bool = True
+    ) -> None:
         super().__init__(sentence)
         self.blocked_by = blocked_by
+        self.retryable = retryable
 
 
 @dataclass

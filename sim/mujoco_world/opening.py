@@ -6,7 +6,7 @@ import math
 from itertools import pairwise
 
 from sim.mujoco_world.base_controllers import PERIOD_S, Planar
-from sim.mujoco_world.base_motions import navigate, reach_m
+from sim.mujoco_world.base_motions import reach_m, stand_at
 from sim.mujoco_world.grasping import (
     RELEASE_OPENING_M,
     Reach,
@@ -72,11 +72,7 @@ def _swing(context: MotionContext, run: MotionRun, goal: float) -> Step:
     run.phase = f"driving up to the handle of {thing}"
     fixture = context.world.fixtures.movers[thing][0]
     point = mechanisms.handle_m(thing)
-    yield from navigate(
-        context,
-        run,
-        lambda: context.navigator.approach(robot.name, point, reach_m(run), fixture.inward_rad),
-    )
+    yield from stand_at(context, run, point, reach_m(run), fixture.inward_rad)
     run.handling = True
     yield from face(run, point[0], point[1])
     x, y, _ = robot.pose()

@@ -6,7 +6,7 @@ import math
 
 from keyexpr_schema.payloads.motions import PointM
 from sim.files.world_schema import FLOOR_M
-from sim.mujoco_world.base_motions import navigate, reach_m, reach_to_m
+from sim.mujoco_world.base_motions import in_reach, reach_m, reach_to_m, stand_at
 from sim.mujoco_world.grasping import (
     BASKET_OPENING_M,
     RELEASE_OPENING_M,
@@ -40,19 +40,18 @@ def place_at(context: MotionContext, run: MotionRun) -> Steps:
     spot = None
     for candidate in spots[:MOST_SPOTS]:
         reach = reach_to_m(context, run, candidate)
-        if context.navigator.reaches(run.robot.name, candidate, reach):
+        if (
+            context.navigator.reaches(run.robot.name, candidate, reach)
+            if run.robot.drives
+            else in_reach(run, candidate, reach)
+        ):
             spot = candidate
             break
         yield  # the world goes on while it thinks
     if spot is None:
         raise MotionFailed(f"no free spot at {target} is in reach of {run.robot.name}")
-    at = spot
     run.phase = f"driving up to {target}"
-    yield from navigate(
-        context,
-        run,
-        lambda: context.navigator.approach(run.robot.name, at, reach_to_m(context, run, at)),
-    )
+    yield from stand_at(context, run, spot, reach_to_m(context, run, spot))
     hollow = target in context.world.object_entries and context.world.kind_of(target).hollow
     rim_m = context.world.kind_of(target).extent_m[2] - FLOOR_M if hollow else 0.0
     yield from set_down(
@@ -77,11 +76,7 @@ def hand_over(context: MotionContext, run: MotionRun) -> Steps:
     run.phase = f"driving up to {person}"
     palm = context.world.fixtures.carrier_point_m(person, 0.0, 0.0)
     fixture = context.world.fixture_of[person]
-    yield from navigate(
-        context,
-        run,
-        lambda: context.navigator.approach(run.robot.name, palm, reach_m(run), fixture.inward_rad),
-    )
+    yield from stand_at(context, run, palm, reach_m(run), fixture.inward_rad)
     yield from set_down(context, run, palm, into=person)
     yield from wait(0.2)
     if context.mechanisms.given.get(held) != person:

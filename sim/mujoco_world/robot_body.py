@@ -8,9 +8,11 @@ from keyexpr_schema.payloads.motions import PointM
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
 from sim.errors import BadFile
 from sim.files.furniture_schema import PointXY
+from sim.files.solids import Solid
 from sim.mujoco_world.arm import Arm, Gripper
-from sim.mujoco_world.base_controllers import PERIOD_S, make_drive
-from sim.mujoco_world.description import RobotModel
+from sim.mujoco_world.base_controllers import PERIOD_S, Turret, make_drive
+from sim.mujoco_world.description import FixedBase, RobotModel
+from sim.navigation.spots import STANDS_OFF_M
 
 LOST_AFTER_S = 0.3
 """A hand that feels nothing for this long is empty: a pad can lose touch for a moment on a jolt."""
@@ -43,6 +45,13 @@ class RobotBody:
         """Points that the hand did not get to, each with where the robot stood."""
         self._untouched_s = 0.0
         about = found.description
+        if isinstance(about.base, FixedBase) == ("drive" in spec.capabilities):
+            has = "has" if "drive" in spec.capabilities else "has no"
+            does = "does not drive" if "drive" in spec.capabilities else "drives"
+            raise BadFile(
+                f"robot {spec.robot} {has} capability `drive`, and its model {found.name} {does}: "
+                "name another model, or change the capabilities in the robot file"
+            )
         try:
             self.drive = make_drive(model, data, prefix, about, spec.capabilities.get("drive", 0.3))
             self.arm = Arm(model, data, prefix, about.arm) if about.arm else None
@@ -70,9 +79,20 @@ class RobotBody:
         if self.arm is not None:
             self.arm.put_stowed()
 
+    @property
+    def drives(self) -> bool:
+        """Whether it can go anywhere, and does not stand where it was put."""
+        return not isinstance(self.drive, Turret)
+
     def pose(self) -> PoseMRad:
         """(x, y, yaw), world frame."""
         return self.drive.pose()
+
+    def solid(self) -> Solid:
+        """The floor that it takes up, as an upright box, less what others keep away anyway."""
+        x, y, _ = self.pose()
+        half = self.description.clearance_m - STANDS_OFF_M
+        return Solid("robot", self.name, (x, y), (half, half), 0.0, 1.0)
 
     def moving(self) -> bool:
         """Whether the base is on the move."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from keyexpr_schema.facts import IS_ON
 from keyexpr_schema.payloads.motions import MotionKind
 from sim.mujoco_world.base_controllers import PERIOD_S
-from sim.mujoco_world.base_motions import navigate, reach_m
+from sim.mujoco_world.base_motions import reach_m, stand_at
 from sim.mujoco_world.grasping import hand_of
 from sim.mujoco_world.motion import (
     MotionContext,
@@ -39,11 +39,7 @@ def switch(context: MotionContext, run: MotionRun) -> Steps:
     fixture, button = context.world.fixtures.buttons[thing]
     point = fixture.point_m(button.top_m)
     run.phase = f"driving up to the switch of {thing}"
-    yield from navigate(
-        context,
-        run,
-        lambda: context.navigator.approach(robot.name, point, reach_m(run), fixture.inward_rad),
-    )
+    yield from stand_at(context, run, point, reach_m(run), fixture.inward_rad)
     run.handling = True
     yield from face(run, point[0], point[1])
     gripper.open(0.0)

@@ -51,9 +51,10 @@ class Navigator:
     way. A robot whose controller keeps within 5 cm of its legs touches nobody.
     """
 
-    def __init__(self, world: WorldFile) -> None:
+    def __init__(self, world: WorldFile, fixed: Sequence[Solid] = ()) -> None:
+        """`fixed` stands on the floor besides what the world file says: robots that never drive."""
         self._world = world
-        self._spots = Spots(world)
+        self._spots = Spots(world, fixed)
         self._lattice = self._spots.lattice
         self._traffic = Traffic(self._lattice, self._spots.retreat)
         self._robots: dict[str, Traveller] = {}
@@ -305,7 +306,7 @@ class Navigator:
             traveller.parked is not None
             and not traveller.leaving
             and name not in self._lingers
-            and self._world.place_at(x, y) == task.place
+            and task.place in self._world.places_around(self._world.place_at(x, y))
             and here in self._spots.waiting[task.place]
         ):
             self._arrive(name)

@@ -33,6 +33,10 @@ ASKEW_M = 0.6
 OTHER_STANCE_M = 0.06
 """One from which an arm may get where it does not from another is so far from that."""
 
+INSIDE_M = 0.02
+STANDS_OFF_M = 0.03
+"""Stances are so much farther than a robot's radius from what stands there."""
+
 DOCK_M = 1.3
 """Longest straight way from the lattice to a stance."""
 
@@ -54,11 +58,13 @@ class Dock:
 class Spots:
     """The places to stop at in one world."""
 
-    def __init__(self, world: WorldFile) -> None:
+    def __init__(self, world: WorldFile, fixed: Sequence[Solid] = ()) -> None:
+        """`fixed` stands there besides what the world file says."""
         self._fixtures = world.fixtures
-        self._clearance = Clearance(world)
+        standing = (*solids(world), *fixed)
+        self._clearance = Clearance(world, standing)
         self._reach = Clearance(world, barriers(world))
-        driven = (*solids(world), *reserves(world))
+        driven = (*standing, *reserves(world))
         self.lattice = lattice = Lattice(world, Clearance(world, driven))
         self.obstacles: Callable[[], Sequence[Solid]] = tuple
         """What stands on the floor for the time being: open doors and drawers."""
@@ -78,18 +84,25 @@ class Spots:
             along = np.maximum(np.abs(c * dx + s * dy) - top.length_m / 2, 0.0)
             across = np.maximum(np.abs(c * dy - s * dx) - top.width_m / 2, 0.0)
             self.at_table |= np.hypot(along, across) < TABLE_FRONT_M
-        places = [world.place_at(x, y) for x, y in points]
+        around = [self._well_inside(world, x, y) for x, y in points]
         self.waiting: dict[str, tuple[int, ...]] = {
             name: tuple(
                 node
-                for node, place in enumerate(places)
-                if place == name and not self.by_door[node]
+                for node, places in enumerate(around)
+                if name in places and not self.by_door[node]
             )
             for name in world.place_entries
         }
         self._everywhere = frozenset(node for nodes in self.waiting.values() for node in nodes)
         self.retreat = lattice.field(self._everywhere)
         """Distance from each node to the nearest one where a robot may wait, m."""
+
+    @staticmethod
+    def _well_inside(world: WorldFile, x_m: float, y_m: float) -> set[str]:
+        """The places that a point is in and not on the border of: robots stop a little off it."""
+        corners = [(x_m + a, y_m + b) for a in (-INSIDE_M, INSIDE_M) for b in (-INSIDE_M, INSIDE_M)]
+        found = [set(world.places_around(world.place_at(*corner))) for corner in corners]
+        return set.intersection(*found)
 
     def way_out(self, node: int, blocked: int) -> bool:
         """Whether one can get from `node` to a waiting spot while somebody is at `blocked`."""
@@ -183,13 +196,13 @@ class Spots:
         d, angle = (a.ravel() for a in np.meshgrid(distances, angles, indexing="ij"))
         points = np.stack([x + d * np.cos(angle), y + d * np.sin(angle)], axis=1)
         front = self._front_of(point_m)
-        good = self._clearance.at(points) >= radius_m + 0.03
+        good = self._clearance.at(points) >= radius_m + STANDS_OFF_M
         good &= self._reach.along((x, y), points, above_m=z + 0.02) > 0.0
         found: list[Dock] = []
         for k in np.flatnonzero(good):
             stance = (float(points[k, 0]), float(points[k, 1]))
             parts: set[int] = set()
-            for way in self.ways_out(stance, radius_m + 0.03, opened):
+            for way in self.ways_out(stance, radius_m + STANDS_OFF_M, opened):
                 if self.lattice.parts[way] in parts:
                     continue
                 parts.add(self.lattice.parts[way])

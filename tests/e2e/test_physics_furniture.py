@@ -12,6 +12,7 @@ import pytest
 from keyexpr_schema.payloads.motions import Motion, MotionKind, MotionOutcome, MotionState
 from keyexpr_schema.payloads.simulation import Truth
 from sim.files.mission_file import load_robot
+from sim.files.world_file import load_world
 from sim.mujoco_world import MujocoBackend
 from tests.support.furnished import furnished, hsr
 
@@ -198,4 +199,45 @@ def test_doors_and_drawers_work_and_give_out_a_cup_wherever_a_robot_comes_from(
         assert truth(backend, thing).states == {"is_open": True}
         do(backend, K.CLOSE, object=thing)
         assert truth(backend, thing).states == {"is_open": False}
+    assert touched(backend) == 0
+
+
+NEIGHBOURS = """
+world: row
+size_m: [6.0, 4.0]
+places:
+  kitchen: {label: Kitchen, region_m: [[0.0, 0.0, 6.0, 4.0]]}
+furniture:
+  left:
+    kind: cupboard
+    place: kitchen
+    center_m: [1.3, 3.7]
+    size_m: [0.6, 0.56, 0.82]
+    hinge: right
+  unit:
+    kind: drawers
+    place: kitchen
+    center_m: [2.15, 3.7]
+    size_m: [1.0, 0.56, 0.72]
+    drawers: 3
+object_kinds:
+  cup: {shape: cylinder, radius_m: 0.035, height_m: 0.10, mass_kg: 0.15}
+objects:
+  cup_1: {kind: cup, in: unit_drawer_3, at_m: [-0.15, -0.10]}
+"""
+
+
+def test_what_is_open_beside_it_is_said_to_be_in_the_way_and_closed_first(tmp_path: Path) -> None:
+    (tmp_path / "row.yaml").write_text(NEIGHBOURS)
+    backend = MujocoBackend(load_world(tmp_path / "row.yaml"), [hsr((3.0, 2.0, 1.57))])
+    do(backend, K.OPEN, object="unit_drawer_1")
+    for thing in ("unit_drawer_2", "left"):
+        outcome = run(backend, K.OPEN, object=thing)
+        assert outcome.state is MotionState.FAILED
+        assert outcome.blocked_by == "unit_drawer_1", outcome.reason
+    do(backend, K.CLOSE, object="unit_drawer_1")
+    do(backend, K.OPEN, object="left")
+    do(backend, K.CLOSE, object="left")
+    do(backend, K.OPEN, object="unit_drawer_3")
+    take(backend, "cup_1")
     assert touched(backend) == 0

@@ -15,7 +15,18 @@ from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
 from fleet.core.state import LOGIC, State
 from fleet.core.step import step
-from keyexpr_schema.facts import AT, HOLDING, IN, IS_OPEN, NOTHING, ON, FactKey, Literal, Value
+from keyexpr_schema.facts import (
+    AT,
+    BLOCKED_BY,
+    HOLDING,
+    IN,
+    IS_OPEN,
+    NOTHING,
+    ON,
+    FactKey,
+    Literal,
+    Value,
+)
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Object, Place
 from tests.support.household import SKILLS
@@ -37,7 +48,14 @@ THINGS = (
         home="kitchen",
         room=2,
     ),
-    Object(object="shelf", kind="shelf", label="shelf", features=("supports",), part_of="cupboard"),
+    Object(
+        object="shelf",
+        kind="shelf",
+        label="shelf",
+        features=("supports",),
+        part_of="cupboard",
+        blocked_by=("box",),
+    ),
     Object(object="bowl", kind="bowl", label="bowl", features=("contains",)),
     Object(object="box", kind="box", label="box", features=("contains", "openable")),
     Object(object="tray", kind="tray", label="tray", features=("supports",)),
@@ -223,19 +241,22 @@ def test_whatever_the_household_does_things_are_in_one_place_and_follow_their_ca
 @reaches("read", "not read")
 @given(
     st.dictionaries(st.sampled_from(NAMES), st.sampled_from([*ROOMS, *NAMES, "arm", "cart"])),
+    st.dictionaries(st.sampled_from(["table", "cupboard", "shelf"]), st.sampled_from(NAMES)),
     st.sampled_from(NAMES),
     st.sampled_from([AT, ON, IN, "reachable", "held", "located"]),
     st.sampled_from([*ROOMS, *NAMES, True]),
     st.booleans(),
     st.sampled_from(
         [FactKey(AT, name) for name in (*NAMES, "arm", "cart")]
-        + [FactKey(HOLDING, "arm"), FactKey(IS_OPEN, "box"), FactKey(IS_OPEN, "cupboard")]
+        + [FactKey(HOLDING, "arm"), FactKey(BLOCKED_BY, "table"), FactKey(BLOCKED_BY, "shelf")]
+        + [FactKey(IS_OPEN, name) for name in NAMES]
     ),
     st.sampled_from([*ROOMS, *NAMES, True, None]),
 )
 def test_no_other_variable_than_those_that_may_be_read_changes_what_holds(
     reached: Reached,
     where: dict[str, str],
+    blocked: dict[str, str],
     subject: str,
     relation: str,
     value: str | bool,
@@ -244,6 +265,7 @@ def test_no_other_variable_than_those_that_may_be_read_changes_what_holds(
     to: Value,
 ) -> None:
     facts: dict[FactKey, Value] = {FactKey(AT, name): at for name, at in where.items()}
+    facts |= {FactKey(BLOCKED_BY, name): by for name, by in blocked.items()}
     literal = Literal(FactKey(relation, subject), value)
     read = read_by(literal, lambda key: {facts.get(key)}, WORLD, aboard=aboard)
     if changed in read:

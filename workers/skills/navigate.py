@@ -18,13 +18,14 @@ async def navigate(ctx: SkillContext, to: str) -> None:
     senses = await ctx.embodiment.senses()
     x_m, y_m, _ = senses.pose_m_rad
     place = ctx.world.places[to]
-    if senses.place == to and inner_distance_m(place.region_m, x_m, y_m) >= DOORWAY_M:
-        ctx.observe(AT, ctx.robot, to)
+    inside = ctx.world.within(senses.place, to)
+    if inside and inner_distance_m(place.region_m, x_m, y_m) >= DOORWAY_M:
+        ctx.observe(AT, ctx.robot, senses.place)
         return
     senses = (await ctx.do(MotionKind.GO_TO, place=to)).senses
     if senses.place is not None:
         ctx.observe(AT, ctx.robot, senses.place)
-    if senses.place != to:
+    if not ctx.world.within(senses.place, to):
         raise SkillFailed(
             f"{ctx.robot} drove off to {to} but stands in {senses.place or 'no place'}"
         )

@@ -42,7 +42,8 @@ async def _find(ctx: SkillContext, object: str, place: str) -> Detection:
                     seen |= await look_at(ctx, container)
             if (found := seen.get(object)) is not None:
                 where = ctx.world.whereabouts(found)
-                if ctx.world.place_of(where) in (place, None):
+                at = ctx.world.place_of(where)
+                if at is None or ctx.world.within(at, place):
                     return found
                 raise SkillFailed(
                     f"{object} is at {where}, not in {place}",

@@ -37,7 +37,7 @@ async def place(ctx: SkillContext, object: str, place: str) -> None:
     if seen is None:
         raise SkillFailed(f"{object} was put down in {place} but is not to be seen there now")
     where = ctx.world.whereabouts(seen)
-    if ctx.world.place_of(where) != place:
+    if not ctx.world.within(ctx.world.place_of(where), place):
         raise SkillFailed(
             f"{object} was put down in {place} but lies in {where or 'no place'}", retryable=False
         )
@@ -53,7 +53,7 @@ async def _lies_there_already(ctx: SkillContext, object: str, place: str, held: 
         if seen.object != object:
             continue
         where = ctx.world.whereabouts(seen)
-        if ctx.world.place_of(where) == place:
+        if ctx.world.within(ctx.world.place_of(where), place):
             ctx.observe(AT, object, where)
             return
     raise SkillFailed(

@@ -69,7 +69,8 @@ async def _stands_at(ctx: SkillContext, carrier: str, place: str) -> PointM:
 
     def there() -> bool:
         state = ctx.world.robots.get(carrier)
-        return state is not None and state.pose_m_rad is not None and state.place == place
+        at = None if state is None or state.pose_m_rad is None else state.place
+        return ctx.world.within(at, place)
 
     if not await ctx.world.until(there, STATE_S):
         state = ctx.world.robots.get(carrier)

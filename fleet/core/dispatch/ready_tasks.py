@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from fleet.core.dispatch.trajectory import in_order
 from fleet.core.dispatch.while_replanning import stands_still, waits_for_new_plan
 from fleet.core.indexes.fleet_index import carried_by
+from fleet.core.model.durations import only_moves
 from fleet.core.model.preconditions import action_of, first_broken, unmet_before, variables_of
 from fleet.core.model.skills import Action
 from fleet.core.plan_entry import PlanEntry
@@ -24,9 +25,12 @@ from fleet.core.state_updates import (
     set_given_out,
     set_record,
 )
-from keyexpr_schema.facts import AT
+from keyexpr_schema.facts import AT, FactKey, Literal
 from keyexpr_schema.payloads.plans import PlanState
-from keyexpr_schema.payloads.tasks import TaskState
+from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
+
+NEEDLESS_SINCE_LOGIC = 4
+"""Since then, a robot is not sent to where the plan has brought it already."""
 
 
 def by_priority(state: State, plans: Iterable[str]) -> list[str]:
@@ -92,6 +96,20 @@ def order_if_ready(state: State, plan: str, task: str, reservations: bool = True
         goals, tasks = (record.goal,), (record.task,)
         entry = entry.to_replan(ReplanScope.REPAIR, reason, goals=goals, tasks=tasks)
         return set_entry(state, entry)
+    if state.logic >= NEEDLESS_SINCE_LOGIC and _stands_there(state, entry, record, action):
+        reason = f"{action.actor} stands there already"
+        now_s = state.time_s
+        done = replace(
+            record,
+            state=TaskState.SUCCEEDED,
+            reason=reason,
+            way_s=0.0,
+            started_s=now_s,
+            ended_s=now_s,
+        )
+        if entry.job is not None:
+            state = set_given_out(state, entry, task)
+        return set_record(state, state.plans[plan], done)
     serial = state.attempts_made + 1
     state = replace(state, attempts_made=serial)
     ordered = replace(
@@ -106,6 +124,27 @@ def order_if_ready(state: State, plan: str, task: str, reservations: bool = True
     if entry.job is not None:
         state = set_given_out(state, entry, task)
     return set_record(state, state.plans[plan], ordered)
+
+
+def _stands_there(state: State, entry: PlanEntry, record: TaskRecord, action: Action) -> bool:
+    """Whether a drive need not be ordered: the robot says that it is there, and what it did just
+    before in this plan was done there. Where it stood when the plan began, its worker sees better:
+    it may be in a doorway.
+    """
+    if not only_moves(action.skill):
+        return False
+    place = action.args[str(action.skill.travel_to)]
+    here = Literal(FactKey(AT, action.actor), place)
+    fact = state.fact(AT, action.actor)
+    if fact is None or (fact.value, fact.source) != (place, action.actor):
+        return False
+    for name in (*record.behind, *record.after):
+        before = entry.records.get(name)
+        if before is not None and before.state is TaskState.SUCCEEDED:
+            done = action_of(before, state.skills)
+            if done is not None and here in (*done.before, *done.after):
+                return True
+    return False
 
 
 def _touches_unwanted_work(state: State, action: Action) -> bool:

@@ -38,6 +38,15 @@ from keyexpr_schema.payloads.world import Feature, Object, Place
 
 DERIVED = frozenset({LOCATED, HELD, REACHABLE})
 """Relations that no fact says and no skill makes true."""
+READ_OFF = {
+    AT: frozenset({AT, HOLDING}),
+    ON: frozenset({ON, AT}),
+    IN: frozenset({IN, AT}),
+    LOCATED: frozenset({AT}),
+    HELD: frozenset({AT, HOLDING}),
+    REACHABLE: frozenset({AT, HOLDING, IS_OPEN, BLOCKED_BY}),
+}
+"""The relations of the variables that `read_by` names, for those that may have others."""
 _GOOD_FOR = {ON: Feature.SUPPORTS, IN: Feature.CONTAINS}
 
 
@@ -204,6 +213,17 @@ def _reachable(subject: str, value_of: ValueOf, world: Inventory) -> bool:
         if name not in wholes
         for thing in _in_the_way(name, lambda key: (value_of(key),), world)
     )
+
+
+def reachable_if(subject: str, value_of: ValueOf, world: Inventory) -> str | bool:
+    """Whether something that moves can be reached, or the name of what carries it, if that is so
+    where that can be; no such thing may be in the way of hands."""
+    here = carrier_of(subject, value_of, world)
+    if here is None or here not in world.objects:
+        return True
+    if is_closed(here, value_of, world):
+        return False
+    return here if carries_on(here, subject, value_of, world, aboard=True) else True
 
 
 def _in_the_way(name: str, values_of: ValuesOf, world: Inventory) -> Iterator[str]:

@@ -14,7 +14,6 @@ from math import inf, isfinite, sqrt
 from msgspec.structs import replace
 
 from fleet.core.model.skills import SkillModel
-from keyexpr_schema.facts import AT, FactKey, Literal
 from keyexpr_schema.payloads.durations import Durations, Estimate
 from keyexpr_schema.payloads.tasks import TaskRecord, TaskState
 
@@ -102,8 +101,5 @@ def _observed(old: Estimate, value: float, weight: float, full: float) -> Estima
 
 
 def only_moves(skill: SkillModel) -> bool:
-    """Whether all that a skill does is to get its robot somewhere."""
-    return skill.travel_to is not None and all(
-        literal == Literal(FactKey(AT, skill.actor_parameter), skill.travel_to)
-        for literal in skill.after
-    )
+    """Whether all that a skill does is to get its robot where it travels to."""
+    return skill.moves_to is not None and skill.moves_to == skill.travel_to

@@ -11,7 +11,7 @@ from fleet.core.model.formulas.nodes import ConditionalEffect, Formula, grounded
 from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, ParameterType, parse_type
 from fleet.core.model.relation_types import RelationType
 from fleet.language.vocabulary import SkillPhrase
-from keyexpr_schema.facts import FactKey, Literal
+from keyexpr_schema.facts import AT, FactKey, Literal
 
 
 class Need(NamedTuple):
@@ -90,6 +90,15 @@ class SkillModel:
     def robot_parameters(self) -> tuple[str, ...]:
         """Parameters that stand for robots, the actor's first."""
         return tuple(name for name, kind in self.parameters.items() if kind == ROBOT)
+
+    @cached_property
+    def moves_to(self) -> str | None:
+        """The parameter for the place that it gets its actor to, if it makes nothing else true."""
+        if len(self.after) != 1 or self.conditional:
+            return None
+        ((relation, subject), to) = self.after[0]
+        moves = relation == AT and subject == self.actor_parameter and isinstance(to, str)
+        return str(to) if moves and self.parameters.get(str(to)) == PLACE else None
 
     @cached_property
     def types(self) -> Mapping[str, ParameterType]:

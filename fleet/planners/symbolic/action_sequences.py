@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
-from msgspec.structs import replace
+from msgspec import structs
 
-from fleet.core.model.derived import carriers, is_closed, is_located
+from fleet.core.model.derived import carriers, is_closed
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, condition_holds
-from fleet.jobshop.time_budget import TimeBudget
+from fleet.jobshop.time_budget import OutOfTime, TimeBudget
 from fleet.planners.base import PlanningProblem
 from fleet.planners.deordering import ActionSequence
 from fleet.planners.symbolic.engine.finite_domain import ANYHOW, FiniteDomainTask, Trajectory
@@ -21,7 +21,7 @@ from fleet.planners.symbolic.engine.instantiation import Facts
 from fleet.planners.symbolic.engine.robot_classes import representatives
 from fleet.planners.symbolic.engine.search import Solution, Solver, Unfinished, Unreachable
 from fleet.planners.symbolic.engine.travel import Travel
-from keyexpr_schema.facts import AT, HELD, HOLDING, IN, ON, SEARCHED, FactKey, Literal, Value
+from keyexpr_schema.facts import AT, HELD, HOLDING, SEARCHED, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 
 ALTERNATIVES = 4
@@ -55,20 +55,23 @@ class Subgoal:
         """
         choices = []
         for subject in self.condition.subjects:
-            rows = [replace(self.condition, subject=subject, any_of=())]
+            rows = [structs.replace(self.condition, subject=subject, any_of=())]
             for other in self.others:
                 known = (s for s in other.subjects if world.value(AT, s) is not None)
                 one = subject if subject in other.subjects else next(known, other.subject)
-                rows.append(replace(other, subject=one, any_of=()))
+                rows.append(structs.replace(other, subject=one, any_of=()))
             choices.append(tuple(rows))
         return choices
 
 
 @dataclass(frozen=True)
 class Impossible:
-    """There is no sequence for a subgoal; what is missing first, as a sentence."""
+    """There is no sequence for a subgoal; what is missing first, as a sentence, and the things that
+    would have to be found first.
+    """
 
     reason: str
+    unlocated: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,6 @@ def alternatives_for(
     facts: Facts,
     world: WorldModel,
     budget: TimeBudget,
-    settled: frozenset[str] = frozenset(),
     on_the_way: Trajectory = ANYHOW,
     patient: bool = False,
 ) -> tuple[tuple[ActionSequence, ...], Facts] | Impossible | GaveUp:
@@ -120,22 +122,17 @@ def alternatives_for(
     there is none, or none was found within the `budget`.
 
     Where a robot stands is left open at the start, so that every actor begins with the way to its
-    work, whatever its robot does before; `settled` robots are taken to be where `facts` say.
-    What has to hold, or not, `on_the_way` does so in every state of a sequence. If `patient`, more
-    time is spent on finding the cheapest.
+    work, whatever its robot does before. What has to hold, or not, `on_the_way` does so in every
+    state of a sequence. If `patient`, more time is spent on finding the cheapest.
     """
-    failure: Impossible | GaveUp | None = None
+    failures: list[Impossible | GaveUp] = []
     sought: list[_Sought] = []
     for conditions in subgoal.choices(world):
-        made = _sought(conditions, facts, world, settled, on_the_way, thorough=False)
-        if isinstance(made, Impossible) and all(
-            _speaks_of_what_exists(c, world) for c in conditions
-        ):
-            made = _sought(conditions, facts, world, settled, on_the_way, thorough=True)
+        made = _sought(conditions, facts, world, budget, on_the_way)
         if isinstance(made, _Sought):
             sought.append(made)
         else:
-            failure = failure or made
+            failures.append(made)
     sought.sort(key=lambda one: one.least_s)
     found: list[tuple[Solution, _Sought]] = []
     for one in sought:
@@ -143,15 +140,17 @@ def alternatives_for(
             break
         results = _different_solutions(one, budget, patient)
         if not results and not one.thorough:
-            again = _sought(one.conditions, facts, world, settled, on_the_way, thorough=True)
+            again = _sought(one.conditions, facts, world, budget, on_the_way, thorough=True)
+            if isinstance(again, GaveUp):
+                failures.append(again)
             if isinstance(again, _Sought):
                 results = _different_solutions(again, budget, patient)
         if isinstance(results, Unfinished):
-            failure = GaveUp(_gave_up(subgoal, results, budget))
+            failures.append(GaveUp(_gave_up(subgoal, results, budget)))
             break
         found += [(result, one) for result in results]
     if not found:
-        return failure or Impossible(_exhausted(subgoal))
+        return _failure(subgoal, failures)
     found.sort(key=lambda pair: pair[0].cost_s + _unloading_s(pair[0], pair[1], world))
     sequences: dict[object, ActionSequence] = {}
     for result, one in found:
@@ -163,11 +162,16 @@ def alternatives_for(
     return tuple(sequences.values())[:ALTERNATIVES], {**after, **{k: facts.get(k) for k in unmoved}}
 
 
-def _speaks_of_what_exists(condition: Condition, world: WorldModel) -> bool:
-    subject, value = condition.subject, condition.value
-    return world.kind_of(subject) is not None and (
-        condition.relation not in (AT, ON, IN) or world.kind_of(str(value)) is not None
-    )
+def _failure(subgoal: Subgoal, failures: Sequence[Impossible | GaveUp]) -> Impossible | GaveUp:
+    """Why there is no sequence for any of those for whom a subgoal may hold."""
+    for failure in failures:
+        if isinstance(failure, GaveUp):
+            return failure
+    impossible = [failure for failure in failures if isinstance(failure, Impossible)]
+    if not impossible:
+        return Impossible(_exhausted(subgoal))
+    lost = dict.fromkeys(thing for failure in impossible for thing in failure.unlocated)
+    return replace(impossible[0], unlocated=tuple(lost))
 
 
 def _spoken_of(conditions: Sequence[Condition], world: WorldModel) -> frozenset[object]:
@@ -263,61 +267,60 @@ def _sought(
     conditions: tuple[Condition, ...],
     facts: Facts,
     world: WorldModel,
-    settled: frozenset[str],
+    budget: TimeBudget,
     on_the_way: Trajectory,
-    thorough: bool,
-) -> _Sought | Impossible:
-    """The conditions as a task, or why they are out of reach."""
+    thorough: bool = False,
+) -> _Sought | Impossible | GaveUp:
+    """The conditions as a task, or why they are out of reach, even with detours if those can help
+    and there is time for them."""
     goal = [Literal(FactKey(c.relation, c.subject), c.value) for c in conditions]
     way = (*on_the_way.always, *on_the_way.never)
     robots = representatives(conditions, facts, world, way, thorough)
     travel = Travel(world, facts)
-    free = travel.free(robots)
-    start: Facts = dict(facts)
-    for robot in free - settled:
-        start[FactKey(AT, robot)] = None
-    grounding = Grounding(world, start, goal, robots, free, thorough)
-    actions = grounding.actions
-    task = FiniteDomainTask(world, start, goal, actions, robots, travel, free, on_the_way)
+    free = {robot: facts.get(FactKey(AT, robot)) for robot in sorted(travel.free(robots))}
+    start = {**facts, **{FactKey(AT, robot): None for robot in free}}
+    try:
+        grounding = Grounding(world, start, goal, robots, free, thorough, budget)
+        task = FiniteDomainTask(
+            world, start, goal, grounding.actions, robots, travel, free, on_the_way, budget
+        )
+    except OutOfTime:
+        return GaveUp(
+            f"gave up after {budget.seconds:.3g} s, while what can be done for "
+            f"{' and '.join(map(str, conditions))} was still being worked out"
+        )
     solver = Solver(task)
     least_s = inf if task.impossible else solver.least_s()
-    if least_s == inf:
-        return Impossible(what_is_missing(grounding, task))
-    return _Sought(conditions, task, solver, least_s, thorough)
+    if least_s < inf:
+        return _Sought(conditions, task, solver, least_s, thorough)
+    missing = what_is_missing(grounding, task)
+    if not (thorough or missing.certain):
+        return _sought(conditions, facts, world, budget, on_the_way, thorough=True)
+    return Impossible(missing.phrase, missing.unlocated)
 
 
 def exploration_for(
-    subgoals: Sequence[Subgoal], problem: PlanningProblem, budget: TimeBudget
+    seeks: tuple[str, ...], goal: str, problem: PlanningProblem, budget: TimeBudget
 ) -> Exploration | None:
-    """Looking around in every place where nobody has looked yet, for all that the subgoals lack;
-    when that is done, into everything that is closed.
+    """Looking around in every place where nobody has looked yet, for all that is sought; when that
+    is done, into everything that is closed. It is said to be for one of the goals.
 
     `None` where nothing is left to look for, or nobody can look. Places that the `budget` does not
     suffice for are left to a later revision.
     """
     world = problem.world
-    seeks = tuple(
-        dict.fromkeys(
-            subject
-            for subgoal in subgoals
-            for subject in subgoal.condition.subjects
-            if subject in world.objects and not is_located(subject, world.facts.get, world)
-        )
-    )
-    if not seeks:
-        return None
     closed = [name for name in world.of_type(CLOSED) if is_closed(name, world.facts.get, world)]
     # What would be behind others once those are open comes before them: no need to close any.
     closed.sort(key=lambda name: len(world.objects[name].blocked_by), reverse=True)
-    return _looked_into(world.places, seeks, subgoals[0], problem, budget) or _looked_into(
-        closed, seeks, subgoals[0], problem, budget
+    return _looked_into(world.places, seeks, goal, problem, budget) or _looked_into(
+        closed, seeks, goal, problem, budget
     )
 
 
 def _looked_into(
     spots: Iterable[str],
     seeks: tuple[str, ...],
-    subgoal: Subgoal,
+    goal: str,
     problem: PlanningProblem,
     budget: TimeBudget,
 ) -> Exploration | None:
@@ -330,7 +333,7 @@ def _looked_into(
             continue
         facts[FactKey(SEARCHED, place)] = False
         condition = Condition(relation=SEARCHED, subject=place, value=True)
-        found = alternatives_for(Subgoal(subgoal.goal, condition), facts, problem.world, budget)
+        found = alternatives_for(Subgoal(goal, condition), facts, problem.world, budget)
         if isinstance(found, tuple):
             looked, facts = found
             sequences.append(looked[0])

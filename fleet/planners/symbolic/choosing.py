@@ -25,11 +25,11 @@ from fleet.planners.base import (
     PlanningProblem,
 )
 from fleet.planners.deordering import ActionSequence, deordered
-from fleet.planners.symbolic.action_sequences import UNLOADING_S, Exploration
+from fleet.planners.symbolic.action_sequences import Exploration
 from fleet.planners.symbolic.flat_list import Team, in_one_list
 from fleet.planners.symbolic.joint_trips import Pair, Trips
 from fleet.planners.symbolic.roles import Roles
-from fleet.planners.symbolic.workloads import Balance, Workloads, balanced
+from fleet.planners.symbolic.workloads import Balance, Workloads, balanced, unloading_s
 from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
 from fleet.scheduling.quick_allocation import quick_allocation
 from keyexpr_schema.payloads.plans import Plan
@@ -95,11 +95,11 @@ def _allocated(
 
 
 def _cost(schedule: PlanSchedule, checked: CheckedPlan) -> Cost:
-    unloading_s = UNLOADING_S * len(carried_at_end(checked))
+    left_s = unloading_s(checked.world) * len(carried_at_end(checked))
     makespan_s, work_s = schedule.makespan_s, sum(schedule.durations_s.values())
     if checked.plan.strategy == LEAST_WORK:
-        return round(work_s + unloading_s, 3), makespan_s
-    return round(makespan_s + unloading_s, 3), work_s
+        return round(work_s + left_s, 3), makespan_s
+    return round(makespan_s + left_s, 3), work_s
 
 
 def _by_cost(candidate: _Candidate) -> Cost:
@@ -203,7 +203,8 @@ class _Choosing:
         """What they take the team as it stands, with the charge for what is left in baskets."""
         team = Team(self.problem.world, self.roles)
         loads = sum(len(role.leaves) for each in choice for role in self.roles.of(each))
-        return max(team.take(each)[1] for each in choice) + UNLOADING_S * loads
+        last_s = max(team.take(each)[1] for each in choice)
+        return last_s + unloading_s(self.problem.world) * loads
 
     def _best(self, options: Sequence[Choice]) -> _Candidate | NoPlan:
         """The cheapest candidate: of few combinations the cheapest of all; else from the cheapest
@@ -326,7 +327,8 @@ class _Choosing:
         sequences = [*choice, *(explored.sequences if explored else ())]
         if problem.strategy == MONOLITHIC:
             things = {s for goal in problem.goals for c in goal.conditions for s in c.subjects}
-            sequences = in_one_list(sequences, problem.world, self.roles, things)
+            constrained = bool(problem.always or problem.never or problem.sometime_before)
+            sequences = in_one_list(sequences, problem.world, self.roles, things, constrained)
         tasks, pins = deordered(
             sequences,
             problem.first_task,

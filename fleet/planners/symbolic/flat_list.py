@@ -113,15 +113,21 @@ class Team:
 
 
 def in_one_list(
-    sequences: Sequence[ActionSequence], world: WorldModel, roles: Roles, delivered: Collection[str]
+    sequences: Sequence[ActionSequence],
+    world: WorldModel,
+    roles: Roles,
+    delivered: Collection[str],
+    in_order: bool,
 ) -> list[ActionSequence]:
-    """The sequences as one list, done by the team of the `world`."""
+    """The sequences as one list, done by the team of the `world`; those that leave something in a
+    basket come last, unless all are to stay `in_order`."""
     team = Team(world, roles, delivered)
-    return [team.take(sequence)[0] for sequence in _loads_last(sequences, roles)]
+    rows = sequences if in_order else _loads_last(sequences, roles)
+    return [team.take(sequence)[0] for sequence in rows]
 
 
 def _loads_last(sequences: Sequence[ActionSequence], roles: Roles) -> list[ActionSequence]:
-    """Those that leave something in a basket come last, unless a later one is about the same."""
+    """Those that leave something in a basket last, unless another one is about the same thing."""
     stay: list[ActionSequence] = []
     last: list[ActionSequence] = []
     things = [_arguments(sequence) for sequence in sequences]

@@ -22,8 +22,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from fleet.core.checker.plan_checker import CheckedPlan
-from fleet.core.model.derived import is_located
-from fleet.core.model.world import WorldModel, condition_holds
+from fleet.core.model.world import condition_holds
 from fleet.jobshop.time_budget import TimeBudget
 from fleet.planners.base import (
     BIG_DAG,
@@ -35,6 +34,7 @@ from fleet.planners.base import (
     PlanningProblem,
 )
 from fleet.planners.symbolic.action_sequences import (
+    Exploration,
     GaveUp,
     Impossible,
     Subgoal,
@@ -45,7 +45,7 @@ from fleet.planners.symbolic.action_sequences import (
 from fleet.planners.symbolic.choosing import Choice, choose
 from fleet.planners.symbolic.engine.finite_domain import Trajectory
 from fleet.planners.symbolic.engine.instantiation import Facts
-from keyexpr_schema.facts import AT, HELD, HOLDING, IN, ON, FactKey
+from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.payloads.goals import Condition, Precedence
 
 MAX_RESTORATIONS = 2
@@ -82,35 +82,33 @@ class SymbolicPlanner(Planner):
         problem: PlanningProblem,
         first: tuple[Subgoal, ...],
         in_order: tuple[Precedence, ...],
+        set_down: bool = True,
     ) -> CheckedPlan | NoPlan:
         """A search for one condition after the other, beginning with some, when all that has to
         hold first has; what may then hold is avoided where it is not one of those `in_order`.
+        `set_down` is that of `_Reached`.
         """
         world = problem.world
         searching = problem.budget.until(SEARCH_SHARE)
-        reached = _Reached(problem, dict(world.facts), searching)
-        unlocated: list[Subgoal] = []
+        reached = _Reached(problem, dict(world.facts), searching, set_down)
+        lost: dict[Subgoal, tuple[str, ...]] = {}
         late: set[str] = set()
         if (failed := reached.pass_first(in_order)) is not None:
             return failed
         subgoals = subgoals_in_order(problem, reached.facts)
         subgoals.sort(key=lambda subgoal: subgoal not in first)
         for subgoal in subgoals:
-            if _is_of_lost_things(subgoal, reached.facts, world):
-                # Nobody takes anywhere what is nobody knows where: no need to search for a way.
-                unlocated.append(subgoal)
-                continue
             # One that is hard leaves half of the time to those after it.
             share = 1.0 if subgoal is subgoals[-1] else 0.5
             if not searching.over and reached.add(subgoal, share):
                 continue
             if searching.over or isinstance(reached.failure, GaveUp):
                 late.add(subgoal.goal)
-            elif _needs_locating(subgoal, reached.facts, world):
-                unlocated.append(subgoal)
+            elif reached.failure.unlocated:
+                lost[subgoal] = reached.failure.unlocated
             elif reached.options and subgoal not in first:
                 # What was done for others before may be what makes it impossible.
-                return self._one_by_one(problem, (subgoal, *first), in_order)
+                return self._one_by_one(problem, (subgoal, *first), in_order, set_down)
             else:
                 refused = NoPlan(_no_way(subgoal, reached.failure, problem))
                 alone = not any(g.goal == subgoal.goal and g.conditions[1:] for g in problem.goals)
@@ -118,17 +116,21 @@ class SymbolicPlanner(Planner):
         if late and len(problem.goals) == 1 and isinstance(reached.failure, GaveUp):
             return NoPlan(reached.failure.reason, postponed=True)
         if late:
-            return _in_time(problem, reached.options, unlocated, late)
-        explored = exploration_for(unlocated, problem, searching) if unlocated else None
-        if unlocated and explored is None:
-            if searching.over:
+            return _in_time(problem, reached.options, late | {subgoal.goal for subgoal in lost})
+        explored: Exploration | None = None
+        if lost:
+            seeks = tuple(dict.fromkeys(thing for things in lost.values() for thing in things))
+            first_lost = next(iter(lost))
+            explored = exploration_for(seeks, first_lost.goal, problem, searching)
+            if explored is None and searching.over:
                 return NoPlan(problem.not_in_time, postponed=True)
-            return NoPlan(_not_found(unlocated[0], problem))
+            if explored is None:
+                return NoPlan(_not_found(lost[first_lost], problem))
         made = choose(problem, reached.options, explored)
         for _ in range(MAX_RESTORATIONS):
             if problem.budget.over:
                 break
-            undone = [s for s in subgoals_in_order(problem, reached.facts) if s not in unlocated]
+            undone = [s for s in subgoals_in_order(problem, reached.facts) if s not in lost]
             if isinstance(made, CheckedPlan) or not (undone and all(map(reached.add, undone))):
                 break
             restored = choose(problem, reached.options, explored)
@@ -136,7 +138,14 @@ class SymbolicPlanner(Planner):
         if isinstance(made, NoPlan):
             if problem.budget.over:
                 return replace(made, postponed=True)  # not all choices were looked at
-            if not unlocated and any(goal.conditions[1:] for goal in problem.goals):
+            if reached.any_set_down:
+                return self._one_by_one(problem, first, in_order, set_down=False)
+            if problem.strategy != MONOLITHIC and len(problem.goals) > 1:
+                # What one goal leaves in a hand may be what another begins with.
+                in_a_row = choose(replace(problem, strategy=MONOLITHIC), reached.options, explored)
+                if isinstance(in_a_row, CheckedPlan):
+                    return in_a_row
+            if not lost and any(goal.conditions[1:] for goal in problem.goals):
                 return self._each_goal_at_once(problem, in_order, made)
         return made
 
@@ -166,16 +175,16 @@ class SymbolicPlanner(Planner):
 class _Reached:
     """Action sequences for one subgoal after the other, and the facts after the cheapest of each.
 
-    A robot with what it delivered in its basket is not to be had for others. As long as there are
-    more like it, what it has is taken to be set down, and those others are left to choose from.
+    What was delivered in a robot's basket is taken to be `set_down` there, so that the ways for
+    later subgoals do not depend on how it was delivered: another robot may have done it.
     """
 
     problem: PlanningProblem
     facts: Facts
     budget: TimeBudget
+    set_down: bool = True
     options: list[Choice] = field(default_factory=list)
-    waiting: Counter[object] = field(default_factory=Counter)
-    """Of each class of robots, how many have something delivered in their basket."""
+    any_set_down: bool = False
     failure: Impossible | GaveUp = field(default_factory=lambda: Impossible("nothing was sought"))
     passed: set[Precedence] = field(default_factory=set)
 
@@ -219,25 +228,24 @@ class _Reached:
             return False
         sequences, self.facts = found
         self.options.append(sequences)
-        for thing in subgoal.condition.subjects:
-            self._set_down(thing)
+        if self.set_down:
+            self._set_down(subgoal)
         return True
 
-    def _set_down(self, thing: str) -> None:
-        """Take it to be where the robot is that has it in its basket, if it may stay there and
-        there are more robots like that."""
-        world, robot = self.problem.world, self.facts.get(FactKey(AT, thing))
-        if robot not in world.robots or self.facts.get(FactKey(HOLDING, str(robot))) == thing:
-            return
-        place = self.facts.get(FactKey(AT, str(robot)))
-        alike = [r for r in world.team if _class(r, world) == _class(str(robot), world)]
-        self.waiting[_class(str(robot), world)] += 1
-        if (
-            place in world.places
-            and self._spoken_of[thing] == 1
-            and self.waiting[_class(str(robot), world)] < len(alike)
-        ):
-            self.facts = {**self.facts, FactKey(AT, thing): place}
+    def _set_down(self, subgoal: Subgoal) -> None:
+        """Take what it is about to be where the robot is that has it in its basket, if no other
+        condition speaks of it."""
+        for thing in subgoal.condition.subjects:
+            robot = str(self.facts.get(FactKey(AT, thing)))
+            place = self.facts.get(FactKey(AT, robot))
+            if (
+                robot in self.problem.world.robots
+                and place in self.problem.world.places
+                and self.facts.get(FactKey(HOLDING, robot)) != thing
+                and self._spoken_of[thing] == 1
+            ):
+                self.facts = {**self.facts, FactKey(AT, thing): place}
+                self.any_set_down = True
 
     @cached_property
     def _spoken_of(self) -> Counter[object]:
@@ -258,19 +266,12 @@ class _Reached:
                     yield condition
 
 
-def _class(robot: str, world: WorldModel) -> object:
-    spec = world.robots[robot]
-    return spec.skills, tuple(sorted(spec.capabilities.items()))
-
-
 def _in_time(
     problem: PlanningProblem,
     options: Sequence[Choice],
-    unlocated: Sequence[Subgoal],
     late: Set[str],
 ) -> CheckedPlan | NoPlan:
     """A plan for those goals for which everything was found before the time was over."""
-    late = late | {subgoal.goal for subgoal in unlocated}
     goals = tuple(goal for goal in problem.goals if goal.goal not in late)
     found = [sequences for sequences in options if sequences[0].goal not in late]
     none = NoPlan(problem.not_in_time, postponed=True)
@@ -291,21 +292,6 @@ def _is_wanted(condition: Condition, problem: PlanningProblem) -> bool:
     )
 
 
-def _needs_locating(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
-    return any(
-        subject in world.objects and not is_located(subject, facts.get, world)
-        for subject in subgoal.condition.subjects
-    )
-
-
-def _is_of_lost_things(subgoal: Subgoal, facts: Facts, world: WorldModel) -> bool:
-    """Whether it says where things shall be, and of none it is known where it is."""
-    return subgoal.condition.relation in (AT, ON, IN, HELD) and not any(
-        subject not in world.objects or is_located(subject, facts.get, world)
-        for subject in subgoal.condition.subjects
-    )
-
-
 def _no_way(subgoal: Subgoal, why: Impossible | GaveUp, problem: PlanningProblem) -> str:
     world = problem.world
     kept = [f"{condition} must always hold" for condition in problem.always]
@@ -319,8 +305,8 @@ def _no_way(subgoal: Subgoal, why: Impossible | GaveUp, problem: PlanningProblem
     )
 
 
-def _not_found(subgoal: Subgoal, problem: PlanningProblem) -> str:
-    things = " or ".join(subgoal.condition.subjects)
+def _not_found(lost: Sequence[str], problem: PlanningProblem) -> str:
+    things = " or ".join(lost)
     if problem.searched:
         places = ", ".join(sorted(problem.searched))
         return f"nobody knows where {things} is; looked for in {places}, and not found"

@@ -29,6 +29,13 @@ MOST_ROUNDS = 8
 Choice = Sequence[ActionSequence]
 
 
+def unloading_s(world: WorldModel) -> float:
+    """What a thing that is left in a basket counts for, s: work for a hand, and half of the hands
+    are taken to do such work at the same time."""
+    hands = sum(world.capability(robot, "grip") is not None for robot in world.team)
+    return UNLOADING_S / max(1, hands // 2)
+
+
 class Estimate(NamedTuple):
     """What a choice comes to; less is better.
 
@@ -43,11 +50,12 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True)
 class Workload:
-    """What a sequence is for the team: seconds of each group of able robots, with the number of
-    robots that are left with a load, and how long it takes at least."""
+    """What a sequence is for the team: seconds for each group of able robots, the groups of which
+    one is left with a load, the number of things so left, and how long it takes at least."""
 
     busy_s: tuple[tuple[frozenset[str], float], ...]
-    left: tuple[frozenset[str], ...]
+    loaded: tuple[frozenset[str], ...]
+    left: int
     length_s: float
 
 
@@ -56,6 +64,7 @@ class Workloads:
 
     def __init__(self, world: WorldModel, roles: Roles) -> None:
         self._world, self._roles = world, roles
+        self.unloading_s = unloading_s(world)
         self._samples: dict[frozenset[str], tuple[str, ...]] = {}
         self._known: dict[int, tuple[ActionSequence, Workload]] = {}
 
@@ -93,6 +102,7 @@ class Workloads:
         return Workload(
             tuple((role.able, busy_s[who]) for who, role in roles.items()),
             tuple(role.able for role in roles.values() if role.leaves),
+            sum(len(role.leaves) for role in roles.values()),
             max(free_s.values(), default=0.0),
         )
 
@@ -128,8 +138,8 @@ class Balance:
             for robots in able
         }
         self._busy_s = [0.0] * len(self._groups)
-        self._left = [0] * len(self._groups)
-        self._loads = 0
+        self._loaded = [0] * len(self._groups)
+        self._left = 0
         self._work_s = 0.0
         self.choice: list[ActionSequence | None] = list(choice)
         """Of each goal; `None` where another one's sequence serves it, too."""
@@ -147,8 +157,9 @@ class Balance:
         """What the choice comes to."""
         groups = range(len(self._groups))
         even_s = max((self._busy_s[n] / len(self._groups[n]) for n in groups), default=0.0)
-        crowded = sum(max(0, self._left[n] - len(self._groups[n])) for n in groups)
-        span_s = max(even_s, max(self._lengths_s, default=0.0)) + UNLOADING_S * self._loads
+        crowded = sum(max(0, self._loaded[n] - len(self._groups[n])) for n in groups)
+        span_s = max(even_s, max(self._lengths_s, default=0.0))
+        span_s += self._workloads.unloading_s * self._left
         return Estimate(crowded, round(span_s, 6), round(self._work_s, 6))
 
     def put(self, number: int, sequence: ActionSequence | None) -> None:
@@ -175,10 +186,10 @@ class Balance:
             self._work_s += times * seconds
             for number in self._within[robots]:
                 self._busy_s[number] += times * seconds
-        for robots in workload.left:
-            self._loads += times
+        self._left += times * workload.left
+        for robots in workload.loaded:
             for number in self._within[robots]:
-                self._left[number] += times
+                self._loaded[number] += times
 
 
 def balanced(balance: Balance, options: Sequence[Choice]) -> Balance:

@@ -19,6 +19,7 @@ from fleet.core.planning_input import InterpretationInput, PlanningInput
 from fleet.jobshop.time_budget import Clock, TimeBudget
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.contradictions import contradictions, reasons_of
+from fleet.planners.mission_bound import mission_bound_s
 from fleet.planners.oversubscription import PartialPlan, plan_reachable_goals
 from fleet.planners.plan_repair import repair_plan
 from fleet.service.composition import Composition
@@ -30,6 +31,8 @@ PLANNERS_SHARE = 0.5
 """Of a job's time, how much its planner has; allocating and checking take the rest."""
 ALLOCATED_BY = 0.9
 """When, of a job's time, allocators should have come to an answer."""
+BOUNDING_SHARE = 0.02
+"""Of what is left then, how much at most is spent on what the goals take at least."""
 
 
 def run_planning_job(
@@ -198,12 +201,21 @@ class _Run:
             durations_s=durations_s,
             predicted_makespan_s=schedule.makespan_s,
             lower_bound_s=allocated.lower_bound_s,
+            mission_bound_s=self._mission_bound_s(partial.plan),
             notes=(*allocated.notes, *notes),
             repaired=repaired,
             left_out=left_out,
             postponed=postponed,
             planning_time_s=0.0,
         )
+
+    def _mission_bound_s(self, plan: Plan) -> float | None:
+        """What the goals of the plan take at least; nothing is known of how far work under way is,
+        nor of what is still to be found."""
+        if self.given.under_way or plan.seeks:
+            return None
+        goals = (goal for goal in self.given.goals if goal.goal in plan.goals)
+        return mission_bound_s(goals, self.world, self.limit.part(BOUNDING_SHARE))
 
     def _allocate(self, checked: CheckedPlan, busy: Mapping[str, str]) -> Allocated | NotAllocated:
         """With actors that robots are `busy` with left where they are and begun with, if that can

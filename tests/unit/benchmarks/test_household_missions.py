@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import replace as changed
 
 import pytest
 from msgspec.structs import replace
@@ -14,22 +13,11 @@ from benchmarks.planning.report import comparable_missions, failures_of, rows_of
 from benchmarks.planning.simulated_time import Deadlock, SimulatedLoop, run
 from benchmarks.planning.verdict import MissionResult, run_mission
 from benchmarks.tables import as_markdown
-from fleet.allocators.makespan import MakespanAllocator
-from fleet.jobshop.time_budget import StepClock
-from fleet.service.composition import Composition, compose
 from keyexpr_schema.payloads.simulation import Truth
 from keyexpr_schema.payloads.world import Place
 from sim.errors import BadFile
+from tests.support.household_missions import PARTS
 
-_ALL = compose()
-PARTS: Composition = changed(
-    _ALL,
-    allocators={
-        **_ALL.allocators,
-        # What is searched for as long as there is time would differ from run to run.
-        "makespan": MakespanAllocator(deadline_s=0.2, exact=False, clock=StepClock()),
-    },
-)
 MISSIONS: dict[str, Mission] = {mission.name: mission for mission in load_missions()}
 
 

@@ -98,6 +98,8 @@ def test_how_a_plan_was_made_is_told() -> None:
         revision=3,
         state=PlanState.RUNNING,
         predicted_makespan_s=12.34,
+        lower_bound_s=10.0,
+        mission_bound_s=8.0,
         planning_time_s=0.5,
         change=PlanChange(kept=1, dropped=2, added=3),
     )
@@ -106,5 +108,7 @@ def test_how_a_plan_was_made_is_told() -> None:
         "fallback    no answer",
         "planning    0.50 s",
         "makespan    12.3 s predicted",
+        "            this task graph cannot be done in less than 10.0 s",
+        "            no plan for this mission is shorter than 8.0 s",
         "change      revision 3 kept 1, dropped 2, added 3 of the unfinished tasks",
     ]

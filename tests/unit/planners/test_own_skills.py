@@ -11,12 +11,12 @@ from fleet.core.model.skills import phrases_of
 from fleet.core.model.world import WorldModel
 from fleet.errors import NotUnderstood
 from fleet.language import Vocabulary, read_goal
-from fleet.planners.base import PlanningProblem
+from fleet.planners.base import NoPlan, PlanningProblem
 from fleet.planners.symbolic.planner import SymbolicPlanner
 from keyexpr_schema.ids import bare_name
-from keyexpr_schema.payloads.goals import Goal
+from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan
-from keyexpr_schema.payloads.world import Fact
+from keyexpr_schema.payloads.world import Fact, Object
 from tests.support.household import (
     PLACES,
     SKILLS,
@@ -138,3 +138,64 @@ def replace_skills(model: WorldModel) -> WorldModel:
     return WorldModel(
         SKILLS, model.places, model.objects, model.robots, model.available, model.facts
     )
+
+
+POLISH = skills_from_data(
+    {
+        "skills": {
+            "polish": {
+                "parameters": {"robot": "robot", "thing": "cup", "tool": "cloth", "place": "place"},
+                "before": ["at(robot) = place", "at(thing) = place", "holding(robot) = tool"],
+                "after": ["polished(thing) = true"],
+            },
+            "polish_together": {
+                "parameters": {"robot": "robot", "partner": "robot", "thing": "tub"},
+                "after": ["polished(thing) = true"],
+            },
+        }
+    },
+    "polish.yaml",
+)
+
+
+def polished(number: int, thing: str) -> Goal:
+    wanted = Condition(relation="polished", subject=thing, value=True)
+    return Goal(goal=f"g{number}", text=f"Polish {thing}", conditions=(wanted,), ordinal=number)
+
+
+def polishing(*kinds: str) -> WorldModel:
+    things = (cup(1), cup(2), *(Object(object=kind, kind=kind, label=kind) for kind in kinds))
+    spec = manipulator()
+    return WorldModel.of(
+        {**SKILLS, **POLISH},
+        PLACES,
+        things,
+        (replace(spec, skills=(*spec.skills, *POLISH)),),
+        (
+            fact("hsr", "holding", "nothing"),
+            fact("cup_1", "at", "kitchen"),
+            fact("cup_2", "at", "living_room"),
+            *(fact(kind, "at", "hallway") for kind in kinds),
+        ),
+    )
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_a_tool_that_one_goal_leaves_in_the_hand_serves_the_next(strategy: str) -> None:
+    plan = planned(strategy, polishing("cloth"), polished(1, "cup_1"), polished(2, "cup_2"))
+    assert [task.skill for task in plan.tasks].count("polish") == 2
+    assert [task.skill for task in plan.tasks].count("pick") == 1
+
+
+@pytest.mark.parametrize(
+    ("goal", "reason"),
+    [
+        (polished(1, "cup_1"), "polish takes a cloth, and there is none"),
+        (polished(1, "tub"), "polish_together takes 2 robots, and there is hsr"),
+    ],
+)
+def test_a_tool_or_a_robot_that_there_is_not_is_what_is_missing(goal: Goal, reason: str) -> None:
+    problem = PlanningProblem("p", (goal,), polishing("tub"))
+    made = SymbolicPlanner().plan(problem)
+    assert isinstance(made, NoPlan)
+    assert reason in made.reason

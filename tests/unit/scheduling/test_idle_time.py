@@ -161,7 +161,10 @@ def test_the_page_shows_both_definitions_predicted_and_measured_beside_the_bound
     assert rows["cart"].split() == ["cart", "52.4", "%", "52.0", "%", "66.7", "%", "66.7", "%"]
     assert rows["spare"].split() == ["spare", "100.0", "%", "100.0", "%", "-", "-"]
     assert rows["makespan"].split()[1:3] == ["21.0", "s"]
-    assert "makespan ÷ lower bound (20.0 s): 1.050 predicted, 1.250 measured" in drawn(report)
+    assert (
+        "makespan ÷ lower bound of this task graph (20.0 s): 1.050 predicted, 1.250 measured"
+        in drawn(report)
+    )
 
 
 def test_before_the_run_and_without_a_bound_it_says_so() -> None:

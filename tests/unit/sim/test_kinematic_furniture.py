@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -161,3 +162,36 @@ def test_what_makes_no_sense_is_refused_with_what_would(
 ) -> None:
     point = (1.0, 1.0, 0.0) if kind is K.GRASP else None
     assert said in refused(flat, kind, object=thing, point_m=point)
+
+
+def test_doors_and_drawers_are_drawn_as_they_stand(flat: KinematicBackend) -> None:
+    """Where the middle of a handle is drawn is where it is when that is open."""
+
+    def handle(thing: str) -> tuple[float, ...]:
+        fixture, mover = flat.world.fixtures.movers[thing]
+        name = f"{fixture.name}/{thing}"
+        assert name in {body.body for body in flat.scene().bodies}
+        (x, y, z), (w, _, _, turned) = flat.frame().poses[name]
+        yaw = 2 * math.atan2(turned, w)
+        a, b, up = mover.handle_m
+        c, s = math.cos(yaw), math.sin(yaw)
+        return (x + c * a - s * b, y + s * a + c * b, z + up)
+
+    for thing in ("cupboard", "dresser_drawer_1"):
+        _, mover = flat.world.fixtures.movers[thing]
+        for kind, share in ((K.OPEN, 1.0), (K.CLOSE, 0.0)):
+            do(flat, kind, object=thing)
+            stands = flat.world.fixtures.moved_m(thing, mover.handle_m, share)
+            assert handle(thing) == pytest.approx(stands)
+
+
+def test_a_drawer_is_not_reached_under_one_that_is_open(flat: KinematicBackend) -> None:
+    do(flat, K.OPEN, object="dresser_drawer_1")
+    flat.begin("hsr", Motion(kind=K.OPEN, object="dresser_drawer_2"))
+    while flat.is_running("hsr"):
+        flat.advance()
+    outcome = flat.outcome("hsr")
+    assert outcome is not None and outcome.blocked_by == "dresser_drawer_1"
+    assert outcome.reason == "dresser_drawer_1, which is open, is in the way of dresser_drawer_2"
+    do(flat, K.CLOSE, object="dresser_drawer_1")
+    do(flat, K.OPEN, object="dresser_drawer_2")

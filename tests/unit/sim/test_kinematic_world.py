@@ -168,3 +168,22 @@ def test_a_hundred_robots_make_ten_thousand_motions_in_as_many_steps() -> None:
         steps += 1
     assert steps <= motions, "it goes from event to event"
     assert backend.time_s > 100.0
+
+
+def test_an_arm_that_does_not_drive_does_what_is_in_its_reach_and_refuses_the_rest() -> None:
+    mission = load_mission("workshop")
+    backend = KinematicBackend(
+        mission.world, [(robot.spec, robot.start_m_rad) for robot in mission.robots]
+    )
+    do(backend, "bench_arm", K.GO_TO, place="hall")  # it is there
+    gear = next(truth.point_m for truth in backend.truths() if truth.object == "gear_1")
+    for kind, fields in ((K.GO_TO, {"place": "store"}), (K.APPROACH, {"point_m": gear})):
+        outcome = do(backend, "bench_arm", kind, **fields)
+        assert outcome.state is MotionState.FAILED
+        assert "bench_arm does not drive" in (outcome.reason or "")
+        assert not outcome.retryable
+    do(backend, "rack_arm", K.APPROACH, point_m=gear)
+    do(backend, "rack_arm", K.GRASP, object="gear_1", point_m=gear)
+    do(backend, "locobot", K.GO_TO, place="rack_place")
+    do(backend, "rack_arm", K.RELEASE_IN_BASKET, robot="locobot")
+    assert backend.senses("locobot").basket == ("gear_1",)

@@ -6,6 +6,7 @@ import math
 import shutil
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from keyexpr_schema.payloads.robots import PoseMRad, RobotSpec
@@ -181,3 +182,16 @@ def test_joint_values_must_be_as_many_as_joints(tmp_path: Path) -> None:
     (tmp_path / "mine.model.yaml").write_text(text)
     with pytest.raises(BadFile, match=r"arm.speeds has 1 values; arm.joints has 4"):
         load_description("mine", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("robot", "model", "said"),
+    [
+        ("hsr", "bench_arm", r"robot hsr has capability `drive`, and its model bench_arm does not"),
+        ("bench_arm", "hsr", r"bench_arm has no capability `drive`, and its model hsr drives"),
+    ],
+)
+def test_a_robot_drives_as_its_model_does(robot: str, model: str, said: str) -> None:
+    spec = msgspec.structs.replace(load_robot(robot), model=model)
+    with pytest.raises(BadFile, match=said):
+        MujocoBackend(load_world("workshop"), [(spec, (4.6, 2.4, 0.0))])

@@ -16,6 +16,7 @@ from sim.files.mission_file import load_mission, load_robot
 from sim.files.solids import solids
 from sim.files.world_file import load_world
 from sim.files.world_payloads import object_payloads, place_payloads
+from sim.navigation.spots import Spots
 from sim.reachability import out_of_reach
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -214,6 +215,8 @@ def test_a_robot_that_cannot_drive_is_refused(tmp_path: Path) -> None:
     path.write_text("robot: r\nmodel: hsr\nskills: [navigate]\ncapabilities: {see: 4.0}\n")
     with pytest.raises(BadFile, match=r"it lacks `drive`, the robot's top speed in m/s"):
         load_robot(path)
+    path.write_text("robot: r\nmodel: bench_arm\nskills: [pick]\ncapabilities: {grip: 1.0}\n")
+    assert load_robot(path).skills == ("pick",)  # one that does not have to is not
     path.write_text("robot: r\nmodel: hsr\nskills: navigate\ncapabilities: {drive: 1}\n")
     with pytest.raises(BadFile, match=r"skills: expected a list, got text"):
         load_robot(path)
@@ -308,3 +311,58 @@ def test_the_apartment_is_furnished_and_everything_in_it_is_in_reach() -> None:
     assert out_of_reach(mission) == ()
     for place in place_payloads(world):
         assert set(place.travel_m) == set(world.place_entries) - {place.place}
+
+
+PARTS = {
+    "flat": {"label": "Flat", "region_m": [[0.0, 0.0, 10.0, 6.0]]},
+    "corner": {"label": "Corner", "part_of": "kitchen", "region_m": [[0.0, 3.6, 4.0, 6.0]]},
+}
+
+
+def test_places_have_parts_and_what_stands_there_is_in_all_of_them(changed: Any) -> None:
+    def change(raw: dict[str, Any]) -> None:
+        raw["places"] = {**PARTS, **raw["places"]}
+        for room in ("kitchen", "hallway", "living_room"):
+            raw["places"][room]["part_of"] = "flat"
+        raw["furniture"]["kitchen_table"]["place"] = "corner"
+
+    world = load_world(changed(change))
+    assert [world.place_at(1.0, y) for y in (5.0, 1.0)] == ["corner", "kitchen"]
+    assert world.places_around("corner") == ("corner", "kitchen", "flat")
+    places = {place.place: place for place in place_payloads(world)}
+    assert {name: place.part_of for name, place in places.items()} == {
+        "flat": None,
+        "corner": "kitchen",
+        "kitchen": "flat",
+        "hallway": "flat",
+        "living_room": "flat",
+    }
+    tables = {name: [s.surface for s in place.surfaces] for name, place in places.items()}
+    assert tables["corner"] == tables["kitchen"] == ["kitchen_table"]
+    assert set(tables["flat"]) == {"kitchen_table", "hallway_table", "coffee_table"}
+    spots = Spots(world).waiting
+    assert spots["corner"] and set(spots["corner"]) < set(spots["kitchen"]) < set(spots["flat"])
+
+
+@pytest.mark.parametrize(
+    ("place", "whole", "said"),
+    [
+        (
+            "corner",
+            "cellar",
+            r"corner\.part_of: there is no place 'cellar'; there are flat, ",
+        ),
+        ("kitchen", "corner", r"part_of: \w+ would be a part of itself"),
+        ("flat", "flat", r"places\.flat\.part_of: flat would be a part of itself"),
+        ("corner", "hallway", r"corner\.part_of: the middle of \[0\.0, .*\] is not in 'hallway'"),
+    ],
+)
+def test_a_part_that_cannot_be_is_one_clear_sentence(
+    changed: Any, place: str, whole: str, said: str
+) -> None:
+    def change(raw: dict[str, Any]) -> None:
+        raw["places"] = {**PARTS, **raw["places"]}
+        raw["places"][place] = {**raw["places"][place], "part_of": whole}
+
+    with pytest.raises(BadFile, match=said):
+        load_world(changed(change))

@@ -173,3 +173,18 @@ def test_a_hand_that_slips_off_a_handle_is_a_failure_that_can_be_tried_again(
         await home.do("open", thing="cupboard", place="kitchen")
 
     run(tmp_path, script, failures={"hsr": {MotionKind.OPEN.value: (1,)}})
+
+
+def test_what_is_open_and_in_the_way_becomes_known(tmp_path: Path) -> None:
+    async def script(home: Household) -> None:
+        await home.do("open", thing="dresser_drawer_1", place="kitchen")
+        home.cache.facts.clear()
+        with pytest.raises(SkillFailed, match="is in the way") as caught:
+            await home.do("open", thing="dresser_drawer_2", place="kitchen")
+        assert not caught.value.retryable
+        assert set(caught.value.facts) == {
+            ("blocked_by", "dresser_drawer_2", "dresser_drawer_1"),
+            ("is_open", "dresser_drawer_1", True),
+        }
+
+    run(tmp_path, script)

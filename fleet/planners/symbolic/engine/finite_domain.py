@@ -20,9 +20,12 @@ from fleet.core.model.formulas.nodes import (
 )
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, room_left
+from fleet.jobshop.time_budget import TimeBudget, Watch
+from fleet.planners.symbolic.engine.conditions import Conditions
 from fleet.planners.symbolic.engine.instantiation import Facts
-from fleet.planners.symbolic.engine.nodes import Nodes, Stands, State, merged, watch_lists
+from fleet.planners.symbolic.engine.nodes import Nodes, Stands, State, merged
 from fleet.planners.symbolic.engine.travel import Moves, Travel
+from fleet.planners.symbolic.engine.watch_lists import watch_lists
 from keyexpr_schema.facts import AT, HOLDING, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 
@@ -66,6 +69,9 @@ class FiniteDomainTask:
     """Operators and a goal over `nodes`, and what holds on the way there.
 
     `impossible` is a part of the goal that no operator touches and that does not hold.
+
+    Raises:
+        OutOfTime: the `budget` was over before it was made.
     """
 
     def __init__(
@@ -78,6 +84,7 @@ class FiniteDomainTask:
         travel: Travel,
         free: Collection[str],
         on_the_way: Trajectory = ANYHOW,
+        budget: TimeBudget | None = None,
     ) -> None:
         self.world = world
         self.goal = goal
@@ -94,11 +101,16 @@ class FiniteDomainTask:
         counted = {effect.variable for of in conditional for effect in of if effect.add is not None}
         able = [robot for robot in robots if robot in free]
         self.nodes = Nodes(world, start, able, changed, counted, travel)
+        self.conditions = Conditions(self.nodes)
         self.initial = self.nodes.initial
         self.position = self.nodes.position
         written = [self._written(a, of) for a, of in zip(actions, conditional, strict=True)]
-        rows = zip(actions, conditional, written, strict=True)
-        self.operators = [made for row in rows if (made := self._operator(*row))]
+        self.operators: list[Operator] = []
+        watch = Watch(budget)
+        for row in zip(actions, conditional, written, strict=True):
+            watch.look()
+            if (made := self._operator(*row)) is not None:
+                self.operators.append(made)
         self.impossible: Literal | None = None
         self.goal_needs, self.goal_stands = self._goal()
         self._count_rides()
@@ -263,10 +275,10 @@ class FiniteDomainTask:
         there = set(stands.values())
         for literal in rest:
             innermost = literal.value in there
-            nodes.append(self.nodes.literal(literal, aboard=False, innermost=innermost))
+            nodes.append(self.conditions.literal(literal, aboard=False, innermost=innermost))
         for condition in action.conditions:
             for part in conjuncts(expanded(condition, self.world)):
-                nodes.append(self.nodes.formula(part))
+                nodes.append(self.conditions.formula(part))
         if any(node is False for node in nodes):
             return None
         needs = tuple(dict.fromkeys(node for node in nodes if node is not True))
@@ -287,7 +299,7 @@ class FiniteDomainTask:
                     self.impossible = literal
                 stands.append((variable.subject, str(place)))
                 continue
-            node = self.nodes.literal(literal, aboard=True, innermost=False)
+            node = self.conditions.literal(literal, aboard=True, innermost=False)
             if node is False:
                 self.impossible = literal
             elif node is not True:

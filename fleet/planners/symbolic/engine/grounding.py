@@ -9,7 +9,7 @@ costs (`fleet.planners.symbolic.engine.travel`).
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from fleet.core.model import derived
 from fleet.core.model.formulas.evaluation import expanded
@@ -17,6 +17,7 @@ from fleet.core.model.formulas.nodes import And, Formula, Holds, Not, Or, Stored
 from fleet.core.model.parameter_types import ROBOT
 from fleet.core.model.skills import Action, SkillModel
 from fleet.core.model.world import WorldModel, room_left
+from fleet.jobshop.time_budget import TimeBudget, Watch
 from fleet.planners.symbolic.engine.instantiation import ANY, Binding, Facts, Instantiation
 from fleet.planners.symbolic.engine.readings import is_read_off
 from fleet.planners.symbolic.engine.relevance import Row
@@ -37,10 +38,14 @@ from keyexpr_schema.facts import (
 class Grounding:
     """The actions of some robots that matter for a goal, and what stood in the way of others.
 
-    `robots` are those looked at, `free` those of them that can drive wherever they are needed.
+    `robots` are those looked at, `free` those of them that can drive wherever they are needed, with
+    where they stand.
     Things are put down and handed over where something is that an action handles, where it shall
     be, or where robots are that cannot drive. `thorough`: in all places, and also with detours over
     furniture, trays and baskets that nothing speaks of.
+
+    Raises:
+        OutOfTime: the `budget` was over before.
     """
 
     def __init__(
@@ -49,15 +54,17 @@ class Grounding:
         start: Facts,
         goal: Sequence[Literal],
         robots: Sequence[str],
-        free: Collection[str],
+        free: Mapping[str, Value],
         thorough: bool = False,
+        budget: TimeBudget | None = None,
     ) -> None:
         self.world = world
         self.start = start
         self.goal = goal
         self.robots = robots
-        self.free = frozenset(free)
+        self.free = free
         self._thorough = thorough
+        self._watch = Watch(budget)
         self.skills = Instantiation(world, start, goal, robots, free)
         self._carriers = self._that_carry()
         self._places: tuple[str, ...] = tuple(world.places)
@@ -66,9 +73,9 @@ class Grounding:
             return
         spoken_of = {name for (_, subject), value in goal for name in (subject, value)}
         matter = self._where_are({*spoken_of, *(robot for robot in robots if robot not in free)})
-        known: set[str] | None = None
-        while known is None or not matter <= known:
-            known = set(matter)
+        known: set[str] = set()
+        while not known or not matter <= known:
+            known = matter or set(world.places)
             self._places = tuple(place for place in world.places if place in known)
             self.skills.look_at(self._places)
             self._ground()
@@ -85,6 +92,7 @@ class Grounding:
         for literal in self.goal:
             self._want_reading(literal, aboard=True)
         while self._open:
+            self._watch.look()
             self._achieve(self._open.pop())
 
     @property
@@ -100,6 +108,19 @@ class Grounding:
             for row in self.skills.writers[literal.variable[0]]
         )
         return [(row.skill, binding) for row, binding in found if binding is not None]
+
+    def may_come_along(self, literal: Literal) -> bool:
+        """Whether what a literal is about, or says it is held, is on or in something that moves, so
+        that it gets elsewhere by itself; or whether robots were refused a place for what it is."""
+        names = (literal.variable.subject, literal.value)
+        around = (
+            carrier for name in names if isinstance(name, str) for carrier in self._around(name)
+        )
+        return literal in self.skills.refused_there or any(
+            self.skills.writable(FactKey(AT, carrier))
+            for carrier in around
+            if carrier in self.world.objects
+        )
 
     # What is wanted.
 
@@ -172,15 +193,21 @@ class Grounding:
         )
 
     def _where_are(self, names: Collection[Value]) -> set[str]:
-        """The innermost places around things and robots; places themselves."""
+        """The innermost places around things and robots, also in a hand; places themselves."""
         found = set[str]()
         for name in names:
-            if not isinstance(name, str):
-                continue
-            chain = (name, *derived.carriers(name, self.skills.known, self.world, aboard=True))
-            here = next((carrier for carrier in chain if carrier in self.world.places), None)
-            found |= set() if here is None else {here}
+            seen: set[Value] = set()
+            while isinstance(name, str) and name not in self.world.places and name not in seen:
+                seen.add(name)
+                name = derived.carrier_of(name, self._now, self.world)
+            if isinstance(name, str) and name in self.world.places:
+                found.add(name)
         return found
+
+    def _now(self, key: FactKey) -> Value:
+        if key.relation == AT and key.subject in self.free:
+            return self.free[key.subject]
+        return self.skills.known(key)
 
     def _around(self, name: str) -> tuple[str, ...]:
         return tuple(derived.carriers(name, self.skills.known, self.world, aboard=True))

@@ -2,12 +2,14 @@
 
 The goal is followed back: what could make it true, what that needs, and so on, to the first thing
 that nothing can bring about: a capability, a robot, a tool, a way, a place that nobody knows.
+Where that is something that no detour can bring about either, it is certain.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from fleet.core.model import derived
 from fleet.core.model.formulas.evaluation import conjuncts, expanded
@@ -19,19 +21,30 @@ from fleet.planners.symbolic.engine.finite_domain import FiniteDomainTask
 from fleet.planners.symbolic.engine.grounding import Grounding
 from fleet.planners.symbolic.engine.instantiation import Binding
 from fleet.planners.symbolic.engine.relevance import rows_of
-from keyexpr_schema.facts import AT, IN, ON, REACHABLE, Literal
+from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, REACHABLE, Literal
 
 MAX_NAMED = 3
 """Reasons named, where there are several of a kind."""
 
 
-def what_is_missing(grounding: Grounding, task: FiniteDomainTask) -> str:
-    """A phrase for a goal that is out of reach."""
+@dataclass(frozen=True)
+class Missing:
+    """Why a goal is out of reach: a phrase, and the things of which that is because nobody knows
+    where they are. `certain`: it is, whatever detours are looked at."""
+
+    phrase: str
+    unlocated: tuple[str, ...]
+    certain: bool
+
+
+def what_is_missing(grounding: Grounding, task: FiniteDomainTask) -> Missing:
+    """What there is to say of a goal that is out of reach."""
     search = _Missing(grounding, task)
     goal = task.impossible or next(filter(search.is_missing, task.goal), None)
     if goal is None:
-        return "all that it needs can be had, but not at the same time"
-    return search.why(goal)
+        return Missing("all that it needs can be had, but not at the same time", (), False)
+    phrase = search.why(goal)
+    return Missing(phrase, tuple(search.unlocated), search.certain)
 
 
 class _Missing:
@@ -41,17 +54,23 @@ class _Missing:
         self._world = grounding.world
         self._true = _reachable(task)
         self._seen: set[Literal | Formula] = set()
+        self.unlocated: dict[str, None] = {}
+        """Things that would have to be found first."""
+        self.certain = True
 
     def is_missing(self, literal: Literal) -> bool:
         """Whether a literal of the goal is out of reach."""
         if self._is_position(literal):
             return self._task.travel.action(literal.variable[1], str(literal.value)) is None
-        return not self._can_be(self._task.nodes.literal(literal, aboard=True, innermost=False))
+        return not self._can_be(
+            self._task.conditions.literal(literal, aboard=True, innermost=False)
+        )
 
     def why(self, literal: Literal | Formula) -> str:
         """What is missing first for something that can never hold."""
         self._seen.add(literal)
         if not isinstance(literal, Literal):
+            self.certain = False
             return f"{formula_text(literal)} never holds"
         unknown = self._unknown(literal)
         if unknown is not None:
@@ -61,20 +80,34 @@ class _Missing:
         for action in self._grounding.actions:
             if any(derived.written(row, self._world) == stored for row in action.after):
                 first = next(self._missing_for(action), None)
+                self.certain &= first is not None
                 if first is not None and first not in self._seen:
                     missing[first] = None
         if missing:
-            found = [self.why(first) for first in list(missing)[:MAX_NAMED]]
-            return "; ".join(dict.fromkeys(found))
+            found = dict.fromkeys(self.why(first) for first in missing)
+            return "; ".join(list(found)[:MAX_NAMED])
         refused = self._grounding.skills.refused.get(stored, [])
         if refused:
+            by = self._grounding.skills.refused_by[stored]
+            everybody = all(skill.name in by for skill, _ in self._grounding.makers_of(literal))
+            self.certain &= everybody and not self._grounding.may_come_along(stored)
             more = f" (and {len(refused) - MAX_NAMED} more)" if len(refused) > MAX_NAMED else ""
             return "; ".join(refused[:MAX_NAMED]) + more
         makers = self._grounding.makers_of(literal)
         if not makers:
             return self._no_maker(stored)
-        lacking = dict.fromkeys(w for skill, args in makers for w in self._lacking(skill, args))
-        return "; ".join(list(lacking)[:MAX_NAMED]) or f"nothing leads to {literal}"
+        lacking = [list(self._lacking(skill, args)) for skill, args in makers]
+        if any(lacking):
+            self.certain &= all(lacking)
+            named = dict.fromkeys(what for rows in lacking for what in rows)
+            return "; ".join(list(named)[:MAX_NAMED])
+        for skill, args in makers:
+            for (relation, parameter), _ in skill.before:
+                name = args.get(parameter)
+                if name is not None and self._is_lost(relation, name):
+                    return self._nobody_knows_where(name)
+        self.certain = False
+        return f"nothing leads to {literal}"
 
     def _lacking(self, skill: SkillModel, args: Binding) -> Iterator[str]:
         """What there is not of the kind that a skill takes: a tool, a second robot."""
@@ -96,16 +129,26 @@ class _Missing:
             if isinstance(value, str) and world.kind_of(value) is None:
                 return f"nobody knows of a place {value}"
             if subject in world.robots:
+                self.certain = False
                 return f"{subject} cannot drive to {value}"
-        if relation in (AT, ON, IN, REACHABLE) and not derived.is_located(
-            subject, self._task.nodes.known, world
-        ):
-            return f"nobody knows where {subject} is"
-        return None
+        return self._nobody_knows_where(subject) if self._is_lost(relation, subject) else None
+
+    def _is_lost(self, relation: str, name: str) -> bool:
+        """Whether something has a part in a relation for which it must be known where it is, and
+        it is not."""
+        return (
+            relation in (AT, ON, IN, REACHABLE, HELD, LOCATED)
+            and name in self._world.objects
+            and not derived.is_located(name, self._task.nodes.known, self._world)
+        )
+
+    def _nobody_knows_where(self, name: str) -> str:
+        self.unlocated[name] = None
+        return f"nobody knows where {name} is"
 
     def _missing_for(self, action: Action) -> Iterator[Literal | Formula]:
         """What an action needs that can never hold."""
-        nodes = self._task.nodes
+        conditions = self._task.conditions
         there = {literal.value for literal in action.before if self._is_position(literal)}
         for literal in action.before:
             if self._is_position(literal):
@@ -114,11 +157,11 @@ class _Missing:
                     yield literal
             else:
                 innermost = literal.value in there
-                if not self._can_be(nodes.literal(literal, aboard=False, innermost=innermost)):
+                if not self._can_be(conditions.literal(literal, aboard=False, innermost=innermost)):
                     yield literal
         for condition in action.conditions:
             for part in conjuncts(expanded(condition, self._world)):
-                if not self._can_be(nodes.formula(part)):
+                if not self._can_be(conditions.formula(part)):
                     yield part
 
     def _is_position(self, literal: Literal) -> bool:

@@ -40,6 +40,10 @@ class Instantiation:
         self.free = frozenset(free)
         self.refused: dict[Literal, list[str]] = defaultdict(list)
         """Why robots cannot do what would make a literal true."""
+        self.refused_by: dict[Literal, set[str]] = defaultdict(set)
+        """The skills that it was."""
+        self.refused_there: set[Literal] = set()
+        """Those for which some cannot do it in certain places."""
         self._skills = related_skills(world, goal)
         self.writers: dict[str, list[Row]] = defaultdict(list)
         """By relation, the effects that change it."""
@@ -177,17 +181,24 @@ class Instantiation:
             robot = binding[parameter]
             if parameter != skill.actor_parameter or skill.name in self.world.robots[robot].skills:
                 return True
-            self._refuse(literal, f"{robot} does not have the skill {skill.name}")
+            self._refuse(literal, skill, f"{robot} does not have the skill {skill.name}")
             return False
         if not complete and parameter == skill.actor_parameter and self.world.hopeless:
             return True  # the whole call may be one that is not to be tried again
         args = {name: binding.get(name, "") for name in skill.parameters}
         why = self.world.lacks(binding[parameter], skill.ground(args), parameter)
-        self._refuse(literal, why)
+        self._refuse(literal, skill, why)
+        places = {name for name, kind in skill.types.items() if kind.bases == (PLACE,)}
+        there = measured & places or (places and binding[parameter] in self.world.marked)
+        if why is not None and literal is not None and there:
+            self.refused_there.add(literal)
         return why is None
 
-    def _refuse(self, literal: Literal | None, why: str | None) -> None:
-        if why is not None and literal is not None and why not in self.refused[literal]:
+    def _refuse(self, literal: Literal | None, skill: SkillModel, why: str | None) -> None:
+        if why is None or literal is None:
+            return
+        self.refused_by[literal].add(skill.name)
+        if why not in self.refused[literal]:
             self.refused[literal].append(why)
 
     def fits(self, kind: str, name: str) -> bool:

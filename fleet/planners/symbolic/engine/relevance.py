@@ -6,34 +6,21 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from fleet.core.model.derived import READ_OFF
 from fleet.core.model.formulas.nodes import relations_of
 from fleet.core.model.parameter_types import OBJECT
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
-from fleet.planners.symbolic.engine.travel import only_drives
+from fleet.planners.symbolic.engine.travel import can_be_put_off
 from keyexpr_schema.facts import (
     AT,
-    HELD,
-    HOLDING,
     IN,
-    IS_OPEN,
-    LOCATED,
     ON,
-    REACHABLE,
     FactKey,
     Literal,
     Value,
 )
 from keyexpr_schema.payloads.world import Object
-
-READ_OFF = {
-    LOCATED: {AT},
-    HELD: {AT, HOLDING},
-    REACHABLE: {AT, IS_OPEN},
-    ON: {ON, AT},
-    IN: {IN, AT},
-}
-"""Relations that a derived one is read off."""
 
 
 @dataclass(frozen=True)
@@ -89,14 +76,14 @@ def _stored(variable: FactKey, value: Value, skill: SkillModel) -> FactKey:
 
 def related_skills(world: WorldModel, goal: Iterable[Literal]) -> list[SkillModel]:
     """Skills that write a relation which the goal, or such a skill, reads; drives left out."""
-    wanted = set[str]().union(*(_read(literal.variable.relation) for literal in goal))
+    wanted = frozenset[str]().union(*(_read(literal.variable.relation) for literal in goal))
     related: set[str] = set()
     while True:
         more = {
             name
             for name, skill in world.skills.items()
             if name not in related
-            and not only_drives(skill)
+            and not can_be_put_off(skill)
             and wanted & {row.relation for row in rows_of(skill)}
         }
         if not more:
@@ -111,8 +98,8 @@ def related_skills(world: WorldModel, goal: Iterable[Literal]) -> list[SkillMode
             )
 
 
-def _read(relation: str) -> set[str]:
-    return READ_OFF.get(relation, {relation})
+def _read(relation: str) -> frozenset[str]:
+    return READ_OFF.get(relation, frozenset({relation}))
 
 
 def few_of_each(

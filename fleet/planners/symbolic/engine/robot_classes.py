@@ -9,7 +9,7 @@ from fleet.core.model.parameter_types import OBJECT
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.planners.symbolic.engine.relevance import related_skills
-from fleet.planners.symbolic.engine.travel import only_drives
+from fleet.planners.symbolic.engine.travel import can_be_put_off
 from keyexpr_schema.facts import AT, HOLDING, NOTHING, FactKey, Literal, Value
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -55,7 +55,7 @@ def representatives(
                 continue
         alone = named or robot in world.marked
         drives = any(
-            name in world.skills and only_drives(world.skills[name]) for name in spec.skills
+            name in world.skills and can_be_put_off(world.skills[name]) for name in spec.skills
         )
         relations = asked - {AT} if drives else asked
         known = tuple(facts.get(FactKey(relation, robot)) for relation in sorted(relations))

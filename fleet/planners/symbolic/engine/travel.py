@@ -19,17 +19,10 @@ Moves = dict[str, str]
 """Robots, and the places that they have to be in."""
 
 
-def only_drives(skill: SkillModel) -> bool:
-    """Whether a skill only changes where its robot is, and can be done at any time."""
-    if skill.before or skill.space_in or len(skill.after) != 1 or len(skill.parameters) != 2:
-        return False
-    ((relation, subject), value) = skill.after[0]
-    return (
-        relation == AT
-        and subject == skill.actor_parameter
-        and isinstance(value, str)
-        and skill.parameters.get(value) == "place"
-    )
+def can_be_put_off(skill: SkillModel) -> bool:
+    """Whether a skill does nothing but get its robot to a place, and can be done at any time."""
+    asks = skill.before or skill.conditions or skill.space_in
+    return skill.moves_to is not None and not asks and len(skill.parameters) == 2
 
 
 class _Ways(dict[tuple[str, Value, str], float]):
@@ -55,7 +48,7 @@ class Travel:
     def __init__(self, world: WorldModel, facts: dict[FactKey, Value]) -> None:
         self._world = world
         self._facts = facts
-        self._skills = [skill for skill in world.skills.values() if only_drives(skill)]
+        self._skills = [skill for skill in world.skills.values() if can_be_put_off(skill)]
         self.charges_s: dict[tuple[str, str], float] = {}
         """What a robot's way to a place costs more."""
         self.way_s = _Ways(self._way_s)
@@ -91,8 +84,7 @@ class Travel:
         """The quickest skill of a robot that leads to a place; `None` if none does."""
         found: list[tuple[float, str, Action]] = []
         for skill in self._skills:
-            to = next(name for name, kind in skill.parameters.items() if kind == "place")
-            action = skill.ground({skill.actor_parameter: robot, to: target})
+            action = skill.ground({skill.actor_parameter: robot, str(skill.moves_to): target})
             if self._world.lacks(robot, action, skill.actor_parameter) is None:
                 found.append((self._world.work_s(robot, skill), skill.name, action))
         return min(found, key=lambda row: row[:2])[2] if found else None

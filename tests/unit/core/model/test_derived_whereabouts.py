@@ -6,7 +6,16 @@ import pytest
 
 from fleet.core.model.derived import holds, read_by, written
 from fleet.core.model.world import WorldModel
-from keyexpr_schema.facts import AT, HOLDING, IS_OPEN, FactKey, Literal, Value, parse_literal
+from keyexpr_schema.facts import (
+    AT,
+    BLOCKED_BY,
+    HOLDING,
+    IS_OPEN,
+    FactKey,
+    Literal,
+    Value,
+    parse_literal,
+)
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Object, Place
 
@@ -32,6 +41,8 @@ WORLD = WorldModel(
             thing("table", "supports", movable=False),
             thing("cabinet", "supports", movable=False),
             thing("drawer", "contains", "openable", part_of="cabinet"),
+            thing("lower", "contains", "openable", part_of="cabinet", blocked_by=("drawer",)),
+            thing("oven", "openable", "supports", movable=False, home="kitchen"),
             thing("anna", "person", movable=False),
         )
     },
@@ -63,7 +74,7 @@ def true(text: str, aboard: bool = False, **changes: Value) -> bool:
     """Whether it holds; `changes` are `at` facts, or `holding_arm=…`, `is_open_drawer=…`."""
     facts = dict(FACTS)
     for name, value in changes.items():
-        for relation in (HOLDING, IS_OPEN):
+        for relation in (HOLDING, IS_OPEN, BLOCKED_BY):
             if name.startswith(relation):
                 facts[FactKey(relation, name.removeprefix(relation + "_"))] = value
                 break
@@ -115,6 +126,26 @@ def test_what_is_in_something_closed_cannot_be_reached():
     assert true("reachable(cup) = false", is_open_drawer=False)
     assert true("reachable(drawer) = true") and true("reachable(fork) = true")
     assert true("reachable(fork) = false", bowl="drawer")
+
+
+def test_what_is_behind_something_open_cannot_be_reached():
+    assert true("reachable(lower) = true") and true("reachable(lower) = true", is_open_drawer=False)
+    assert true("reachable(lower) = false", is_open_drawer=True)
+    both = {"is_open_drawer": True, "is_open_lower": True}
+    assert true("reachable(cup) = false", cup="lower", **both)
+    assert true("reachable(cup) = true", cup="drawer", **both)
+    assert true("reachable(drawer) = true", **both)
+
+
+def test_what_somebody_found_in_the_way_is_so_while_it_is_open():
+    found = {"blocked_by_cabinet": "oven"}
+    assert true("reachable(cup) = true", cup="cabinet", is_open_oven=True)
+    assert true("reachable(cup) = false", cup="cabinet", is_open_oven=True, **found)
+    assert true("reachable(cup) = true", cup="cabinet", is_open_oven=False, **found)
+    # What is in the way at its top is not at its drawers, and nothing is in its own way.
+    assert true("reachable(cup) = true", is_open_drawer=True, is_open_oven=True, **found)
+    own = {"blocked_by_cabinet": "drawer"}
+    assert true("reachable(drawer) = true", is_open_drawer=True, **own)
 
 
 def test_located_and_held():

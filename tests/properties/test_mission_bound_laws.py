@@ -36,7 +36,7 @@ def test_the_optimum_of_a_small_scene_is_not_below_it(
     reached["near"] += bound_s > 0.6 * optimum.makespan_s
 
 
-@reaches(least={"valid": 100, "bound": 30})
+@reaches(least={"valid": 100, "bound": 10})
 @settings(max_examples=600, deadline=None)
 @given(kitchen_plans())
 def test_no_valid_plan_is_below_it(reached: Reached, drawn: tuple[Plan, WorldModel]) -> None:

@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from fleet.core.model.derived import holds
+from fleet.core.model.formulas.nodes import Formula, grounded
+from fleet.core.model.formulas.text import formula_text
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel, known_value, room_left
 from keyexpr_schema.facts import FactKey, Literal, Value, render_value
 
 Left = tuple[str, Value]
 """A relation and its value, as an actor leaves them of its robot."""
+
+
+class Asked(NamedTuple):
+    """A formula before a task about one actor, decided by what `relations` are of its robot at the
+    start: `holds` says whether it does in every order."""
+
+    formula: Formula
+    task: str
+    actor: str
+    relations: tuple[str, ...]
+    holds: Callable[[Asked, Mapping[str, Value]], bool]
 
 
 @dataclass
@@ -23,9 +37,18 @@ class Requirement:
     """By relation: the value needed, and the task that needs it first."""
     valued: dict[FactKey, str] = field(default_factory=dict)
     """Variables whose value at the start must be this robot, and the task that needs it first."""
+    asked: list[Asked] = field(default_factory=list)
+    """Formulas that hold or not by which robot it is."""
     space: int = 0
     """Room needed in its basket, in objects."""
     pinned_to: str | None = None
+
+
+class _Asks(NamedTuple):
+    """Which list of robots comes into question for an actor, and what must hold of its robot."""
+
+    fitting: int
+    facts: frozenset[Left]
 
 
 class Candidates:
@@ -53,32 +76,48 @@ class Candidates:
             kind = spec.skills, tuple(spec.capabilities.items()), marked
             alike.setdefault(kind, []).append(robot)
         self._kinds = list(alike.values())
+        self._room: dict[str, float] = {}
+        self._answers: dict[tuple[Asked, tuple[Value, ...]], bool] = {}
         self._playable: dict[tuple[object, ...], list[str]] = {}
         fitting = {actor: self._fitting(each) for actor, each in requirements.items()}
+        asks = {
+            actor: _Asks(
+                id(fitting[actor]),
+                frozenset((name, row[0]) for name, row in each.facts.items()),
+            )
+            for actor, each in requirements.items()
+        }
+        first = {asked: actor for actor, asked in reversed(asks.items())}
+        """What many actors ask alike is answered once."""
         unmet = {
-            actor: {robot: list(self._unmet(robot, requirements[actor])) for robot in robots}
-            for actor, robots in fitting.items()
+            asked: {
+                robot: list(self._unmet(robot, requirements[actor])) for robot in fitting[actor]
+            }
+            for asked, actor in first.items()
         }
         offered: dict[str, set[Left]] = {robot: set() for robot in world.team}
-        for actor, rows in unmet.items():
-            for robot, missing in rows.items():
+        for asked, left in {(asks[actor], frozenset(leaves.get(actor, ()))) for actor in asks}:
+            states = {
+                (relation, value)
+                for relation, value in left
+                if not isinstance(value, str) or world.kind_of(value) is None
+            }
+            for robot, missing in unmet[asked].items() if states else ():
                 if not missing:
-                    offered[robot] |= {
-                        (relation, value)
-                        for relation, value in leaves.get(actor, ())
-                        if not isinstance(value, str) or world.kind_of(value) is None
-                    }
-        self.able: dict[str, tuple[str, ...]] = {
-            actor: tuple(
+                    offered[robot] |= states
+        able = {
+            asked: tuple(
                 robot
                 for robot, missing in rows.items()
                 if all(
-                    (relation, requirements[actor].facts[relation][0]) in offered[robot]
-                    for relation in missing
+                    (name, value) in offered[robot]
+                    for name, value in asked.facts
+                    if name in missing
                 )
             )
-            for actor, rows in unmet.items()
+            for asked, rows in unmet.items()
         }
+        self.able: dict[str, tuple[str, ...]] = {actor: able[asks[actor]] for actor in asks}
 
     def reasons(self, actor: str) -> Iterator[str]:
         """Why each robot of the team that cannot be the actor cannot."""
@@ -101,7 +140,7 @@ class Candidates:
         able = self._able_to_play(requirement)
         if requirement.pinned_to is not None:
             able = [requirement.pinned_to] if requirement.pinned_to in able else []
-        if requirement.valued or requirement.space > 0:
+        if requirement.valued or requirement.asked or requirement.space > 0:
             able = [robot for robot in able if self._unfit(robot, requirement) is None]
         return able
 
@@ -138,12 +177,25 @@ class Candidates:
         for variable, task in requirement.valued.items():
             if (has := known_value(variable, self._world.facts, self._world)) != robot:
                 return f"{task} needs {variable} = {robot}, and it is {has}"
+        for asked in requirement.asked:
+            if not self._is_answered(asked, robot):
+                formula = formula_text(grounded(asked.formula, {asked.actor: robot}))
+                return f"{asked.task} needs {formula}, which need not hold"
         if requirement.space > 0:
-            room = room_left(robot, self._world.facts, self._world)
+            if robot not in self._room:
+                self._room[robot] = room_left(robot, self._world.facts, self._world)
+            room = self._room[robot]
             if room < requirement.space:
                 needed = f"{requirement.space} are needed"
                 return f"{robot}'s basket has room for {room} more and {needed}"
         return None
+
+    def _is_answered(self, asked: Asked, robot: str) -> bool:
+        values = {name: self._value_of(FactKey(name, robot)) for name in asked.relations}
+        key = asked, tuple(values.values())
+        if key not in self._answers:
+            self._answers[key] = asked.holds(asked, values)
+        return self._answers[key]
 
     def _unmet(self, robot: str, requirement: Requirement) -> Iterator[str]:
         """Relations that do not hold of the robot now as the actor needs them."""

@@ -9,12 +9,13 @@ from collections import defaultdict
 from collections.abc import Mapping
 from functools import cached_property
 
-from fleet.core.checker.actor_requirements import Requirement
+from fleet.core.checker.actor_requirements import Asked, Requirement
 from fleet.core.checker.plan_goals import PlanGoals
 from fleet.core.checker.quantities import BasketLoads
 from fleet.core.checker.reachable_states import ReachableStates, Undecided, listed
 from fleet.core.checker.writers import Writers
 from fleet.core.model.derived import holds, read_by
+from fleet.core.model.formulas.evaluation import conjuncts, expanded
 from fleet.core.model.formulas.nodes import (
     TRUE,
     And,
@@ -123,6 +124,7 @@ class Causality:
         try:
             failure = self._states.failure(formula, task)
         except Undecided:
+            self._ask_of_robot(task, formula)
             return
         if failure is None:
             return
@@ -146,6 +148,47 @@ class Causality:
             value = bare_name(value) if isinstance(value, str) else value
             condition = Condition(relation=relation, subject=bare_name(subject), value=value)
         self._report(code, f"{needs}, and {why}", task, condition)
+
+    def _ask_of_robot(self, task: str, formula: Formula) -> None:
+        """What a formula says of one actor, and no other actor changes, its robot decides."""
+        for part in conjuncts(expanded(formula, self._world)):
+            try:
+                read = self._states.read_for(part)
+            except Undecided:
+                continue
+            actors = {key.subject for key in read if actor_in(key.subject) is not None}
+            if len(actors) != 1:
+                continue
+            (actor,) = actors
+            others = self._changers
+            if all(others[key.relation] <= {actor} for key in read if key.subject == actor):
+                of_actor = sorted(key.relation for key in read if key.subject == actor)
+                asked = Asked(part, task, actor, tuple(of_actor), self._holds_for)
+                self.requirements[actor].asked.append(asked)
+
+    @cached_property
+    def _changers(self) -> Mapping[str, set[str]]:
+        """By relation, the actors of which some task changes it: two may be the same robot."""
+        found: dict[str, set[str]] = defaultdict(set)
+        for key in self._writers.variables:
+            if actor_in(key.subject) is not None:
+                found[key.relation].add(key.subject)
+        return found
+
+    def _holds_for(self, asked: Asked, values: Mapping[str, Value]) -> bool:
+        """Whether it does in every order, with these values of the actor's variables at first."""
+
+        def start(variable: FactKey) -> Value:
+            needed = self.requirements[asked.actor].facts
+            if variable.subject != asked.actor or variable.relation in needed:
+                return self._at_start(variable)
+            return values[variable.relation]
+
+        states = ReachableStates(self._graph, self._writers, self._world, start)
+        try:
+            return states.failure(asked.formula, asked.task) is None
+        except Undecided:
+            return True
 
     def _report(
         self, code: str, sentence: str, task: str | None = None, condition: Condition | None = None

@@ -18,6 +18,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 from typing import ClassVar
 
 import msgspec
@@ -25,6 +26,7 @@ import msgspec
 from fleet.core.checker.actor_requirements import Candidates, Left, Requirement
 from fleet.core.checker.causality import Causality
 from fleet.core.checker.well_formedness import PlanForm
+from fleet.core.model.formulas.effects import instances
 from fleet.core.model.skills import Action
 from fleet.core.model.task_graph import Cycle, TaskGraph
 from fleet.core.model.world import WorldModel
@@ -51,7 +53,9 @@ class CheckedPlan:
 
     @cached_property
     def effects(self) -> Mapping[FactKey, Value]:
-        """What tasks make of each variable; of several, the last in the graph's order."""
+        """What tasks make of each variable in any case; of several, the last in the graph's order.
+        What depends on something is not in it: who may still have a load is told by it, and the
+        check of the allocated plan does not need it."""
         return _effects(self.graph, self.actions)
 
     def with_making(self, making: Making, strategy: str) -> CheckedPlan:
@@ -90,7 +94,7 @@ def check_plan(plan: Plan, world: WorldModel) -> CheckedPlan | InvalidPlan:
         for name, each in causality.requirements.items()
         if (actor := actor_in(name)) is not None
     }
-    candidates = Candidates(requirements, _leaves(_effects(graph, actions)), world)
+    candidates = Candidates(requirements, _leaves(graph, actions, world), world)
     violations = (*causality.violations, *_actors_without_robot(candidates))
     able = {actor: candidates.able[actor] for actor in plan.actors}
     if violations:
@@ -139,10 +143,20 @@ def _effects(graph: TaskGraph, actions: Mapping[str, Action]) -> dict[FactKey, V
     return {key: value for task in graph.order for key, value in actions[task].after}
 
 
-def _leaves(effects: Mapping[FactKey, Value]) -> dict[str, set[Left]]:
-    """What each actor leaves of its robot: its tasks have an order, and the last one holds."""
+def _leaves(
+    graph: TaskGraph, actions: Mapping[str, Action], world: WorldModel
+) -> dict[str, set[Left]]:
+    """What each actor leaves of its robot, or may: its tasks have an order, and the last one holds;
+    what depends on something may be so. Numbers that are added up are not among it."""
     leaves: dict[str, set[Left]] = defaultdict(set)
-    for (relation, subject), value in effects.items():
+    conditional = (
+        (row.variable, row.value)
+        for action in actions.values()
+        for effect in action.conditional
+        for row in instances(effect, world)
+        if row.to is None
+    )
+    for (relation, subject), value in chain(_effects(graph, actions).items(), conditional):
         if (actor := actor_in(subject)) is not None:
             leaves[actor].add((relation, value))
     return leaves

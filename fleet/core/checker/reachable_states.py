@@ -91,6 +91,17 @@ class ReachableStates:
             raise Undecided
         return None
 
+    def read_for(self, part: Formula) -> frozenset[FactKey]:
+        """The variables that may decide it, at whatever time; start values of actors aside."""
+
+        def ever(variable: FactKey) -> Collection[Value] | None:
+            try:
+                return self._ever(variable)
+            except Undecided:
+                return self._writers.values(variable) or None
+
+        return self._closure(reads(part, ever, self._world))
+
     def failure_at_any_time(self, formula: Formula, *, aboard: bool = False) -> Failure | None:
         """What of the formula does not hold all the time, before and after each task.
 

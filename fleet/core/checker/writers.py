@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from fleet.core.model.formulas.effects import Guarded, instances
 from fleet.core.model.skills import Action
@@ -48,6 +48,12 @@ class Writers:
     def plain_of(self, task: str) -> tuple[Literal, ...]:
         """What the task makes true in any case."""
         return self._actions[task].after
+
+    @property
+    def variables(self) -> Iterator[FactKey]:
+        """Every variable that some task writes, or may."""
+        yield from self._plain_mask
+        yield from self._guarded_mask
 
     def mask(self, variable: FactKey) -> int:
         """Every task that writes it, or may."""

@@ -36,7 +36,9 @@ from keyexpr_schema.payloads.plans import Plan
 
 MAX_COMBINATIONS = 256
 """Up to this many combinations are all compared; beyond, one sequence is changed at a time."""
-MOST_CHANGES = 32
+MANY = 16
+"""Subgoals that are many, however few sequences there are for each."""
+MOST_CHANGES = 24
 """Of those changes, how many are compared as plans: those that spread the work best."""
 MOST_REFINED, REFINING_NODES = 12, 3000
 """Of those, how many of the most promising get a better allocation, and how long it is sought."""
@@ -174,7 +176,7 @@ class _Choosing:
 
     def _each_alone(self, options: Sequence[Choice]) -> _Candidate | None:
         """For each goal what is best as if there were no other, if that is a plan in time."""
-        if prod(map(len, options)) > MAX_COMBINATIONS:
+        if _are_many(options):
             return self._each_alone_quickly(options)
         alone, choice = replace(self, explored=None), list[Choice]()
         for goal in dict.fromkeys(alternatives[0].goal for alternatives in options):
@@ -259,9 +261,8 @@ class _Choosing:
     def _with_joint_trips(self, begin: _Candidate, options: Sequence[Choice]) -> _Candidate:
         """Sequences for two goals joined into one with one carrier, for as long as that helps."""
         best, ways = begin, [list(alternatives) for alternatives in options]
-        if prod(map(len, ways)) > MAX_COMBINATIONS:
-            best = self._many_joined(best, ways)
-            ways = [[sequence] for sequence in best.choice]
+        if _are_many(options):
+            return self._many_joined(best, ways)
         while (joint := self._joint_trip(best, ways)) is not None:
             (one, other, made), best = joint
             ways[one] = [made.sequence]
@@ -269,26 +270,41 @@ class _Choosing:
         return best
 
     def _many_joined(self, begin: _Candidate, options: Sequence[Choice]) -> _Candidate:
-        """Of many goals, all pairs of trips at once that are less work as one, if that helps."""
-        pairs = self.trips.pairs(options)
-        made = [(pair.made.sequence,) for pair in pairs]
-        balance = Balance(self.workloads, [*options, *made], begin.choice)
-        joined: set[int] = set()
-        for one, other, trip in pairs:
-            before = balance.estimate
-            if joined.isdisjoint((one, other)):
-                old = balance.choice[one], balance.choice[other]
-                balance.put(one, trip.sequence)
-                balance.put(other, None)
-                if balance.estimate < before:
-                    joined |= {one, other}
-                else:
-                    balance.put(one, old[0])
-                    balance.put(other, old[1])
-        best = _Best(begin)
-        if joined and not self.problem.budget.over:
-            best.improved(self._candidate(balance.chosen))
+        """Of many goals, all pairs of trips at once that are less work as one; where that is no
+        better a plan, the half of them that save most, and so on."""
+        best, ways = _Best(begin), list(options)
+        while best.found is not None and not self.problem.budget.over:
+            before = best.found
+            balance, pairs = self._joined(before, self.trips.pairs(ways))
+            while pairs and not self.problem.budget.over:
+                if best.improved(self._candidate(balance.chosen)):
+                    break
+                balance, pairs = self._joined(before, pairs[: len(pairs) // 2])
+            if best.found is before:
+                break
+            ways = [[sequence] for sequence in best.found.choice]
         return best.found or begin
+
+    def _joined(self, begin: _Candidate, pairs: Sequence[Pair]) -> tuple[Balance, list[Pair]]:
+        """The choice with those pairs joined, each on its own, that are less work; and which."""
+        joint = [(pair.made.sequence,) for pair in pairs]
+        single = [(sequence,) for sequence in begin.choice]
+        balance = Balance(self.workloads, [*single, *joint], begin.choice)
+        taken: list[Pair] = []
+        free = set(range(len(begin.choice)))
+        for pair in pairs:
+            if not {pair.one, pair.other} <= free:
+                continue
+            before = balance.estimate, balance.choice[pair.one], balance.choice[pair.other]
+            balance.put(pair.one, pair.made.sequence)
+            balance.put(pair.other, None)
+            if balance.estimate < before[0]:
+                taken.append(pair)
+                free -= {pair.one, pair.other}
+            else:
+                balance.put(pair.one, before[1])
+                balance.put(pair.other, before[2])
+        return balance, taken
 
     def _joint_trip(
         self, begin: _Candidate, ways: Sequence[Choice]
@@ -360,6 +376,11 @@ class _Choosing:
             never=problem.never,
             sometime_before=problem.sometime_before,
         )
+
+
+def _are_many(options: Sequence[Choice]) -> bool:
+    """Whether too many to look at each pair, or at each alone, as a plan."""
+    return len(options) > MANY or prod(map(len, options)) > MAX_COMBINATIONS
 
 
 def _changes(balance: Balance, options: Sequence[Choice]) -> Iterator[tuple[int, ActionSequence]]:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from fleet.core.model.parameter_types import OBJECT
+from fleet.core.model.preconditions import spoken_of
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
 from fleet.planners.symbolic.engine.relevance import related_skills
@@ -69,9 +70,12 @@ def representatives(
 
 def _asked_of_robots(skills: Sequence[SkillModel]) -> frozenset[str]:
     """The relations that skills ask of their robots, but for what they hold."""
-    plain = (row.variable for skill in skills for row in skill.before)
-    robots = {name for skill in skills for name in skill.robot_parameters}
-    asked = {variable.relation for variable in plain if variable.subject in robots}
+    asked = set[str]()
+    for skill in skills:
+        formulas = (*skill.conditions, *(effect.when for effect in skill.conditional))
+        read = [row.variable for row in skill.before]
+        read += [key for formula in formulas for key in spoken_of(formula)]
+        asked |= {key.relation for key in read if key.subject in skill.robot_parameters}
     return frozenset(asked - {HOLDING})
 
 

@@ -15,8 +15,10 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from graphlib import TopologicalSorter
+from itertools import repeat
 from pathlib import Path
 
 from rich.console import Console
@@ -65,9 +67,12 @@ def main() -> None:
     options.add_argument("--data", type=Path, required=True, help="a copy of the set")
     options.add_argument("--out", type=Path, help="folder to write the page into")
     options.add_argument("--only", default="", help="tasks whose names begin so, e.g. env0-1")
+    options.add_argument(
+        "--jobs", type=int, default=1, help="processes, each with a task at a time"
+    )
     options.add_argument("--limit", type=float, default=LIMIT_S, help="processor time a plan, s")
     chosen = options.parse_args()
-    console, parts = Console(width=160), compose()
+    console = Console(width=160)
     told = (
         f"{machine()}; commit {_commit()}; load average before it began: {os.getloadavg()[0]:.1f}."
     )
@@ -76,13 +81,14 @@ def main() -> None:
     except BadTaskFile as error:
         sys.exit(str(error))
     results = []
-    for task in tasks:
-        results.append(result := carried_out(task, parts, chosen.limit))
-        outcome = result.why if result.steps is None else f"{result.steps} steps"
-        console.print(
-            f"{result.name}: {outcome} (reference: {result.reference}), {result.planning_s:.1f} s",
-            highlight=False,
-        )
+    with ProcessPoolExecutor(chosen.jobs) as processes:
+        for result in processes.map(carried_out, tasks, repeat(chosen.limit)):
+            results.append(result)
+            outcome = result.why if result.steps is None else f"{result.steps} steps"
+            console.print(
+                f"{result.name}: {outcome} (reference: {result.reference}), {result.planning_s:.1f} s",
+                highlight=False,
+            )
     rows = rows_of(results)
     table = Table(*HEAD, title=f"COHERENT; {told}")
     for row in rows:
@@ -92,8 +98,9 @@ def main() -> None:
         _write(chosen.out, results, rows, told)
 
 
-def carried_out(task: Task, parts: Composition, limit_s: float) -> Result:
+def carried_out(task: Task, limit_s: float) -> Result:
     """A task planned, and carried out in a graph of its own."""
+    parts = compose()
     began_s = time.process_time()
 
     def result(steps: int | None, why: str = "") -> Result:

@@ -50,28 +50,26 @@ def parts() -> Composition:
     ],
 )
 def test_a_task_takes_the_fewest_steps(
-    goal: list[tuple[int, str, int]], steps: int, tmp_path: Path, parts: Composition
+    goal: list[tuple[int, str, int]], steps: int, tmp_path: Path
 ) -> None:
     (task,) = tasks_in(written(tmp_path, task_row(goal, steps)))
-    assert carried_out(task, parts, LIMIT_S) == Result(
+    assert carried_out(task, LIMIT_S) == Result(
         "env7", 0, steps, steps, pytest.approx(0, abs=LIMIT_S)
     )
 
 
-def test_what_cannot_be_done_by_the_sets_rules_is_told_apart(
-    tmp_path: Path, parts: Composition
-) -> None:
+def test_what_cannot_be_done_by_the_sets_rules_is_told_apart(tmp_path: Path) -> None:
     (task,) = tasks_in(written(tmp_path, task_row([(BENCH, "ON", COUNTER)], 5)))
-    result = carried_out(task, parts, LIMIT_S)
+    result = carried_out(task, LIMIT_S)
     assert (result.steps, result.why) == (
         None,
         "by the set's own rules nobody takes <bench>(20): it is not GRABABLE",
     )
 
 
-def test_more_than_twice_the_reference_is_no_success(tmp_path: Path, parts: Composition) -> None:
+def test_more_than_twice_the_reference_is_no_success(tmp_path: Path) -> None:
     (task,) = tasks_in(written(tmp_path, task_row([(PEN, "ON", BENCH)], 2)))
-    assert carried_out(task, parts, LIMIT_S).why == "6 steps are more than twice the reference's"
+    assert carried_out(task, LIMIT_S).why == "6 steps are more than twice the reference's"
 
 
 @pytest.mark.parametrize("seed", range(6))

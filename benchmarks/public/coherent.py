@@ -73,9 +73,8 @@ def main() -> None:
     options.add_argument("--limit", type=float, default=LIMIT_S, help="processor time a plan, s")
     chosen = options.parse_args()
     console = Console(width=160)
-    told = (
-        f"{machine()}; commit {_commit()}; load average before it began: {os.getloadavg()[0]:.1f}."
-    )
+    load = os.getloadavg()[0]
+    told = f"{machine()}; commit {_commit()}; load average before it began: {load:.1f}."
     try:
         tasks = [task for task in tasks_in(chosen.data) if task.name.startswith(chosen.only)]
     except BadTaskFile as error:
@@ -85,10 +84,8 @@ def main() -> None:
         for result in processes.map(carried_out, tasks, repeat(chosen.limit)):
             results.append(result)
             outcome = result.why if result.steps is None else f"{result.steps} steps"
-            console.print(
-                f"{result.name}: {outcome} (reference: {result.reference}), {result.planning_s:.1f} s",
-                highlight=False,
-            )
+            told_of = f"{outcome} (reference: {result.reference}), {result.planning_s:.1f} s"
+            console.print(f"{result.name}: {told_of}", highlight=False)
     rows = rows_of(results)
     table = Table(*HEAD, title=f"COHERENT; {told}")
     for row in rows:

@@ -1,10 +1,10 @@
 """COHERENT's graphs as a world of this project, and plans as steps of the set.
 
 Rooms are places; all else that is no robot is a thing that is `at` what it is on or in. What the
-set's robots can do is in the skill file beside this module. Heights are read off what carries a
-thing, and what a dog is close to is kept in a few variables of the dog, so the world says a little
-less than the graph: the dog is not known to be close to all that it could have put down on the way,
-nobody uses the top of what is a container, too, and nobody reaches through what is closed.
+set's robots can do is in the skill file beside this module. What a dog is close to is kept in a few
+variables of the dog, so the world says a little less than the graph: a dog is not known to be close
+to all that it put down on the way, nor goes it up to what is on or in a thing that moves; nobody
+uses the top of what is a container, too, and nobody reaches through what is closed.
 """
 
 from __future__ import annotations

@@ -212,9 +212,7 @@ def test_a_wrong_mission_is_one_clear_sentence(tmp_path: Path, second: str, said
 
 def test_a_speaker_is_one_of_the_people(tmp_path: Path) -> None:
     path = mission(tmp_path, f"  - {{spec: {HSR}, start: {{at_m: [8, 3]}}}}\nspeaker: anna\n")
-    with pytest.raises(
-        BadFile, match=r"speaker: there is nobody 'anna' in the world"
-    ):
+    with pytest.raises(BadFile, match=r"speaker: there is nobody 'anna' in the world"):
         load_mission(path)
 
 

@@ -9,7 +9,7 @@ from math import inf
 from fleet.core.actors import carried_at_end
 from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.jobshop.time_budget import TimeBudget
-from fleet.planners.base import NoPlan
+from fleet.planners.base import LEAST_WORK, NoPlan
 from fleet.planners.symbolic.workloads import Choice as Choice
 from fleet.planners.symbolic.workloads import unloading_s
 from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
@@ -19,7 +19,8 @@ REFINING_NODES = 3000
 """How long a better allocation is sought for a small plan."""
 
 Cost = tuple[float, float]
-"""The makespan [s], with a charge for what is left in baskets, and the work of all robots [s]."""
+"""The makespan [s], with a charge for what is left in baskets, and the work of all robots [s]; for
+the least work the other way round."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,10 @@ def allocated_as(
 
 def _cost(schedule: PlanSchedule, checked: CheckedPlan) -> Cost:
     left_s = unloading_s(checked.world) * len(carried_at_end(checked))
-    return round(schedule.makespan_s + left_s, 3), sum(schedule.durations_s.values())
+    makespan_s, work_s = schedule.makespan_s, sum(schedule.durations_s.values())
+    if checked.plan.strategy == LEAST_WORK:
+        return round(work_s + left_s, 3), makespan_s
+    return round(makespan_s + left_s, 3), work_s
 
 
 def by_cost(candidate: Candidate) -> Cost:

@@ -15,7 +15,14 @@ from itertools import product
 from math import prod
 
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
-from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, PlanningProblem
+from fleet.planners.base import (
+    BIG_DAG,
+    LEAST_WORK,
+    MONOLITHIC,
+    PER_GOAL,
+    NoPlan,
+    PlanningProblem,
+)
 from fleet.planners.deordering import ActionSequence, deordered
 from fleet.planners.symbolic.action_sequences import Exploration
 from fleet.planners.symbolic.candidates import Best, Candidate, Choice, Pace, allocated_as, by_cost
@@ -85,7 +92,7 @@ class _Choosing:
             best = self._best(options)
         if isinstance(best, NoPlan):
             return best
-        if self.problem.strategy == BIG_DAG:
+        if self.problem.strategy in (BIG_DAG, LEAST_WORK):
             best = self._with_joint_trips(best, options)
         return best.allocated.checked
 

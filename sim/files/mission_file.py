@@ -103,6 +103,11 @@ def load_mission(name: str | Path) -> Mission:
     path = find_file("missions", name)
     entry = read_yaml(path, _MissionEntry, "mission file")
     world = _rearranged(path, load_world(find_file("worlds", entry.world, path)), entry)
+    if entry.speaker is not None and entry.speaker not in world.people:
+        raise BadFile(
+            f"{path}: speaker: there is nobody {entry.speaker!r} in the world; "
+            f"there are {', '.join(world.people) or 'no people'}"
+        )
     robots: list[MissionRobot] = []
     for number, item in enumerate(entry.robots):
         file = find_file("robots", item.spec, path)

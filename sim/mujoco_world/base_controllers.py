@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Any
 
 from keyexpr_schema.payloads.robots import PoseMRad
-from sim.mujoco_world.assemble import yaw_of, yaw_quaternion
-from sim.mujoco_world.description import Description, DifferentialDrive, FixedBase, PlanarDrive
+from sim.files.furniture_schema import PointXY
+from sim.mujoco_world.description import PlanarDrive
 
 PERIOD_S = 0.05
 """Control period."""
-
-NEAR_M = 0.015
-"""A wheeled base this close to its target has arrived; turning on the spot for less is noise."""
-
-LEAVES_M = 0.025
 
 GAIN_1_S = 3.0
 """Speed commanded for each metre of distance: settles in about a second, below the servo's band."""
@@ -47,6 +43,8 @@ class Drive(ABC):
         self._yaw_rate = yaw_rate
         self.carrying = False
         """Whether the hand is full: then it turns slowly."""
+        self.backs = False
+        """Whether it may drive any distance backwards, to a target behind it."""
         self._target: tuple[float, float, float | None, float] | None = None
         self._spin: float | None = None
         self._pose_at: tuple[float, PoseMRad] | None = None
@@ -74,12 +72,30 @@ class Drive(ABC):
         """Write the commands for the next control period."""
 
     def drive(
-        self, x_m: float, y_m: float, yaw_rad: float | None, speed_m_s: float | None = None
+        self,
+        x_m: float,
+        y_m: float,
+        yaw_rad: float | None,
+        speed_m_s: float | None = None,
+        *,
+        backs: bool = False,
     ) -> None:
-        """Go to a point, facing `yaw_rad` in the end (`None`: whatever comes)."""
+        """Go to a point, facing `yaw_rad` in the end (`None`: whatever comes).
+
+        `backs`: straight on, backwards if that is behind.
+        """
         limit = self._top_m_s if speed_m_s is None else min(self._top_m_s, speed_m_s)
         self._spin = None
+        self.backs = backs
         self._target = (x_m, y_m, yaw_rad, limit)
+
+    @abstractmethod
+    def lead(self, point_m: PointXY, ahead_m: float, speed_m_s: float) -> None:
+        """Move so that the point `ahead_m` before its axis comes to `point_m`."""
+
+    @abstractmethod
+    def led(self, way_m: Sequence[PointXY], ahead_m: float) -> list[PoseMRad]:
+        """Where the base gets to as it is led along a way, from where it is now."""
 
     def turn_to(self, yaw_rad: float) -> None:
         """Turn on the spot."""
@@ -134,6 +150,20 @@ class Planar(Drive):
         self._pose_at = None
         self.halt()
 
+    def lead(self, point_m: PointXY, ahead_m: float, speed_m_s: float) -> None:
+        if self._target is None or self._target[2] is None:
+            self.halt()
+        assert self._target is not None
+        yaw = self._target[2]
+        assert yaw is not None
+        x, y = point_m[0] - ahead_m * math.cos(yaw), point_m[1] - ahead_m * math.sin(yaw)
+        self.drive(x, y, yaw, speed_m_s)
+
+    def led(self, way_m: Sequence[PointXY], ahead_m: float) -> list[PoseMRad]:
+        yaw = self.pose()[2]
+        c, s = ahead_m * math.cos(yaw), ahead_m * math.sin(yaw)
+        return [(x - c, y - s, yaw) for x, y in way_m]
+
     def speed(self) -> tuple[float, float]:
         vx, vy, rate = (float(self._data.qvel[address]) for address in self._dofs)
         return (math.hypot(vx, vy), abs(rate))
@@ -184,125 +214,3 @@ def _turned_into(
     left = math.sqrt(most_m_s**2 - across**2)
     along = max(-left, min(left, change_x * ux + change_y * uy))
     return (old_m_s[0] + along * ux - across * uy, old_m_s[1] + along * uy + across * ux)
-
-
-class Differential(Drive):
-    """Two driven wheels: turns towards the target, then drives, then turns to the last heading."""
-
-    def __init__(
-        self, model: Any, data: Any, prefix: str, entry: DifferentialDrive, speed_m_s: float
-    ) -> None:
-        super().__init__(data, speed_m_s, entry.acceleration_m_s2, entry.yaw_rate_rad_s)
-        free = model.joint(prefix + entry.joints[0])
-        self._qpos = int(free.qposadr[0])
-        self._dof = int(free.dofadr[0])
-        self._ctrl = [int(model.actuator(prefix + name).id) for name in entry.actuators]
-        self._radius = entry.wheel_radius_m
-        self._half = entry.wheel_separation_m / 2
-        self._command = (0.0, 0.0)
-        self._driving = False
-
-    def _read_pose(self) -> PoseMRad:
-        at = self._qpos
-        x, y, _, *turn = self._data.qpos[at : at + 7].tolist()
-        return (x, y, yaw_of(turn))
-
-    def put(self, pose_m_rad: PoseMRad) -> None:
-        x, y, yaw = pose_m_rad
-        at = self._qpos
-        self._data.qpos[at : at + 3] = (x, y, 0.0)
-        self._data.qpos[at + 3 : at + 7] = yaw_quaternion(yaw)
-        self._pose_at = None
-        self.halt()
-
-    def speed(self) -> tuple[float, float]:
-        qvel = self._data.qvel
-        at = self._dof
-        return (math.hypot(float(qvel[at]), float(qvel[at + 1])), abs(float(qvel[at + 5])))
-
-    def halt(self) -> None:
-        self._target = None
-        self._spin = None
-
-    def tick(self, ctrl: list[float]) -> None:
-        speed, rate = self._wanted()
-        old_speed, old_rate = self._command
-        most = self._acceleration * PERIOD_S
-        speed = old_speed + max(-most, min(most, speed - old_speed))
-        most = 8.0 * most
-        rate = old_rate + max(-most, min(most, rate - old_rate))
-        self._command = (speed, rate)
-        ctrl[self._ctrl[0]] = (speed - rate * self._half) / self._radius
-        ctrl[self._ctrl[1]] = (speed + rate * self._half) / self._radius
-
-    def _wanted(self) -> tuple[float, float]:
-        if self._spin is not None:
-            return 0.0, self._limited(self._spin)
-        if self._target is None:
-            return 0.0, 0.0
-        x, y, yaw = self.pose()
-        to_x, to_y, to_yaw, limit = self._target
-        dx, dy = to_x - x, to_y - y
-        distance = math.hypot(dx, dy)
-        # Leaving again only from farther off keeps it from hunting around the point.
-        self._driving = distance > (NEAR_M if self._driving else LEAVES_M)
-        if not self._driving:
-            error = 0.0 if to_yaw is None else wrap(to_yaw - yaw)
-            return 0.0, self._approach_rate(error) if abs(error) > 0.01 else 0.0
-        error = wrap(math.atan2(dy, dx) - yaw)
-        backwards = abs(error) > math.pi / 2 and distance < 0.12
-        if backwards:
-            error = wrap(error + math.pi)
-        rate = self._approach_rate(error)
-        if abs(error) > 0.6:
-            return 0.0, rate
-        speed = self._approach_speed(distance, limit) * max(0.0, math.cos(1.5 * error))
-        return (-speed if backwards else speed), rate
-
-
-class Turret(Drive):
-    """A base that does not drive: it turns about the vertical where it stands."""
-
-    def __init__(self, model: Any, data: Any, prefix: str, entry: FixedBase) -> None:
-        super().__init__(data, 0.0, 0.8, entry.yaw_rate_rad_s)
-        joint = model.joint(prefix + entry.joint)
-        self._qpos, self._dof = int(joint.qposadr[0]), int(joint.dofadr[0])
-        self._ctrl = int(model.actuator(prefix + entry.actuator).id)
-        body = model.body(int(joint.bodyid[0]))
-        self._at = (float(body.pos[0]), float(body.pos[1]))
-        self._command = 0.0
-
-    def _read_pose(self) -> PoseMRad:
-        return (*self._at, wrap(float(self._data.qpos[self._qpos])))
-
-    def put(self, pose_m_rad: PoseMRad) -> None:
-        self._data.qpos[self._qpos] = pose_m_rad[2]
-        self._pose_at = None
-        self.halt()
-
-    def speed(self) -> tuple[float, float]:
-        return (0.0, abs(float(self._data.qvel[self._dof])))
-
-    def tick(self, ctrl: list[float]) -> None:
-        if self._target is None:
-            self.halt()
-        assert self._target is not None
-        yaw = self.pose()[2]
-        to_yaw = self._target[2]
-        rate = self._approach_rate(0.0 if to_yaw is None else wrap(to_yaw - yaw))
-        rate = rate if self._spin is None else self._limited(self._spin)
-        most = 3.0 * self._acceleration * PERIOD_S
-        self._command += max(-most, min(most, rate - self._command))
-        ctrl[self._ctrl] = self._command
-
-
-def make_drive(
-    model: Any, data: Any, prefix: str, description: Description, speed_m_s: float
-) -> Drive:
-    """The controller for the kind of base that the description names."""
-    base = description.base
-    if isinstance(base, FixedBase):
-        return Turret(model, data, prefix, base)
-    if isinstance(base, PlanarDrive):
-        return Planar(model, data, prefix, base, speed_m_s)
-    return Differential(model, data, prefix, base, speed_m_s)

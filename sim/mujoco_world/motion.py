@@ -202,7 +202,7 @@ def drive_straight(run: MotionRun, goal: PoseMRad, phase: str, speed_m_s: float 
     run.phase = phase
     run.manual = True
     drive = run.robot.drive
-    drive.drive(*goal, speed_m_s)
+    drive.drive(*goal, speed_m_s, backs=True)
     still_s = 0.0
     while True:
         yield

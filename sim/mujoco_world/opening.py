@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from sim.mujoco_world.base_controllers import PERIOD_S, Planar
-from sim.mujoco_world.base_motions import reach_m, stand_at
+from sim.mujoco_world.base_controllers import PERIOD_S
+from sim.mujoco_world.base_motions import distance_m, reach_m, stand_at
 from sim.mujoco_world.grasping import (
     RELEASE_OPENING_M,
     Reach,
@@ -66,8 +66,10 @@ def _swing(context: MotionContext, run: MotionRun, goal: float) -> Step:
     arm, gripper = hand_of(robot)
     if robot.held is not None:
         raise MotionFailed(f"the hand is not empty: it holds {robot.held}")
-    if not isinstance(robot.drive, Planar):
-        raise MotionFailed(f"{robot.name} cannot drive sideways, as one must with a door in hand")
+    if not robot.drives:
+        raise MotionFailed(
+            f"{robot.name} does not drive, as one must with a door in hand", retryable=False
+        )
     yield from stow(run)
     run.phase = f"driving up to the handle of {thing}"
     fixture = context.world.fixtures.movers[thing][0]
@@ -75,11 +77,10 @@ def _swing(context: MotionContext, run: MotionRun, goal: float) -> Step:
     yield from stand_at(context, run, point, reach_m(run), fixture.inward_rad)
     run.handling = True
     yield from face(run, point[0], point[1])
-    x, y, _ = robot.pose()
     way = _handle_way(context, thing, goal)
-    base = [(x + hx - point[0], y + hy - point[1]) for hx, hy in way]
-    ends = [behind((*base[k], fixture.inward_rad), BACK_M)[:2] for k in (0, -1)]
-    whole = [ends[0], *base, ends[1]]
+    base = robot.drive.led(way, distance_m(run, point))
+    ends = [behind(base[k], BACK_M)[:2] for k in (0, -1)]
+    whole = [ends[0], *(pose[:2] for pose in base), ends[1]]
     run.phase = f"moving the door of {thing}"
     check_way(context, run, whole, but=(fixture.name, *(m.thing for m in fixture.movers)))
     if min(Clearance(context.world, context.solids).at(whole)) < robot.description.radius_m:
@@ -149,8 +150,7 @@ def _pull(context: MotionContext, run: MotionRun, goal: float) -> Step:
     _, mover = context.world.fixtures.movers[thing]
     moved = context.world.fixtures.moved_m
     share = mechanisms.opening(thing)
-    start = moved(thing, mover.handle_m, share)
-    x, y, yaw = run.robot.pose()
+    ahead_m = distance_m(run, mechanisms.handle_m(thing))
     way = _handle_way(context, thing, goal)
     length = sum(math.dist(a, b) for a, b in pairwise(way))
     step = (goal - share) * PULL_M_S * PERIOD_S / max(length, 1e-6)
@@ -158,7 +158,7 @@ def _pull(context: MotionContext, run: MotionRun, goal: float) -> Step:
     while abs(mechanisms.opening(thing) - goal) > NEAR_SHARE / 2 or share != goal:
         share = goal if abs(goal - share) <= abs(step) else share + step
         at = moved(thing, mover.handle_m, share)
-        drive.drive(x + at[0] - start[0], y + at[1] - start[1], yaw, LIMIT_M_S)
+        drive.lead(at[:2], ahead_m, LIMIT_M_S)
         # Where to go from here, should it be stopped.
         run.robot.way_out = behind(run.robot.pose(), BACK_M)
         yield

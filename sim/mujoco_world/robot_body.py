@@ -10,8 +10,9 @@ from sim.errors import BadFile
 from sim.files.furniture_schema import PointXY
 from sim.files.solids import Solid
 from sim.mujoco_world.arm import Arm, Gripper
-from sim.mujoco_world.base_controllers import PERIOD_S, Turret, make_drive
+from sim.mujoco_world.base_controllers import PERIOD_S
 from sim.mujoco_world.description import FixedBase, RobotModel
+from sim.mujoco_world.turning_bases import Turret, make_drive
 from sim.navigation.spots import STANDS_OFF_M
 
 LOST_AFTER_S = 0.3

@@ -15,6 +15,7 @@ from sim.files.mission_file import load_robot
 from sim.files.world_file import load_world
 from sim.mujoco_world import MujocoBackend
 from tests.support.furnished import furnished, hsr
+from tests.support.wheeled_arm import wheeled_arm
 
 K = MotionKind
 
@@ -240,4 +241,19 @@ def test_what_is_open_beside_it_is_said_to_be_in_the_way_and_closed_first(tmp_pa
     do(backend, K.CLOSE, object="left")
     do(backend, K.OPEN, object="unit_drawer_3")
     take(backend, "cup_1")
+    assert touched(backend) == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_arm_on_two_wheels_opens_and_closes_what_it_cannot_drive_along_with(
+    tmp_path: Path, seed: int
+) -> None:
+    chance = random.Random(seed)
+    start = (chance.uniform(1.5, 4.0), chance.uniform(1.6, 3.2), chance.uniform(-3.0, 3.0))
+    spec = wheeled_arm(tmp_path)
+    backend = MujocoBackend(furnished(tmp_path), [(spec, start)], seed, {spec.robot: tmp_path})
+    for thing in ("cupboard", "dresser_drawer_1"):
+        for kind, is_open in ((K.OPEN, True), (K.CLOSE, False)):
+            do(backend, kind, spec.robot, object=thing)
+            assert truth(backend, thing).states == {"is_open": is_open}
     assert touched(backend) == 0

@@ -44,6 +44,13 @@ class Requirement:
     pinned_to: str | None = None
 
 
+class _Asks(NamedTuple):
+    """Which list of robots comes into question for an actor, and what must hold of its robot."""
+
+    fitting: int
+    facts: frozenset[Left]
+
+
 class Candidates:
     """Which robots of the team can be which actors.
 
@@ -69,33 +76,48 @@ class Candidates:
             kind = spec.skills, tuple(spec.capabilities.items()), marked
             alike.setdefault(kind, []).append(robot)
         self._kinds = list(alike.values())
+        self._room: dict[str, float] = {}
         self._answers: dict[tuple[Asked, tuple[Value, ...]], bool] = {}
         self._playable: dict[tuple[object, ...], list[str]] = {}
         fitting = {actor: self._fitting(each) for actor, each in requirements.items()}
+        asks = {
+            actor: _Asks(
+                id(fitting[actor]),
+                frozenset((name, row[0]) for name, row in each.facts.items()),
+            )
+            for actor, each in requirements.items()
+        }
+        first = {asked: actor for actor, asked in reversed(asks.items())}
+        """What many actors ask alike is answered once."""
         unmet = {
-            actor: {robot: list(self._unmet(robot, requirements[actor])) for robot in robots}
-            for actor, robots in fitting.items()
+            asked: {
+                robot: list(self._unmet(robot, requirements[actor])) for robot in fitting[actor]
+            }
+            for asked, actor in first.items()
         }
         offered: dict[str, set[Left]] = {robot: set() for robot in world.team}
-        for actor, rows in unmet.items():
-            for robot, missing in rows.items():
+        for asked, left in {(asks[actor], frozenset(leaves.get(actor, ()))) for actor in asks}:
+            states = {
+                (relation, value)
+                for relation, value in left
+                if not isinstance(value, str) or world.kind_of(value) is None
+            }
+            for robot, missing in unmet[asked].items() if states else ():
                 if not missing:
-                    offered[robot] |= {
-                        (relation, value)
-                        for relation, value in leaves.get(actor, ())
-                        if not isinstance(value, str) or world.kind_of(value) is None
-                    }
-        self.able: dict[str, tuple[str, ...]] = {
-            actor: tuple(
+                    offered[robot] |= states
+        able = {
+            asked: tuple(
                 robot
                 for robot, missing in rows.items()
                 if all(
-                    (relation, requirements[actor].facts[relation][0]) in offered[robot]
-                    for relation in missing
+                    (name, value) in offered[robot]
+                    for name, value in asked.facts
+                    if name in missing
                 )
             )
-            for actor, rows in unmet.items()
+            for asked, rows in unmet.items()
         }
+        self.able: dict[str, tuple[str, ...]] = {actor: able[asks[actor]] for actor in asks}
 
     def reasons(self, actor: str) -> Iterator[str]:
         """Why each robot of the team that cannot be the actor cannot."""
@@ -160,7 +182,9 @@ class Candidates:
                 formula = formula_text(grounded(asked.formula, {asked.actor: robot}))
                 return f"{asked.task} needs {formula}, which need not hold"
         if requirement.space > 0:
-            room = room_left(robot, self._world.facts, self._world)
+            if robot not in self._room:
+                self._room[robot] = room_left(robot, self._world.facts, self._world)
+            room = self._room[robot]
             if room < requirement.space:
                 needed = f"{requirement.space} are needed"
                 return f"{robot}'s basket has room for {room} more and {needed}"

@@ -125,6 +125,18 @@ class WorldModel:
         """The robots that can get work now, in a fixed order."""
         return tuple(sorted(robot for robot in self.robots if robot in self.available))
 
+    def things_at(self, carrier: str) -> tuple[str, ...]:
+        """Things that are believed to be carried by it directly."""
+        return self._things_at.get(carrier, ())
+
+    @cached_property
+    def _things_at(self) -> dict[Value, tuple[str, ...]]:
+        found: dict[Value, tuple[str, ...]] = {}
+        for thing in self.objects:
+            carrier = self.facts.get(FactKey(AT, thing))
+            found[carrier] = (*found.get(carrier, ()), thing)
+        return found
+
     @cached_property
     def _hopeless(self) -> dict[Call, Hopeless]:
         return {call_of(known.skill, known.args): known for known in self.hopeless}
@@ -257,8 +269,11 @@ def room_left(carrier: str, facts: Mapping[FactKey, Value], world: WorldModel) -
     if (room := capacity(carrier, world)) == inf:
         return inf
     held = facts.get(FactKey(HOLDING, carrier))
-    there = (t for t in world.objects if facts.get(FactKey(AT, t)) == carrier and held != t)
-    return room - sum(1 for _ in there)
+    if facts is world.facts:
+        there = world.things_at(carrier)
+    else:
+        there = tuple(t for t in world.objects if facts.get(FactKey(AT, t)) == carrier)
+    return room - sum(1 for thing in there if thing != held)
 
 
 def capacity(carrier: str, world: WorldModel) -> float:

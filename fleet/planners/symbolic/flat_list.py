@@ -67,6 +67,8 @@ class Team:
 
     def _chosen(self, role: Role, taken: Collection[str]) -> str | None:
         """The robot that can be there first; `None` if there is none."""
+        if role.particular:
+            return role.who.robot
         best, least = None, (2, inf)
         for robot in self._world.team:
             if robot not in role.able or robot in taken or not self._is_fit(role, robot):

@@ -6,7 +6,9 @@ it are sought (for instance one with a helper that carries), and one is chosen a
 * `big-dag` chooses for all goals together, by the makespan that they lead to;
 * `per-goal` chooses for each goal alone, as if there were no other, and merges the results;
 * `monolithic` makes one flat list, each goal going on from where the one before left every robot
-  (`flat_list`).
+  (`flat_list`);
+* `least-work` searches for all conditions of a goal at once, and chooses by what the robots have to
+  do altogether, however long that takes.
 
 Where it is not known where a needed object is, the plan looks for it: a search of every place, by
 all robots that can, in parallel. What is found leads to the next revision.
@@ -18,11 +20,20 @@ from collections import Counter
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 
 from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.core.model.world import condition_holds
 from fleet.jobshop.time_budget import TimeBudget
-from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, Planner, PlanningProblem
+from fleet.planners.base import (
+    BIG_DAG,
+    LEAST_WORK,
+    MONOLITHIC,
+    PER_GOAL,
+    NoPlan,
+    Planner,
+    PlanningProblem,
+)
 from fleet.planners.symbolic.action_sequences import (
     Exploration,
     GaveUp,
@@ -32,7 +43,8 @@ from fleet.planners.symbolic.action_sequences import (
     exploration_for,
     subgoals_in_order,
 )
-from fleet.planners.symbolic.choosing import Choice, choose
+from fleet.planners.symbolic.candidates import Choice
+from fleet.planners.symbolic.choosing import choose
 from fleet.planners.symbolic.engine.finite_domain import Trajectory
 from fleet.planners.symbolic.engine.instantiation import Facts
 from keyexpr_schema.facts import AT, HOLDING, FactKey
@@ -45,41 +57,65 @@ SEARCH_SHARE = 0.6
 """Of the time for planning, how much the search for sequences has; choosing takes the rest."""
 
 
+@dataclass(frozen=True)
+class _Manner:
+    """What has to hold first is made so `in_order`, before anything else; what may then hold is
+    avoided where it is not one of those. Robots are `bound` to what they were found to do.
+    """
+
+    in_order: tuple[Precedence, ...] = ()
+    bound: bool = False
+
+
 class SymbolicPlanner(Planner):
     """Search over skill models."""
 
     name = "symbolic"
-    strategies = (BIG_DAG, PER_GOAL, MONOLITHIC)
+    strategies = (BIG_DAG, PER_GOAL, MONOLITHIC, LEAST_WORK)
 
     def _solve(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
         world, rows = problem.world, problem.sometime_before
         for row in rows:
             if world.holds(row.then):
                 return NoPlan(f"{row.first} must hold before {row.then} does, which it does now")
+        # What need not hold is avoided; where it cannot be, what has to hold before it does so
+        # first. Where robots may not be somewhere, others must not be taken for them.
         wanted = tuple(row for row in rows if _is_wanted(row.then, problem))
-        made = self._one_by_one(problem, (), wanted)
-        if isinstance(made, CheckedPlan) or made.postponed or wanted == rows:
-            return made
-        # What need not hold could not be avoided, so what has to hold before it does so first.
-        return self._one_by_one(problem, (), rows)
+        names = {name for goal in problem.goals for c in goal.constraints for name in c.subjects}
+        bound = (False, True) if names & set(world.team) else (False,)
+        first: NoPlan | None = None
+        for manner in dict.fromkeys(_Manner(o, b) for o, b in product((wanted, rows), bound)):
+            made = self._made(problem, manner)
+            if isinstance(made, CheckedPlan) or made.postponed:
+                return made
+            first = first or made
+        assert first is not None
+        return first
+
+    def _made(self, problem: PlanningProblem, manner: _Manner) -> CheckedPlan | NoPlan:
+        """In one manner; for the least work each goal at once, if that is a plan."""
+        if problem.strategy == LEAST_WORK:
+            made = self._each_goal_at_once(problem, manner, NoPlan(problem.not_in_time))
+            if isinstance(made, CheckedPlan):
+                return made
+        return self._one_by_one(problem, (), manner)
 
     def _one_by_one(
         self,
         problem: PlanningProblem,
         first: tuple[Subgoal, ...],
-        in_order: tuple[Precedence, ...],
+        manner: _Manner,
         set_down: bool = True,
     ) -> CheckedPlan | NoPlan:
         """A search for one condition after the other, beginning with some, when all that has to
-        hold first has; what may then hold is avoided where it is not one of those `in_order`.
-        `set_down` is that of `_Reached`.
+        hold first has. `set_down` is that of `_Reached`.
         """
         world = problem.world
         searching = problem.budget.until(SEARCH_SHARE)
-        reached = _Reached(problem, dict(world.facts), searching, set_down)
+        reached = _Reached(problem, manner, dict(world.facts), searching, set_down)
         lost: dict[Subgoal, tuple[str, ...]] = {}
         late: set[str] = set()
-        if (failed := reached.pass_first(in_order)) is not None:
+        if (failed := reached.pass_first()) is not None:
             return failed
         subgoals = subgoals_in_order(problem, reached.facts)
         subgoals.sort(key=lambda subgoal: subgoal not in first)
@@ -94,11 +130,11 @@ class SymbolicPlanner(Planner):
                 lost[subgoal] = reached.failure.unlocated
             elif reached.options and subgoal not in first:
                 # What was done for others before may be what makes it impossible.
-                return self._one_by_one(problem, (subgoal, *first), in_order, set_down)
+                return self._one_by_one(problem, (subgoal, *first), manner, set_down)
             else:
                 refused = NoPlan(_no_way(subgoal, reached.failure, problem))
                 alone = not any(g.goal == subgoal.goal and g.conditions[1:] for g in problem.goals)
-                return refused if alone else self._each_goal_at_once(problem, in_order, refused)
+                return refused if alone else self._each_goal_at_once(problem, manner, refused)
         if late and len(problem.goals) == 1 and isinstance(reached.failure, GaveUp):
             return NoPlan(reached.failure.reason, postponed=True)
         if late:
@@ -125,25 +161,26 @@ class SymbolicPlanner(Planner):
             if problem.budget.over:
                 return replace(made, postponed=True)  # not all choices were looked at
             if reached.any_set_down:
-                return self._one_by_one(problem, first, in_order, set_down=False)
+                return self._one_by_one(problem, first, manner, set_down=False)
             if problem.strategy != MONOLITHIC and len(problem.goals) > 1:
                 # What one goal leaves in a hand may be what another begins with.
                 in_a_row = choose(replace(problem, strategy=MONOLITHIC), reached.options, explored)
                 if isinstance(in_a_row, CheckedPlan):
                     return in_a_row
             if not lost and any(goal.conditions[1:] for goal in problem.goals):
-                return self._each_goal_at_once(problem, in_order, made)
+                return self._each_goal_at_once(problem, manner, made)
         return made
 
     def _each_goal_at_once(
-        self, problem: PlanningProblem, in_order: tuple[Precedence, ...], otherwise: NoPlan
+        self, problem: PlanningProblem, manner: _Manner, otherwise: NoPlan
     ) -> CheckedPlan | NoPlan:
         """All conditions of a goal in one search: what one of them leaves in a hand is there for
         the next, and what is undone on the way is made true again. `otherwise` where that is no
         plan either.
         """
-        reached = _Reached(problem, dict(problem.world.facts), problem.budget.until(SEARCH_SHARE))
-        if reached.pass_first(in_order) is not None:
+        searching = problem.budget.until(SEARCH_SHARE)
+        reached = _Reached(problem, manner, dict(problem.world.facts), searching)
+        if reached.pass_first() is not None:
             return otherwise
         for goal in problem.goals:
             if all(condition_holds(reached.facts, c, problem.world) for c in goal.conditions):
@@ -166,6 +203,7 @@ class _Reached:
     """
 
     problem: PlanningProblem
+    manner: _Manner
     facts: Facts
     budget: TimeBudget
     set_down: bool = True
@@ -174,13 +212,13 @@ class _Reached:
     failure: Impossible | GaveUp = field(default_factory=lambda: Impossible("nothing was sought"))
     passed: set[Precedence] = field(default_factory=set)
 
-    def pass_first(self, in_order: tuple[Precedence, ...]) -> NoPlan | None:
+    def pass_first(self) -> NoPlan | None:
         """Reach what has to hold before something else may; why that cannot be done, if it cannot.
 
         One may have to come before the other: each is sought while of none that is left the second
         may hold.
         """
-        problem, left = self.problem, list(in_order)
+        problem, left = self.problem, list(self.manner.in_order)
         while left:
             for row in left:
                 goal = next(g.goal for g in problem.goals if row in g.sometime_before)
@@ -205,11 +243,17 @@ class _Reached:
         if problem.strategy == MONOLITHIC:
             kept = tuple(c for c in self._in_baskets() if c != subgoal.condition)
             subgoal = replace(subgoal, others=(*subgoal.others, *kept))
-        found = alternatives_for(subgoal, self.facts, problem.world, budget, on_the_way=way)
+        patient = problem.strategy == LEAST_WORK
+        found = alternatives_for(
+            subgoal, self.facts, problem.world, budget, on_the_way=way, patient=patient
+        )
         if not isinstance(found, tuple):
             self.failure = found
             return False
         sequences, self.facts = found
+        if self.manner.bound:
+            robots = frozenset(problem.world.team)
+            sequences = tuple(replace(sequence, named=robots) for sequence in sequences)
         self.options.append(sequences)
         if self.set_down:
             self._set_down(subgoal)

@@ -6,10 +6,12 @@ be, can stand in for one of them.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from fleet.core.model.formulas.text import formula_text
 from fleet.core.model.skills import Action
 from fleet.core.model.world import WorldModel
 from fleet.planners.deordering import ActionSequence
@@ -40,6 +42,8 @@ class Role:
     leaves: frozenset[str]
     starts_at: str | None
     """Where its first way leads, if that is what it begins with."""
+    particular: bool
+    """Whether a formula speaks of the robot, so that others need not do."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,13 @@ class Roles:
         rows = list(steps(sequence))
         for who in dict.fromkeys(part for step in rows for part in step.parts):
             mine = [step for step in rows if who in step.parts]
-            yield Role(who, self._able_robots(who, mine, sequence), *_states(who, rows, mine))
+            particular = any(
+                who.robot in re.findall(r"\w+", formula_text(formula))
+                for step in mine
+                for formula in step.action.conditions
+            )
+            able = self._able_robots(who, mine, sequence)
+            yield Role(who, able, *_states(who, rows, mine), particular)
 
     def _able_robots(
         self, who: Part, mine: Iterable[Step], sequence: ActionSequence

@@ -190,6 +190,37 @@ def test_what_is_in_a_closed_cupboard_is_reached_once_it_is_open() -> None:
     assert opened.task in ancestors(plan, picked.task)
 
 
+def test_what_was_found_in_the_way_is_closed_first() -> None:
+    found = (fact("cupboard", "blocked_by", "fridge"), fact("fridge", "is_open", value=True))  # type: ignore[arg-type]
+    plan = planned(kitchen(*found), condition("held", "cup", True))
+    by_skill = {task.skill: task for task in plan.tasks}
+    assert by_skill["close"].args["thing"] == "fridge"
+    assert by_skill["close"].task in ancestors(plan, by_skill["open"].task)
+    assert "close" not in skills(planned(kitchen(found[0]), condition("held", "cup", True)))
+
+
+def test_the_lower_of_two_drawers_is_looked_into_before_the_upper_one() -> None:
+    """So that none has to be closed again."""
+    drawers = [
+        thing(f"drawer_{n}", "drawer", "contains", "openable", part_of="unit", movable=False)
+        for n in (1, 2)
+    ]
+    drawers[1] = msgspec.structs.replace(drawers[1], blocked_by=("drawer_1",))
+    unit = thing("unit", "dresser", "supports", movable=False, home="kitchen")
+    robots = (able(manipulator("hsr")),)
+    holds = fact("hsr", "holding", "nothing")
+    world = WorldModel.of(SKILLS, PLACES, (unit, *drawers, thing("cup", "cup")), robots, (holds,))
+    goal = Goal(goal="g", text="g", ordinal=1, conditions=(condition("held", "cup", True),))
+    searched = frozenset(place.place for place in PLACES)
+    problem = PlanningProblem(plan="p", goals=(goal,), world=world, searched=searched)
+    made = SymbolicPlanner().plan(problem)
+    assert isinstance(made, CheckedPlan), made
+    tasks = {(t.skill, t.args.get("thing") or t.args.get("container")): t for t in made.plan.tasks}
+    assert "close" not in skills(made.plan)
+    looked = tasks["look_into", "drawer_2"].task
+    assert looked in ancestors(made.plan, tasks["open", "drawer_1"].task)
+
+
 def test_a_door_is_closed_again_behind_what_was_put_in() -> None:
     closed = fact("fridge", "is_open", value=False)  # type: ignore[arg-type]
     wanted = (condition("in", "milk", "fridge"), condition("is_open", "fridge", False))

@@ -210,6 +210,12 @@ def test_a_wrong_mission_is_one_clear_sentence(tmp_path: Path, second: str, said
         load_mission(path)
 
 
+def test_a_speaker_is_one_of_the_people(tmp_path: Path) -> None:
+    path = mission(tmp_path, f"  - {{spec: {HSR}, start: {{at_m: [8, 3]}}}}\nspeaker: anna\n")
+    with pytest.raises(BadFile, match=r"speaker: there is nobody 'anna' in the world"):
+        load_mission(path)
+
+
 def test_a_robot_that_cannot_drive_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "r.yaml"
     path.write_text("robot: r\nmodel: hsr\nskills: [navigate]\ncapabilities: {see: 4.0}\n")

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
+from functools import cache
 
 from fleet.core.model import derived
 from fleet.core.model.formulas.evaluation import expanded
@@ -66,6 +67,8 @@ class Grounding:
         self._thorough = thorough
         self._watch = Watch(budget)
         self.skills = Instantiation(world, start, goal, robots, free)
+        self._around = cache(self._carried_by)
+        self._inside = cache(self._with_parts)
         self._carriers = self._that_carry()
         self._places: tuple[str, ...] = tuple(world.places)
         if thorough:
@@ -209,10 +212,10 @@ class Grounding:
             return self.free[key.subject]
         return self.skills.known(key)
 
-    def _around(self, name: str) -> tuple[str, ...]:
+    def _carried_by(self, name: str) -> tuple[str, ...]:
         return tuple(derived.carriers(name, self.skills.known, self.world, aboard=True))
 
-    def _inside(self, where: str) -> list[str]:
+    def _with_parts(self, where: str) -> list[str]:
         """A place or thing, and its parts."""
         names = [where]
         for table in (self.world.places, self.world.objects):

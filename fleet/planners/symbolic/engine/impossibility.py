@@ -8,12 +8,12 @@ Where that is something that no detour can bring about either, it is certain.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from fleet.core.model import derived
 from fleet.core.model.formulas.evaluation import conjuncts, expanded
-from fleet.core.model.formulas.nodes import Formula
+from fleet.core.model.formulas.nodes import Formula, Holds, Or, Stored
 from fleet.core.model.formulas.text import formula_text
 from fleet.core.model.parameter_types import PLACE, ROBOT
 from fleet.core.model.skills import Action, SkillModel
@@ -21,7 +21,19 @@ from fleet.planners.symbolic.engine.finite_domain import FiniteDomainTask
 from fleet.planners.symbolic.engine.grounding import Grounding
 from fleet.planners.symbolic.engine.instantiation import Binding
 from fleet.planners.symbolic.engine.relevance import rows_of
-from keyexpr_schema.facts import AT, HELD, IN, LOCATED, ON, REACHABLE, Literal
+from keyexpr_schema.facts import (
+    AT,
+    HELD,
+    HOLDING,
+    IN,
+    IS_OPEN,
+    LOCATED,
+    ON,
+    REACHABLE,
+    FactKey,
+    Literal,
+)
+from keyexpr_schema.payloads.world import Feature
 
 MAX_NAMED = 3
 """Reasons named, where there are several of a kind."""
@@ -53,7 +65,7 @@ class _Missing:
         self._task = task
         self._world = grounding.world
         self._true = _reachable(task)
-        self._seen: set[Literal | Formula] = set()
+        self._told: dict[Literal | Formula, str] = {}
         self.unlocated: dict[str, None] = {}
         """Things that would have to be found first."""
         self.certain = True
@@ -68,46 +80,97 @@ class _Missing:
 
     def why(self, literal: Literal | Formula) -> str:
         """What is missing first for something that can never hold."""
-        self._seen.add(literal)
+        if literal not in self._told:
+            self._told[literal] = ""  # what leads there and needs it itself has nothing to say
+            self._told[literal] = self._why(literal)
+        return self._told[literal]
+
+    def _why(self, literal: Literal | Formula) -> str:
         if not isinstance(literal, Literal):
-            self.certain = False
-            return f"{formula_text(literal)} never holds"
+            return self._why_formula(literal)
         unknown = self._unknown(literal)
         if unknown is not None:
             return unknown
+        if literal.variable.relation in derived.DERIVED:
+            return self._why_derived(literal)
         stored = derived.written(literal, self._world)
         missing: dict[Literal | Formula, None] = {}
+        making: set[str] = set()
         for action in self._grounding.actions:
             if any(derived.written(row, self._world) == stored for row in action.after):
+                making.add(action.skill.name)
                 first = next(self._missing_for(action), None)
                 self.certain &= first is not None
-                if first is not None and first not in self._seen:
+                if first is not None:
                     missing[first] = None
-        if missing:
-            found = dict.fromkeys(self.why(first) for first in missing)
-            return "; ".join(list(found)[:MAX_NAMED])
-        refused = self._grounding.skills.refused.get(stored, [])
-        if refused:
-            by = self._grounding.skills.refused_by[stored]
-            everybody = all(skill.name in by for skill, _ in self._grounding.makers_of(literal))
-            self.certain &= everybody and not self._grounding.may_come_along(stored)
-            more = f" (and {len(refused) - MAX_NAMED} more)" if len(refused) > MAX_NAMED else ""
-            return "; ".join(refused[:MAX_NAMED]) + more
         makers = self._grounding.makers_of(literal)
         if not makers:
             return self._no_maker(stored)
-        lacking = [list(self._lacking(skill, args)) for skill, args in makers]
-        if any(lacking):
-            self.certain &= all(lacking)
-            named = dict.fromkeys(what for rows in lacking for what in rows)
-            return "; ".join(list(named)[:MAX_NAMED])
+        skills = self._grounding.skills
+        refused = skills.refused.get(stored, [])
+        found = [self.why(first) for first in missing]
+        lacking: list[str] = []
         for skill, args in makers:
-            for (relation, parameter), _ in skill.before:
-                name = args.get(parameter)
-                if name is not None and self._is_lost(relation, name):
-                    return self._nobody_knows_where(name)
-        self.certain = False
+            there_is_not = [*self._lacking(skill, args), *self._lost_of(skill, args)]
+            lacking += there_is_not
+            tried = skill.name in making or skill.name in skills.refused_by[stored]
+            self.certain &= tried or bool(there_is_not)
+        given_back = skills.restores(stored.variable.relation, stored.value)
+        self.certain &= not given_back and not self._grounding.may_come_along(stored)
+        if any(found):
+            return _named(found)
+        return _named([*lacking, *refused]) or self._nothing(literal)
+
+    def _nothing(self, literal: Literal) -> str:
+        """That nothing leads there; of what a person has, in whose hand it is."""
+        subject = literal.variable.subject
+        holder = self._world.objects.get(str(self._task.nodes.known(FactKey(AT, subject))))
+        if holder is not None and holder.is_a(Feature.PERSON):
+            return f"{subject} is in the hand of {holder.object}, and nobody takes it from there"
         return f"nothing leads to {literal}"
+
+    def _lost_of(self, skill: SkillModel, args: Binding) -> Iterator[str]:
+        """What a skill handles of which nobody knows where it is."""
+        for (relation, parameter), _ in skill.before:
+            name = args.get(parameter)
+            if name is not None and self._is_lost(relation, name):
+                yield self._nobody_knows_where(name)
+
+    def _why_formula(self, formula: Formula) -> str:
+        """Of alternatives each needs something that is missing."""
+        found: list[str] = []
+        for alternative in formula.of if isinstance(formula, Or) else ():
+            parts = conjuncts(alternative)
+            first = next((part for part in parts if not self._holds_ever(part)), None)
+            if isinstance(first, Holds | Stored):
+                found.append(self.why(first.literal))
+            else:
+                self.certain = False
+        if not found:
+            self.certain = False
+        return _named(found) or f"{formula_text(formula)} never holds"
+
+    def _why_derived(self, literal: Literal) -> str:
+        """What carries something has to be opened first; or a robot has to hold it."""
+        (relation, subject), wanted = literal
+        known = self._task.nodes.known
+        if relation == REACHABLE and wanted is True:
+            around = derived.carriers(subject, known, self._world, aboard=True)
+            closed = [name for name in around if derived.is_closed(name, known, self._world)]
+            missing = [Literal(FactKey(IS_OPEN, name), True) for name in closed]
+        elif relation == HELD and wanted is True:
+            robots = self._grounding.robots
+            missing = [Literal(FactKey(HOLDING, robot), subject) for robot in robots]
+        else:
+            missing = []
+        missing = [first for first in missing if not self._holds_ever(Holds(first))]
+        if not missing:
+            self.certain = False
+            return f"nothing leads to {literal}"
+        return _named([self.why(first) for first in missing]) or f"nothing leads to {literal}"
+
+    def _holds_ever(self, part: Formula) -> bool:
+        return self._can_be(self._task.conditions.formula(part))
 
     def _lacking(self, skill: SkillModel, args: Binding) -> Iterator[str]:
         """What there is not of the kind that a skill takes: a tool, a second robot."""
@@ -189,6 +252,13 @@ class _Missing:
                         reasons[f"{skill.name} is for {kind}, and {name} is none"] = None
         named = list(reasons)[:MAX_NAMED]
         return "; ".join(named) if named else f"no skill makes {literal}"
+
+
+def _named(reasons: Sequence[str]) -> str:
+    """The first few of them, each once."""
+    rows = list(dict.fromkeys(filter(None, reasons)))
+    more = f" (and {len(rows) - MAX_NAMED} more)" if len(rows) > MAX_NAMED else ""
+    return "; ".join(rows[:MAX_NAMED]) + more
 
 
 def _reachable(task: FiniteDomainTask) -> set[int]:

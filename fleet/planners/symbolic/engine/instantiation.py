@@ -188,10 +188,11 @@ class Instantiation:
         args = {name: binding.get(name, "") for name in skill.parameters}
         why = self.world.lacks(binding[parameter], skill.ground(args), parameter)
         self._refuse(literal, skill, why)
-        places = {name for name, kind in skill.types.items() if kind.bases == (PLACE,)}
-        there = measured & places or (places and binding[parameter] in self.world.marked)
-        if why is not None and literal is not None and there:
-            self.refused_there.add(literal)
+        if why is not None and literal is not None:
+            places = {name for name, kind in skill.types.items() if kind.bases == (PLACE,)}
+            anywhere = skill.ground({**args, **dict.fromkeys(places, "")})
+            if self.world.lacks(binding[parameter], anywhere, parameter) is None:
+                self.refused_there.add(literal)
         return why is None
 
     def _refuse(self, literal: Literal | None, skill: SkillModel, why: str | None) -> None:

@@ -15,6 +15,7 @@ from keyexpr_schema.payloads.goals import Condition, Goal, Precedence
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 BIG_DAG, PER_GOAL, MONOLITHIC = "big-dag", "per-goal", "monolithic"
+LEAST_WORK = "least-work"
 """How tasks for several goals come together; a planner has some of these strategies, or others."""
 
 

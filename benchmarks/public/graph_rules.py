@@ -101,6 +101,17 @@ class Situation:
         """Whether the relations that are wanted are there."""
         return self.edges.issuperset(goal)
 
+    def never(self, goal: Iterable[Edge]) -> str:
+        """Why by these rules no steps ever lead to what is wanted; empty if they may."""
+        for edge in set(goal) - self.edges:
+            node, where = self.nodes[edge.of], self.nodes[edge.to]
+            into = CONTAINERS if edge.relation == INSIDE else SURFACES
+            if node.category != AGENTS and GRABABLE not in node.properties:
+                return f"by the set's own rules nobody takes {node}: it is not {GRABABLE}"
+            if node.category != AGENTS and into not in where.properties:
+                return f"by the set's own rules nothing is put there: {where} is not {into}"
+        return ""
+
     def has(self, node: int, word: str) -> bool:
         """Whether a node has a property."""
         return word in self.nodes[node].properties

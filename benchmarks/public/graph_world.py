@@ -1,10 +1,10 @@
 """COHERENT's graphs as a world of this project, and plans as steps of the set.
 
 Rooms are places; all else that is no robot is a thing that is `at` what it is on or in. What the
-set's robots can do is in the skill file beside this module. Heights are read off what carries a
-thing, and what a dog is close to is kept in a few variables of the dog, so the world says a little
-less than the graph: the dog is not known to be close to all that it could have put down on the way,
-nobody uses the top of what is a container, too, and nobody reaches through what is closed.
+set's robots can do is in the skill file beside this module. What a dog is close to is kept in a few
+variables of the dog, so the world says a little less than the graph: a dog is not known to be close
+to all that it put down on the way, nor goes it up to what is on or in a thing that moves; nobody
+uses the top of what is a container, too, and nobody reaches through what is closed.
 """
 
 from __future__ import annotations
@@ -93,9 +93,14 @@ _STEPS = {
     "arm_open": (OPENS, "thing"),
     "arm_close": (CLOSES, "thing"),
     "arm_take": (GRAB, "object"),
-    "arm_put_down": (PUT_ON, "object", "table"),
+    "arm_take_out": (GRAB, "object"),
+    "arm_take_from": (GRAB, "object"),
+    "arm_unload": (GRAB, "object"),
     "arm_put_on": (PUT_ON, "object", "onto"),
-    "arm_put_in": (PUT_INTO, "object", "into"),
+    "arm_put_in": (PUT_INTO, "object", "container"),
+    "arm_put_on_top": (PUT_ON, "object", "onto"),
+    "arm_put_inside": (PUT_INTO, "object", "into"),
+    "arm_load": (PUT_INTO, "object", "basket"),
 }
 """By skill: the step, and the parameters that it is with."""
 
@@ -173,9 +178,22 @@ def _thing(node: Node, task: Task) -> Object:
 
 def _is_high(node: Node, task: Task) -> bool:
     """Whether a dog does not reach it where it is at first."""
-    words = {HIGH_HEIGHT, ON_HIGH_SURFACE} & set(node.properties)
-    under = [task.nodes[e.to] for e in task.edges if e.of == node.id and e.relation in (ON, INSIDE)]
-    return bool(words) or any(_is_high(one, task) for one in under)
+    high = (HIGH_HEIGHT in task.nodes[one].properties for one in _under(node, task))
+    return bool({HIGH_HEIGHT, ON_HIGH_SURFACE} & set(node.properties)) or any(high)
+
+
+def _under(node: Node, task: Task) -> Iterator[int]:
+    """All that carries a node at first."""
+    for edge in task.edges:
+        if edge.of == node.id and edge.relation in (ON, INSIDE):
+            yield edge.to
+            yield from _under(task.nodes[edge.to], task)
+
+
+def _arms_surfaces(task: Task) -> set[int]:
+    """What arms are fixed on."""
+    arms = {n.id for n in task.nodes.values() if n.class_name.replace("_", " ") == ROBOT_ARM}
+    return {edge.to for edge in task.edges if edge.of in arms and edge.relation == ON}
 
 
 def _opens(node: Node) -> bool:
@@ -223,6 +241,9 @@ def _facts(task: Task) -> Iterator[tuple[str, str, Value]]:
             yield HOLDING, names[node.id], NOTHING
             for relation in ("beside", "support", "inner", "laid", "chosen"):
                 yield relation, names[node.id], NOTHING
+        for table in _arms_surfaces(task) & {node.id, *_under(node, task)}:
+            if GRABABLE not in node.properties:
+                yield "within", names[node.id], names[table]
     for of, relation, to in task.edges:
         node, where = nodes[of], nodes[to]
         if relation == WITH:

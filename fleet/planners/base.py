@@ -10,10 +10,12 @@ from math import inf
 from fleet.core.checker.plan_checker import CheckedPlan, check_plan
 from fleet.core.model.world import WorldModel
 from fleet.jobshop.time_budget import TimeBudget
+from fleet.planners.room_wanted import lacks_room
 from keyexpr_schema.payloads.goals import Condition, Goal, Precedence
 from keyexpr_schema.payloads.plans import Plan, Violation
 
 BIG_DAG, PER_GOAL, MONOLITHIC = "big-dag", "per-goal", "monolithic"
+LEAST_WORK = "least-work"
 """How tasks for several goals come together; a planner has some of these strategies, or others."""
 
 
@@ -91,6 +93,9 @@ class Planner(ABC):
             )
         if not problem.world.team:
             return NoPlan("no robot is connected")
+        wanted = (condition for goal in problem.goals for condition in goal.conditions)
+        if (why := lacks_room(wanted, problem.world)) is not None:
+            return NoPlan(why)
         solved = self._solve(problem)
         if isinstance(solved, NoPlan):
             return solved

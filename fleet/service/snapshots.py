@@ -18,9 +18,10 @@ from msgspec.structs import replace
 from fleet.core.state import State
 from fleet.core.table import Table, decode_table, encode_table
 
-SNAPSHOT_FORMAT = 4
+SNAPSHOT_FORMAT = 5
 """Counts up whenever a field of the state gets another name or meaning."""
-_READABLE = frozenset({2, 3, SNAPSHOT_FORMAT})
+_WITH_REASONS = 4
+_READABLE = frozenset({2, 3, _WITH_REASONS, SNAPSHOT_FORMAT})
 """Formats that decode; in format 2 a state had no skills, before format 4 no reasons and wishes."""
 KEPT = 2
 _PREFIX, _SUFFIX = "snapshot-", ".msgpack"
@@ -59,7 +60,7 @@ def decode_snapshot(data: bytes) -> Snapshot | None:
         found = msgspec.msgpack.decode(data, type=_Format).format
         if found not in _READABLE:
             return None
-        if found < SNAPSHOT_FORMAT:
+        if found < _WITH_REASONS:
             bare = _of_earlier_format(msgspec.msgpack.decode(data))
         else:
             bare = msgspec.msgpack.decode(data, type=Snapshot, dec_hook=_decode)

@@ -116,13 +116,14 @@ def alternatives_for(
     world: WorldModel,
     budget: TimeBudget,
     on_the_way: Trajectory = ANYHOW,
+    patient: bool = False,
 ) -> tuple[tuple[ActionSequence, ...], Facts] | Impossible | GaveUp:
     """Different sequences for a subgoal, the cheapest first, and the facts after that one; or why
     there is none, or none was found within the `budget`.
 
     Where a robot stands is left open at the start, so that every actor begins with the way to its
-    work, whatever its robot does before.
-    What has to hold, or not, `on_the_way` does so in every state of a sequence.
+    work, whatever its robot does before. What has to hold, or not, `on_the_way` does so in every
+    state of a sequence. If `patient`, more time is spent on finding the cheapest.
     """
     failures: list[Impossible | GaveUp] = []
     sought: list[_Sought] = []
@@ -137,12 +138,13 @@ def alternatives_for(
     for one in sought:
         if len(found) >= ALTERNATIVES and one.least_s >= _dearest_s(found):
             break
-        results = _different_solutions(one, budget)
+        results = _different_solutions(one, budget, patient)
         if not results and not one.thorough:
             again = _sought(one.conditions, facts, world, budget, on_the_way, thorough=True)
             if isinstance(again, GaveUp):
                 failures.append(again)
-            results = _different_solutions(again, budget) if isinstance(again, _Sought) else []
+            if isinstance(again, _Sought):
+                results = _different_solutions(again, budget, patient)
         if isinstance(results, Unfinished):
             failures.append(GaveUp(_gave_up(subgoal, results, budget)))
             break
@@ -223,7 +225,9 @@ class _Sought:
     thorough: bool
 
 
-def _different_solutions(sought: _Sought, budget: TimeBudget) -> list[Solution] | Unfinished:
+def _different_solutions(
+    sought: _Sought, budget: TimeBudget, patient: bool
+) -> list[Solution] | Unfinished:
     """The cheapest sequence, and others made different by charging for what was used before."""
     charge_s = [0.0] * len(sought.task.operators)
     same: dict[object, list[int]] = {}
@@ -231,7 +235,9 @@ def _different_solutions(sought: _Sought, budget: TimeBudget) -> list[Solution] 
     for number, operator in enumerate(sought.task.operators):
         for use in _uses(operator.action, world):
             same.setdefault(use, []).append(number)
-    found: Solution | Unreachable | Unfinished | None = sought.solver.solve(charge_s, budget)
+    found: Solution | Unreachable | Unfinished | None = sought.solver.solve(
+        charge_s, budget, patient
+    )
     if isinstance(found, Unfinished):
         return found
     solutions: list[Solution] = []

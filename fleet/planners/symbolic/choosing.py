@@ -8,22 +8,28 @@ carriers that go the same way are made one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from math import inf, prod
+from math import prod
 
-from fleet.core.actors import carried_at_end
 from fleet.core.checker.plan_checker import CheckedPlan, InvalidPlan, check_plan
-from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, PlanningProblem
+from fleet.planners.base import (
+    BIG_DAG,
+    LEAST_WORK,
+    MONOLITHIC,
+    PER_GOAL,
+    NoPlan,
+    PlanningProblem,
+)
 from fleet.planners.deordering import ActionSequence, deordered
 from fleet.planners.symbolic.action_sequences import Exploration
+from fleet.planners.symbolic.candidates import Best, Candidate, Choice, Pace, allocated_as, by_cost
 from fleet.planners.symbolic.flat_list import Team, in_one_list
 from fleet.planners.symbolic.joint_trips import Pair, Trips
 from fleet.planners.symbolic.roles import Roles
 from fleet.planners.symbolic.workloads import Balance, Workloads, balanced, unloading_s
-from fleet.scheduling.plan_schedule import AllocatedPlan, PlanSchedule
 from fleet.scheduling.quick_allocation import quick_allocation
 from keyexpr_schema.payloads.plans import Plan
 
@@ -33,16 +39,12 @@ MANY = 16
 """Subgoals that are many, however few sequences there are for each."""
 MOST_CHANGES = 24
 """Of those changes, how many are compared as plans: those that spread the work best."""
-MOST_REFINED, REFINING_NODES = 12, 3000
-"""Of those, how many of the most promising get a better allocation, and how long it is sought."""
+MOST_REFINED = 12
+"""Of those, how many of the most promising get a better allocation."""
 MOST_JOINED = 24
 """Pairs of trips that are tried as one trip before no more are joined."""
 FEW = 32
 """Beside a joint trip, up to so many combinations of what the others do are all compared."""
-
-Choice = Sequence[ActionSequence]
-Cost = tuple[float, float]
-"""The makespan [s], with a charge for what is left in baskets, and the work of all robots [s]."""
 
 
 def choose(
@@ -53,83 +55,14 @@ def choose(
 
 
 @dataclass(frozen=True)
-class _Candidate:
-    """A valid plan for a choice of sequences, each actor with an able robot.
-
-    Until it is verified, `cost` is that of the shortest schedule, which need not pass the checker.
-    """
-
-    choice: Choice
-    allocated: AllocatedPlan
-    cost: Cost
-
-    def refined(self) -> _Candidate:
-        """With a better allocation, if a look at all of a small plan's finds one."""
-        checked = self.allocated.checked
-        made = _allocated(self.choice, checked, quick_allocation(checked, REFINING_NODES))
-        return made if made is not None and made.cost < self.cost else self
-
-    def verified(self) -> _Candidate | NoPlan:
-        """With the cost of the shortest schedule that passes the checker."""
-        found = self.allocated.valid_schedule()
-        if isinstance(found, tuple):
-            return NoPlan(found[0].sentence, found)
-        return replace(self, cost=_cost(found, self.allocated.checked))
-
-
-def _allocated(
-    choice: Choice, checked: CheckedPlan, allocation: Mapping[str, str] | None
-) -> _Candidate | None:
-    if allocation is None:
-        return None
-    allocated = AllocatedPlan(checked, allocation)
-    schedule = next(allocated.schedules(), None)
-    cost = (inf, inf) if schedule is None else _cost(schedule, checked)
-    return _Candidate(choice, allocated, cost)
-
-
-def _cost(schedule: PlanSchedule, checked: CheckedPlan) -> Cost:
-    left_s = unloading_s(checked.world) * len(carried_at_end(checked))
-    return round(schedule.makespan_s + left_s, 3), sum(schedule.durations_s.values())
-
-
-def _by_cost(candidate: _Candidate) -> Cost:
-    return candidate.cost
-
-
-class _Best:
-    """The cheapest valid candidate so far, and why the first that was not valid was not."""
-
-    def __init__(self, begin: _Candidate | None = None) -> None:
-        self.found = begin
-        self.failure: NoPlan | None = None
-
-    def improved(self, candidate: _Candidate | NoPlan) -> bool:
-        """Whether the candidate is better; verifying does not make a plan cheaper, so only what
-        looks cheaper is verified."""
-        if isinstance(candidate, _Candidate) and self._is_better(candidate):
-            candidate = candidate.verified()
-            if isinstance(candidate, _Candidate) and self._is_better(candidate):
-                self.found = candidate
-                return True
-        if isinstance(candidate, NoPlan):
-            self.failure = self.failure or candidate
-        return False
-
-    def _is_better(self, candidate: _Candidate) -> bool:
-        return self.found is None or candidate.cost < self.found.cost
-
-    @property
-    def result(self) -> _Candidate | NoPlan:
-        """The best, or why there is none."""
-        none = NoPlan("no combination of action sequences passes the checker")
-        return self.found or self.failure or none
-
-
-@dataclass(frozen=True)
 class _Choosing:
     problem: PlanningProblem
     explored: Exploration | None
+
+    @cached_property
+    def pace(self) -> Pace:
+        """Of comparing plans of many goals."""
+        return Pace(self.problem.budget)
 
     @cached_property
     def roles(self) -> Roles:
@@ -159,11 +92,11 @@ class _Choosing:
             best = self._best(options)
         if isinstance(best, NoPlan):
             return best
-        if self.problem.strategy == BIG_DAG:
+        if self.problem.strategy in (BIG_DAG, LEAST_WORK):
             best = self._with_joint_trips(best, options)
         return best.allocated.checked
 
-    def _each_alone(self, options: Sequence[Choice]) -> _Candidate | None:
+    def _each_alone(self, options: Sequence[Choice]) -> Candidate | None:
         """For each goal what is best as if there were no other, if that is a plan in time."""
         if _are_many(options):
             return self._each_alone_quickly(options)
@@ -175,9 +108,9 @@ class _Choosing:
                 return None
             choice += [(sequence,) for sequence in best.choice]
         together = self._best(choice)
-        return together if isinstance(together, _Candidate) else None
+        return together if isinstance(together, Candidate) else None
 
-    def _each_alone_quickly(self, options: Sequence[Choice]) -> _Candidate | None:
+    def _each_alone_quickly(self, options: Sequence[Choice]) -> Candidate | None:
         """The same for many goals: each goal's sequences done by those who can be there first."""
         choice: list[ActionSequence] = []
         for goal in dict.fromkeys(alternatives[0].goal for alternatives in options):
@@ -188,7 +121,7 @@ class _Choosing:
         if Balance(self.workloads, [choice], choice).estimate.crowded:
             return None
         together = self._candidate(choice)
-        return together if isinstance(together, _Candidate) else None
+        return together if isinstance(together, Candidate) else None
 
     def _alone_s(self, choice: Choice) -> float:
         """What they take the team as it stands, with the charge for what is left in baskets."""
@@ -197,7 +130,7 @@ class _Choosing:
         last_s = max(team.take(each)[1] for each in choice)
         return last_s + unloading_s(self.problem.world) * loads
 
-    def _best(self, options: Sequence[Choice]) -> _Candidate | NoPlan:
+    def _best(self, options: Sequence[Choice]) -> Candidate | NoPlan:
         """The cheapest candidate: of few combinations the cheapest of all; else from the cheapest
         sequence of each, one is changed at a time for as long as that helps.
 
@@ -205,49 +138,56 @@ class _Choosing:
         """
         if prod(map(len, options)) > MAX_COMBINATIONS:
             return self._one_at_a_time(options)
-        best = _Best()
+        best = Best()
         for found in self._ranked(product(*options), MOST_REFINED):
             if best.found is not None and self.problem.budget.over:
                 break
             best.improved(found)
         return best.result
 
-    def _one_at_a_time(self, options: Sequence[Choice]) -> _Candidate | NoPlan:
+    def _one_at_a_time(self, options: Sequence[Choice]) -> Candidate | NoPlan:
         cheapest = [alternatives[0] for alternatives in options]
         balance = balanced(Balance(self.workloads, options, cheapest), options)
-        best = _Best()
-        best.improved(self._candidate(balance.chosen))
-        if best.found is None or not self.problem.budget.over:
-            best.improved(self._candidate(cheapest))
+        best = Best()
+        self._compare(best, balance.chosen)
+        if best.found is None or not self.pace.over:
+            self._compare(best, cheapest)
         for tried, (number, sequence) in enumerate(_changes(balance, options)):
-            if self.problem.budget.over or (best.found and tried >= MOST_CHANGES):
+            if self.pace.over or (best.found and tried >= MOST_CHANGES):
                 break
             current = best.found.choice if best.found else balance.chosen
-            best.improved(self._candidate([*current[:number], sequence, *current[number + 1 :]]))
+            self._compare(best, [*current[:number], sequence, *current[number + 1 :]])
         return best.result
 
-    def _ranked(self, choices: Iterator[Choice], most_refined: int) -> list[_Candidate | NoPlan]:
+    def _compare(self, best: Best, choice: Choice) -> bool:
+        """Whether the plan of a choice is better."""
+        self.pace.begin()
+        improved = best.improved(self._candidate(choice))
+        self.pace.end()
+        return improved
+
+    def _ranked(self, choices: Iterator[Choice], most_refined: int) -> list[Candidate | NoPlan]:
         """All that are valid, the cheapest first; so many of the cheapest with better allocations.
         Before them why another is not valid, if one is not.
         """
-        candidates: list[_Candidate] = []
+        candidates: list[Candidate] = []
         failures: list[NoPlan] = []
         for choice in choices:
             found = self._candidate(choice)
-            if isinstance(found, _Candidate):
+            if isinstance(found, Candidate):
                 candidates.append(found)
             else:
                 failures.append(found)
             if self.problem.budget.over:
                 break
-        candidates.sort(key=_by_cost)
+        candidates.sort(key=by_cost)
         for number, candidate in enumerate(candidates[:most_refined]):
             if self.problem.budget.over:
                 break
             candidates[number] = candidate.refined()
-        return [*failures[:1], *sorted(candidates, key=_by_cost)]
+        return [*failures[:1], *sorted(candidates, key=by_cost)]
 
-    def _with_joint_trips(self, begin: _Candidate, options: Sequence[Choice]) -> _Candidate:
+    def _with_joint_trips(self, begin: Candidate, options: Sequence[Choice]) -> Candidate:
         """Sequences for two goals joined into one with one carrier, for as long as that helps."""
         best, ways = begin, [list(alternatives) for alternatives in options]
         if _are_many(options):
@@ -258,15 +198,15 @@ class _Choosing:
             del ways[other]
         return best
 
-    def _many_joined(self, begin: _Candidate, options: Sequence[Choice]) -> _Candidate:
+    def _many_joined(self, begin: Candidate, options: Sequence[Choice]) -> Candidate:
         """Of many goals, all pairs of trips at once that are less work as one; where that is no
         better a plan, the half of them that save most, and so on."""
-        best, ways = _Best(begin), list(options)
-        while best.found is not None and not self.problem.budget.over:
+        best, ways = Best(begin), list(options)
+        while best.found is not None and not self.pace.over:
             before = best.found
             balance, pairs = self._joined(before, self.trips.pairs(ways))
-            while pairs and not self.problem.budget.over:
-                if best.improved(self._candidate(balance.chosen)):
+            while pairs and not self.pace.over:
+                if self._compare(best, balance.chosen):
                     break
                 balance, pairs = self._joined(before, pairs[: len(pairs) // 2])
             if best.found is before:
@@ -274,7 +214,7 @@ class _Choosing:
             ways = [[sequence] for sequence in best.found.choice]
         return best.found or begin
 
-    def _joined(self, begin: _Candidate, pairs: Sequence[Pair]) -> tuple[Balance, list[Pair]]:
+    def _joined(self, begin: Candidate, pairs: Sequence[Pair]) -> tuple[Balance, list[Pair]]:
         """The choice with those pairs joined, each on its own, that are less work; and which."""
         joint = [(pair.made.sequence,) for pair in pairs]
         single = [(sequence,) for sequence in begin.choice]
@@ -296,13 +236,13 @@ class _Choosing:
         return balance, taken
 
     def _joint_trip(
-        self, begin: _Candidate, ways: Sequence[Choice]
-    ) -> tuple[Pair, _Candidate] | None:
+        self, begin: Candidate, ways: Sequence[Choice]
+    ) -> tuple[Pair, Candidate] | None:
         """The pair of trips that makes the cheapest plan as one, and that plan, if it is cheaper.
 
         Of many goals it is the first pair that helps, and the others stay as they are.
         """
-        best, chosen = _Best(begin), None
+        best, chosen = Best(begin), None
         for pair in self.trips.pairs(ways)[:MOST_JOINED]:
             if self.problem.budget.over:
                 break
@@ -318,12 +258,12 @@ class _Choosing:
                 break
         return None if chosen is None or best.found is None else (chosen, best.found)
 
-    def _candidate(self, choice: Choice) -> _Candidate | NoPlan:
+    def _candidate(self, choice: Choice) -> Candidate | NoPlan:
         plan = self._plan(choice)
         checked = check_plan(plan, self.problem.world)
         if isinstance(checked, InvalidPlan):
             return NoPlan(checked.violations[0].sentence, checked.violations)
-        made = _allocated(choice, checked, quick_allocation(checked))
+        made = allocated_as(choice, checked, quick_allocation(checked))
         return made or NoPlan("there are fewer robots than the plan needs at the same time")
 
     def _plan(self, choice: Choice) -> Plan:

@@ -6,7 +6,9 @@ it are sought (for instance one with a helper that carries), and one is chosen a
 * `big-dag` chooses for all goals together, by the makespan that they lead to;
 * `per-goal` chooses for each goal alone, as if there were no other, and merges the results;
 * `monolithic` makes one flat list, each goal going on from where the one before left every robot
-  (`flat_list`).
+  (`flat_list`);
+* `least-work` searches for all conditions of a goal at once, and chooses by what the robots have to
+  do altogether, however long that takes.
 
 Where it is not known where a needed object is, the plan looks for it: a search of every place, by
 all robots that can, in parallel. What is found leads to the next revision.
@@ -24,7 +26,15 @@ from math import inf
 from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.core.model.world import condition_holds
 from fleet.jobshop.time_budget import TimeBudget
-from fleet.planners.base import BIG_DAG, MONOLITHIC, PER_GOAL, NoPlan, Planner, PlanningProblem
+from fleet.planners.base import (
+    BIG_DAG,
+    LEAST_WORK,
+    MONOLITHIC,
+    PER_GOAL,
+    NoPlan,
+    Planner,
+    PlanningProblem,
+)
 from fleet.planners.symbolic.action_sequences import (
     Exploration,
     GaveUp,
@@ -34,7 +44,8 @@ from fleet.planners.symbolic.action_sequences import (
     exploration_for,
     subgoals_in_order,
 )
-from fleet.planners.symbolic.choosing import Choice, choose
+from fleet.planners.symbolic.candidates import Choice
+from fleet.planners.symbolic.choosing import choose
 from fleet.planners.symbolic.engine.finite_domain import Trajectory
 from fleet.planners.symbolic.engine.instantiation import Facts
 from keyexpr_schema.facts import AT, HOLDING, FactKey
@@ -65,7 +76,7 @@ class SymbolicPlanner(Planner):
     """Search over skill models."""
 
     name = "symbolic"
-    strategies = (BIG_DAG, PER_GOAL, MONOLITHIC)
+    strategies = (BIG_DAG, PER_GOAL, MONOLITHIC, LEAST_WORK)
 
     def _solve(self, problem: PlanningProblem) -> CheckedPlan | NoPlan:
         world, rows = problem.world, problem.sometime_before
@@ -79,12 +90,20 @@ class SymbolicPlanner(Planner):
         bound = (False, True) if names & set(world.team) else (False,)
         first: NoPlan | None = None
         for manner in dict.fromkeys(_Manner(o, b) for o, b in product((wanted, rows), bound)):
-            made = self._one_by_one(problem, (), manner)
+            made = self._made(problem, manner)
             if isinstance(made, CheckedPlan) or made.postponed:
                 return made
             first = first or made
         assert first is not None
         return first
+
+    def _made(self, problem: PlanningProblem, manner: _Manner) -> CheckedPlan | NoPlan:
+        """In one manner; for the least work each goal at once, if that is a plan."""
+        if problem.strategy == LEAST_WORK:
+            made = self._each_goal_at_once(problem, manner, NoPlan(problem.not_in_time))
+            if isinstance(made, CheckedPlan):
+                return made
+        return self._one_by_one(problem, (), manner)
 
     def _one_by_one(
         self,
@@ -237,7 +256,10 @@ class _Reached:
             kept = tuple(c for c in self._in_baskets() if c != subgoal.condition)
             subgoal = replace(subgoal, others=(*subgoal.others, *kept))
         left_s = problem.budget.left_s
-        found = alternatives_for(subgoal, self.facts, problem.world, budget, on_the_way=way)
+        patient = problem.strategy == LEAST_WORK
+        found = alternatives_for(
+            subgoal, self.facts, problem.world, budget, on_the_way=way, patient=patient
+        )
         if not isinstance(found, tuple):
             self.failure = found
             return False

@@ -199,3 +199,52 @@ def test_a_tool_or_a_robot_that_there_is_not_is_what_is_missing(goal: Goal, reas
     made = SymbolicPlanner().plan(problem)
     assert isinstance(made, NoPlan)
     assert reason in made.reason
+
+
+def test_what_a_person_has_is_named_as_in_that_hand() -> None:
+    world = polishing("cloth")
+    anna = Object(object="anna", kind="person", label="Anna", movable=False, features=("person",))
+    held = WorldModel.of(
+        world.skills,
+        PLACES,
+        (*world.objects.values(), anna),
+        tuple(world.robots.values()),
+        (
+            fact("hsr", "holding", "nothing"),
+            fact("anna", "at", "kitchen"),
+            fact("cup_1", "at", "anna"),
+        ),
+    )
+    made = SymbolicPlanner().plan(PlanningProblem("p", (bring(1, "hallway"),), held))
+    assert isinstance(made, NoPlan)
+    assert "cup_1 is in the hand of anna" in made.reason
+
+
+@pytest.mark.parametrize(("room", "fits"), [(1, False), (2, True)])
+def test_no_more_is_wanted_somewhere_than_it_has_room_for(room: int, fits: bool) -> None:
+    world = polishing()
+    tray = Object(object="tray", kind="tray", label="tray", features=("contains",), room=room)
+    spec = replace(manipulator(), skills=(*manipulator().skills, "place_in"))
+    model = WorldModel.of(
+        world.skills,
+        PLACES,
+        (*world.objects.values(), tray),
+        (spec,),
+        (
+            fact("hsr", "holding", "nothing"),
+            *(fact(name, "at", "kitchen") for name in ("tray", "cup_1", "cup_2")),
+        ),
+    )
+    goals = tuple(
+        Goal(
+            goal=f"g{n}",
+            text=f"Put cup {n} in the tray",
+            conditions=(Condition(relation="in", subject=f"cup_{n}", value="tray"),),
+            ordinal=n,
+        )
+        for n in (1, 2)
+    )
+    made = SymbolicPlanner().plan(PlanningProblem("p", goals, model))
+    assert isinstance(made, CheckedPlan) is fits
+    if isinstance(made, NoPlan):
+        assert made.reason == "tray has room for 1, and cup_1, cup_2 are to be there"

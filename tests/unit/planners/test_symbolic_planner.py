@@ -206,6 +206,21 @@ def test_choosing_for_all_goals_together_is_at_least_as_fast() -> None:
     assert makespan["big-dag"] < makespan["monolithic"]
 
 
+def test_the_least_work_of_all_robots_may_take_longer() -> None:
+    stand = (fact("r1", "at", "kitchen"), fact("r2", "at", "living_room"))
+    world = home((manipulator("r1"), manipulator("r2")), facts=stand)
+    goals = (bring(1, "living_room"), bring(2, "living_room"))
+
+    def spent(strategy: str) -> tuple[float, float]:
+        schedule = allocate(solve(world, *goals, strategy=strategy), world).schedule
+        return schedule.makespan_s, sum(schedule.durations_s.values())
+
+    makespan_s, work_s = spent("big-dag")
+    longer_s, less_s = spent("least-work")
+    assert less_s <= work_s
+    assert longer_s >= makespan_s
+
+
 def test_a_skill_of_a_users_own_is_planned_with() -> None:
     mop = {
         "about": "Mop a floor, with the mop in the hand.",

@@ -30,6 +30,14 @@ WORLD = str(CONFIGS / "worlds" / "home.yaml")
         (["goal", "add", " "], "say what you want, such as “Bring the first cup"),
         (["goal", "add", "x", "--id", ""], "goal '' is not valid: use 1 to 63 ASCII letters"),
         (["goal", "add", "x", "--id", "a/**"], "goal 'a/**' is not valid: use 1 to 63 ASCII"),
+        (
+            ["goal", "add", "x", "--before", "at cup_1 kitchen"],
+            "is 'CONDITION before CONDITION', such as 'is_open fridge false before at cup_1",
+        ),
+        (
+            ["goal", "add", "x", "--before", "at cup_1 before at cup_1 kitchen"],
+            "a condition is RELATION SUBJECT VALUE, such as 'is_open fridge false'; got 'at cup_1'",
+        ),
         (["world", "add", ""], "say something, such as “The first cup is in the kitchen.”"),
         (["plan", "create", "big-dag", "milp", "--id", "a/b"], "plan 'a/b' is not valid: use 1"),
         (["goal", "delete", "g", "--ended"], "or say --ended for all that have ended; one of both"),

@@ -42,6 +42,21 @@ def test_a_goal_without_a_planner_is_stored_and_said_so(robotctl: Robotctl) -> N
     )  # a refused one has had 3
 
 
+def test_what_a_goal_keeps_avoids_and_puts_in_order_is_shown(robotctl: Robotctl) -> None:
+    said = robotctl(
+        *("goal", "add", "Bring the first cup to the hallway.", "--id", "g", "--json"),
+        *("--always", "at cup_2 kitchen", "--never", "at(hsr) = living_room"),
+        *("--before", "at cup_1 living_room before at(cup_1) = hallway"),
+    )
+    (row,) = said.data["spec"]["sometime_before"]
+    assert row["first"]["value"] == "living_room"
+    assert row["then"]["value"] == "hallway"
+    page = robotctl("goal", "show", "g").out
+    assert "always      at(cup_2) = kitchen" in page
+    assert "never       at(hsr) = living_room" in page
+    assert "in order    at(cup_1) = living_room before at(cup_1) = hallway" in page
+
+
 def test_numbers_of_goals_do_not_come_back(robotctl: Robotctl) -> None:
     text = "Bring the first cup to the hallway."
     goals = [robotctl("goal", "add", text, "--json").data["goal"] for _ in range(3)]

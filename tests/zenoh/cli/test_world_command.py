@@ -30,6 +30,9 @@ def test_the_world_is_loaded_said_listed_and_forgotten(robotctl: Robotctl) -> No
     assert said.out.strip() == "stored at(cup_1) = kitchen"
     wrong = robotctl("world", "add", "--fact", "at", "cup_1", "kitchn")
     assert "(did you mean 'kitchen'?)" in wrong.err
+    shut = robotctl("world", "add", "--fact", "is_open", "cup_1", "true")
+    assert shut.code == 1
+    assert "is_open is said of openable, and cup_1 is none" in shut.err
     assert "got 2 words" in robotctl("world", "add", "--fact", "at", "cup_1").err
 
     world = robotctl("world", "list", "--json").data

@@ -33,6 +33,7 @@ from keyexpr_schema.facts import (
     FactKey,
     Literal,
 )
+from keyexpr_schema.payloads.world import Feature
 
 MAX_NAMED = 3
 """Reasons named, where there are several of a kind."""
@@ -120,7 +121,15 @@ class _Missing:
         self.certain &= not (grounding.is_given_back(stored) or grounding.may_come_along(stored))
         if any(found):
             return _named(found)
-        return _named(refused) or _named(lacking) or f"nothing leads to {literal}"
+        return _named([*lacking, *refused]) or self._nothing(literal)
+
+    def _nothing(self, literal: Literal) -> str:
+        """That nothing leads there; of what a person has, in whose hand it is."""
+        subject = literal.variable.subject
+        holder = self._world.objects.get(str(self._task.nodes.known(FactKey(AT, subject))))
+        if holder is not None and holder.is_a(Feature.PERSON):
+            return f"{subject} is in the hand of {holder.object}, and nobody takes it from there"
+        return f"nothing leads to {literal}"
 
     def _lost_of(self, skill: SkillModel, args: Binding) -> Iterator[str]:
         """What a skill handles of which nobody knows where it is."""

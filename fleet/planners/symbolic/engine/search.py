@@ -2,8 +2,9 @@
 
 First A* with h_max: what it finds is the cheapest. Where that takes long, A* with h_FF looks for a
 cheap one; where that takes long, too, a greedy search with h_add for any. Then the first goes on,
-within limits, for a cheaper one. States are estimated when it is their turn, not when they are
-made; what a relaxed plan begins with has its turn first.
+within limits, for a cheaper one; with patience, so does A* with a part of h_FF, which overestimates
+less. States are estimated when it is their turn, not when they are made; what a relaxed plan begins
+with has its turn first.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ CHEAP_SHARE = 0.5
 """Of the time, how much that has at most."""
 IMPROVING_STATES = 600
 """States that A* looks at in all where there is a sequence already."""
+PATIENT = ((0.8, 600), (0.6, 900))
+"""With patience: parts of h_FF, and how many states A* with each looks at for a cheaper one."""
 OTHER_STATES = 15
 """States looked at for another sequence that uses other actions."""
 MAX_STATES = 500_000
@@ -143,7 +146,8 @@ class Search:
     def _push(self, node: _Node, guess_s: float, first: bool, estimate: Estimate | None) -> None:
         self._ticket += 1
         least_s = round(node.spent_s + self._greed * guess_s, 6)
-        row = (least_s, not first, guess_s, -self._ticket, node.spent_s + guess_s, node, estimate)
+        bound_s = node.spent_s + min(1.0, self._greed) * guess_s
+        row = (least_s, not first, guess_s, -self._ticket, bound_s, node, estimate)
         heappush(self._queue, row)
 
     def _estimate(self, state: State) -> Estimate:
@@ -191,7 +195,7 @@ class Solver:
         return self._careful.estimate(self.task.initial, nothing).cost_s
 
     def solve(
-        self, charge_s: list[float], budget: TimeBudget
+        self, charge_s: list[float], budget: TimeBudget, patient: bool = False
     ) -> Solution | Unreachable | Unfinished:
         """The cheapest sequence, or with little time a cheap one."""
         careful = Search(self.task, self._careful, charge_s, 1.0)
@@ -211,8 +215,16 @@ class Solver:
         if any_found is True:
             return Unreachable()
         spent_s = any_found.cost_s + sum(self._charges(any_found, charge_s))
-        better = careful.run(budget, IMPROVING_STATES, spent_s)
-        return better if isinstance(better, Solution) else any_found
+        if not patient:
+            better = careful.run(budget, IMPROVING_STATES, spent_s)
+            return better if isinstance(better, Solution) else any_found
+        for part, states in PATIENT:
+            slow = Search(self.task, by_plan, charge_s, part)
+            better = slow.run(budget, states, spent_s)
+            if isinstance(better, Solution):
+                any_found = better
+                spent_s = better.cost_s + sum(self._charges(better, charge_s))
+        return any_found
 
     def another(self, charge_s: list[float], budget: TimeBudget) -> Solution | None:
         """A cheap sequence with other charges, if one is found quickly."""

@@ -21,6 +21,7 @@ from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
+from math import inf
 
 from fleet.core.checker.plan_checker import CheckedPlan
 from fleet.core.model.world import condition_holds
@@ -65,6 +66,10 @@ class _Manner:
 
     in_order: tuple[Precedence, ...] = ()
     bound: bool = False
+
+
+CHOOSING = 1.0
+"""Making one plan takes, for each of its subgoals, as long as so many of the quickest searches."""
 
 
 class SymbolicPlanner(Planner):
@@ -122,9 +127,9 @@ class SymbolicPlanner(Planner):
         for subgoal in subgoals:
             # One that is hard leaves half of the time to those after it.
             share = 1.0 if subgoal is subgoals[-1] else 0.5
-            if not searching.over and reached.add(subgoal, share):
+            if not reached.time_is_up and reached.add(subgoal, share):
                 continue
-            if searching.over or isinstance(reached.failure, GaveUp):
+            if reached.time_is_up or isinstance(reached.failure, GaveUp):
                 late.add(subgoal.goal)
             elif reached.failure.unlocated:
                 lost[subgoal] = reached.failure.unlocated
@@ -211,6 +216,13 @@ class _Reached:
     any_set_down: bool = False
     failure: Impossible | GaveUp = field(default_factory=lambda: Impossible("nothing was sought"))
     passed: set[Precedence] = field(default_factory=set)
+    quickest_s: float = inf
+
+    @property
+    def time_is_up(self) -> bool:
+        """Whether the time for searching is over, or what is left is needed to choose."""
+        choosing_s = CHOOSING * self.quickest_s * len(self.options) if self.options else 0.0
+        return self.budget.over or self.problem.budget.left_s < choosing_s
 
     def pass_first(self) -> NoPlan | None:
         """Reach what has to hold before something else may; why that cannot be done, if it cannot.
@@ -243,6 +255,7 @@ class _Reached:
         if problem.strategy == MONOLITHIC:
             kept = tuple(c for c in self._in_baskets() if c != subgoal.condition)
             subgoal = replace(subgoal, others=(*subgoal.others, *kept))
+        left_s = problem.budget.left_s
         patient = problem.strategy == LEAST_WORK
         found = alternatives_for(
             subgoal, self.facts, problem.world, budget, on_the_way=way, patient=patient
@@ -250,6 +263,7 @@ class _Reached:
         if not isinstance(found, tuple):
             self.failure = found
             return False
+        self.quickest_s = min(self.quickest_s, left_s - problem.budget.left_s)
         sequences, self.facts = found
         if self.manner.bound:
             robots = frozenset(problem.world.team)

@@ -78,11 +78,12 @@ class Grounding:
         matter = self._where_are({*spoken_of, *(robot for robot in robots if robot not in free)})
         known: set[str] = set()
         while not known or not matter <= known:
-            known = matter or set(world.places)
+            known = set(matter or world.places)
             self._places = tuple(place for place in world.places if place in known)
             self.skills.look_at(self._places)
             self._ground()
-            matter |= self._where_are({n for a in self._made.values() for n in a.args.values()})
+            handled = {name for action in self._made.values() for name in action.args.values()}
+            matter = known | self._where_are(handled - self.free.keys())
 
     def _ground(self) -> None:
         self._along: set[Literal] = set()
@@ -111,6 +112,15 @@ class Grounding:
             for row in self.skills.writers[literal.variable[0]]
         )
         return [(row.skill, binding) for row, binding in found if binding is not None]
+
+    def is_given_back(self, literal: Literal) -> bool:
+        """Whether only some of the ways to make it true are looked at: what was taken, given back
+        in the plainest way."""
+        return any(
+            self._taken_before(row, literal.value) is not None
+            for row in self.skills.writers[literal.variable.relation]
+            if self.skills.unified(row, literal) is not None
+        )
 
     def may_come_along(self, literal: Literal) -> bool:
         """Whether what a literal is about, or says it is held, is on or in something that moves, so
@@ -272,12 +282,8 @@ class Grounding:
             binding = self.skills.unified(row, literal)
             if binding is None:
                 continue
-            before = next((b for b in row.skill.before if b.variable == row.variable), None)
-            if (
-                before is not None
-                and before.value in row.skill.parameters
-                and self.skills.restores(row.relation, literal.value)
-            ):
+            before = self._taken_before(row, literal.value)
+            if before is not None:
                 # It gives back what such actions take: only what has been taken matters, and of
                 # several ways to give it back those that need nothing else.
                 if not (self._thorough or row.is_plain) and any(
@@ -291,6 +297,12 @@ class Grounding:
                 continue
             for values in self.skills.completed(row.skill, binding, literal):
                 self._add(row.skill, values)
+
+    def _taken_before(self, row: Row, value: Value) -> Literal | None:
+        """What a skill asks of a variable to which it gives back what others take, if it does."""
+        before = next((b for b in row.skill.before if b.variable == row.variable), None)
+        parameter = before is not None and before.value in row.skill.parameters
+        return before if parameter and self.skills.restores(row.relation, value) else None
 
     def _restore(self, row: Row, before: Literal, binding: Binding, value: Value) -> None:
         parameter = str(before.value)

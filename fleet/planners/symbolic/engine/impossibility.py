@@ -19,7 +19,7 @@ from fleet.core.model.parameter_types import PLACE, ROBOT
 from fleet.core.model.skills import Action, SkillModel
 from fleet.planners.symbolic.engine.finite_domain import FiniteDomainTask
 from fleet.planners.symbolic.engine.grounding import Grounding
-from fleet.planners.symbolic.engine.instantiation import Binding
+from fleet.planners.symbolic.engine.instantiation import ANY, Binding
 from fleet.planners.symbolic.engine.relevance import rows_of
 from keyexpr_schema.facts import (
     AT,
@@ -107,16 +107,18 @@ class _Missing:
         if not makers:
             return self._no_maker(stored)
         skills = self._grounding.skills
-        refused = skills.refused.get(stored, [])
+        sought = stored, Literal(stored.variable, ANY)
+        refused = [why for each in sought for why in skills.refused.get(each, ())]
+        by = {name for each in sought for name in skills.refused_by.get(each, ())}
         found = [self.why(first) for first in missing]
         lacking: list[str] = []
         for skill, args in makers:
             there_is_not = [*self._lacking(skill, args), *self._lost_of(skill, args)]
             lacking += there_is_not
-            tried = skill.name in making or skill.name in skills.refused_by[stored]
+            tried = skill.name in making or skill.name in by
             self.certain &= tried or bool(there_is_not)
-        given_back = skills.restores(stored.variable.relation, stored.value)
-        self.certain &= not given_back and not self._grounding.may_come_along(stored)
+        grounding = self._grounding
+        self.certain &= not (grounding.is_given_back(stored) or grounding.may_come_along(stored))
         if any(found):
             return _named(found)
         return _named([*lacking, *refused]) or self._nothing(literal)

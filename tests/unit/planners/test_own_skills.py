@@ -12,7 +12,9 @@ from fleet.core.model.world import WorldModel
 from fleet.errors import NotUnderstood
 from fleet.language import Vocabulary, read_goal
 from fleet.planners.base import NoPlan, PlanningProblem
+from fleet.planners.symbolic.engine.grounding import Grounding
 from fleet.planners.symbolic.planner import SymbolicPlanner
+from keyexpr_schema.facts import FactKey, Literal
 from keyexpr_schema.ids import bare_name
 from keyexpr_schema.payloads.goals import Condition, Goal
 from keyexpr_schema.payloads.plans import Plan
@@ -248,3 +250,15 @@ def test_no_more_is_wanted_somewhere_than_it_has_room_for(room: int, fits: bool)
     assert isinstance(made, CheckedPlan) is fits
     if isinstance(made, NoPlan):
         assert made.reason == "tray has room for 1, and cup_1, cup_2 are to be there"
+
+
+def test_a_tool_is_taken_from_where_it_is_without_looking_at_every_detour() -> None:
+    world = polishing("cloth")
+    goal = [Literal(FactKey("polished", "cup_1"), True)]
+    grounding = Grounding(world, dict(world.facts), goal, ["hsr"], {"hsr": None})
+    picks = {
+        (action.args["object"], action.args["place"])
+        for action in grounding.actions
+        if action.skill.name == "pick"
+    }
+    assert ("cloth", "hallway") in picks, "the cup is in the kitchen"

@@ -78,7 +78,7 @@ class Grounding:
         matter = self._where_are({*spoken_of, *(robot for robot in robots if robot not in free)})
         known: set[str] = set()
         while not known or not matter <= known:
-            known = matter or set(world.places)
+            known = set(matter or world.places)
             self._places = tuple(place for place in world.places if place in known)
             self.skills.look_at(self._places)
             self._ground()

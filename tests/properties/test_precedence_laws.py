@@ -73,9 +73,9 @@ def test_nothing_holds_too_early(
             break
         reached["at the same time"] += len(orders) > 1
         made.succeed(data.draw(st.sampled_from(orders)))
+        look()
         if made.goal_state(goals[0].goal) is GoalState.REACHED:
             break
-        look()
     assert made.goal_state(goals[0].goal) is GoalState.REACHED
     reached["reached"] += 1
     reached["first and then"] += any(came[row] and passed[row] for row in rows)

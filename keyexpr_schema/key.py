@@ -11,6 +11,7 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
+from keyexpr_schema.decoding import decode
 from keyexpr_schema.errors import ForeignKey, InvalidId, UndecodablePayload
 from keyexpr_schema.ids import ID_PATTERN, ID_RULE, check_id
 
@@ -205,7 +206,7 @@ def decode_payload(kind: type[P], data: bytes, where: str) -> P:
         UndecodablePayload: it is not one; the message names the field and what it should be.
     """
     try:
-        return msgspec.json.decode(data, type=kind)
+        return decode(data, kind)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise UndecodablePayload(
             f"the value at {where} is not a {kind.__name__}: {plainly(error)}"

@@ -11,6 +11,7 @@ import msgspec
 from cli.errors import Unknown, check_known
 from cli.plans.comparison import PlanSide
 from cli.plans.files import is_plan_file, read_plan
+from keyexpr_schema.decoding import decode
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.keyspace import PLAN_SPEC, PLAN_STATUS, STORE_JOURNAL, TASK_RECORD
 from keyexpr_schema.payloads.plans import Plan, PlanAddress, PlanStatus
@@ -89,10 +90,10 @@ async def _history(session: Session, address: PlanAddress) -> dict[int, PlanSide
             continue
         try:
             if entry.keyexpr == spec_key:
-                plan = msgspec.json.decode(entry.value, type=Plan)
+                plan = decode(entry.value, Plan)
                 plans[plan.revision] = plan
             else:
-                status = msgspec.json.decode(entry.value, type=PlanStatus)
+                status = decode(entry.value, PlanStatus)
                 allocations[status.revision] = status.allocation
         except (msgspec.DecodeError, SchemaError):
             continue  # somebody put nonsense there; the planner has put the right one after it

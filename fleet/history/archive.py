@@ -20,6 +20,7 @@ from msgspec.structs import replace
 
 from fleet.errors import StoreError
 from fleet.history.entries import entry_of
+from keyexpr_schema.decoding import decode
 from keyexpr_schema.payloads.goals import Goal
 from keyexpr_schema.payloads.history import (
     Ended,
@@ -232,7 +233,7 @@ class Archive:
         row = self._db.execute(
             "SELECT spec FROM goals WHERE goal = ? AND live ORDER BY number DESC", (goal,)
         ).fetchone()
-        return None if row is None else msgspec.json.decode(row[0], type=Goal)
+        return None if row is None else decode(row[0], Goal)
 
     def past_goal(self, goal: str) -> PastGoal | None:
         """What came of the latest goal of this name that is over."""
@@ -324,4 +325,4 @@ def _unpacked(data: bytes) -> Ended:
 
 
 def _entry(number: int, data: bytes) -> PastEntry:
-    return replace(msgspec.json.decode(data, type=PastEntry), number=number)
+    return replace(decode(data, PastEntry), number=number)

@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta, timezone
 
-import msgspec
 from msgspec.structs import replace
 
+from keyexpr_schema.decoding import decode
 from keyexpr_schema.payloads.history import (
     FailureCount,
     HistoryOutcome,
@@ -50,8 +50,7 @@ def page(db: sqlite3.Connection, query: HistoryQuery) -> HistoryPage:
         (*values, limit + 1),
     ).fetchall()
     entries = tuple(
-        replace(msgspec.json.decode(data, type=PastEntry), number=number)
-        for number, data in rows[:limit]
+        replace(decode(data, PastEntry), number=number) for number, data in rows[:limit]
     )
     return HistoryPage(entries=entries, before=entries[-1].number if len(rows) > limit else None)
 

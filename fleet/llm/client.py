@@ -14,6 +14,8 @@ from typing import Any
 
 import msgspec
 
+from keyexpr_schema.decoding import decode
+
 START_TIMEOUT_S = 60.0
 """For the process to import LiteLLM, which takes 5 s on two idle cores."""
 GRACE_S = 1.0
@@ -177,7 +179,7 @@ class _LiteLlmProcess:
                 self._read += some
         line, _, self._read = self._read.partition(b"\n")
         try:
-            return msgspec.json.decode(line, type=ModelAnswer)
+            return decode(line, ModelAnswer)
         except msgspec.MsgspecError as error:
             self._stop()
             return ModelAnswer(kind="failed", error=f"the answer cannot be passed on: {error}")

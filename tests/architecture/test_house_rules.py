@@ -51,6 +51,19 @@ def test_zenoh_is_imported_by_the_transport_only() -> None:
     assert users == {"keyexpr_schema/transport", "keyexpr_schema/transport/store"}
 
 
+def test_payloads_are_decoded_by_decoders_that_are_made_one_at_a_time() -> None:
+    """What `keyexpr_schema.decoding` says of threads holds for all that is read from JSON."""
+    found = [
+        names(path)
+        for path in MODULES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func) == "msgspec.json.decode"
+        and any(keyword.arg == "type" for keyword in node.keywords)
+    ]
+    assert found == []
+
+
 def test_no_files_import_each_other_in_a_circle() -> None:
     """Imports inside functions and those for type checkers only count as well."""
     files = {}

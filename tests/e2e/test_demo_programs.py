@@ -89,9 +89,14 @@ async def test_a_sentence_is_added_to_a_running_plan_and_carried_out(tmp_path: P
 
             def done() -> bool:
                 status = view.plan_status.get("plan-1")
-                return status is not None and status.state is PlanState.SUCCEEDED
+                records = [record for record in view.tasks.values() if record.skill == "do"]
+                return (
+                    status is not None
+                    and status.state is PlanState.SUCCEEDED
+                    and any(record.state is TaskState.SUCCEEDED for record in records)
+                )
 
-            await view.until(done, 90.0, "the plan to be done")
+            await view.until(done, 90.0, "the plan and its sentence to be done")
 
         await demo.processes.guard(play())
         (record,) = [r for r in demo.view.tasks.values() if r.skill == "do"]

@@ -108,6 +108,8 @@ async def mission(folder: Path) -> None:
             ):
                 done = await robotctl.soon(*words.split())
                 assert done.code == 0, (words, done.err)
+            asked = await robotctl.soon("ask", "Where is the first cup?")
+            assert asked.code == 0, asked.err
             refused = await robotctl.soon("replan", "plan-1")
             assert "not running" in refused.err
             for words in ("goal delete --ended", "plan delete --ended"):

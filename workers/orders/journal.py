@@ -19,6 +19,7 @@ from typing import Self
 import msgspec
 
 from keyexpr_schema.data_folder import usable_folder
+from keyexpr_schema.decoding import decode
 from keyexpr_schema.key import Payload
 from keyexpr_schema.payloads.programs import ProgramCall
 from keyexpr_schema.payloads.tasks import Order, Report
@@ -180,7 +181,7 @@ class Journal:
             f"SELECT finished FROM call WHERE {_IS_ATTEMPT} ORDER BY number",
             _row_of(AttemptName.of(order)),
         )
-        return tuple(msgspec.json.decode(row, type=FinishedCall) for (row,) in rows)
+        return tuple(decode(row, FinishedCall) for (row,) in rows)
 
     def ended(self, order: Order, report: Report) -> None:
         """The attempt has ended; its facts, then its report, wait to be sent."""
@@ -245,7 +246,7 @@ class Journal:
             if row is None:
                 return None
             number, kind, data = row
-            payload = msgspec.json.decode(data, type=_KINDS[kind])
+            payload = decode(data, _KINDS[kind])
             assert isinstance(payload, (Fact, Report))
             if not self._overtaken(number, payload):
                 return Unsent(number, payload)
@@ -375,16 +376,16 @@ class Journal:
         for phase, order, report, ended_at in rows:
             ledger.put(
                 Attempt(
-                    order=msgspec.json.decode(order, type=Order),
+                    order=decode(order, Order),
                     phase=Phase(phase),
-                    report=None if report is None else msgspec.json.decode(report, type=Report),
+                    report=None if report is None else decode(report, Report),
                     ended_wall_s=ended_at,
                 )
             )
         for number, payload in db.execute(
             "SELECT number, payload FROM outbox WHERE kind='report' ORDER BY number"
         ):
-            self._note_waiting(number, msgspec.json.decode(payload, type=Report))
+            self._note_waiting(number, decode(payload, Report))
 
 
 def _row_of(name: AttemptName) -> tuple[str, str, str, int]:

@@ -47,8 +47,8 @@ def test_a_name_of_no_file_is_told_those_there_are_and_where_they_were_looked_fo
     with pytest.raises(NoConfigFile) as caught:
         config_file("robots", "forklift")
     assert str(caught.value) == (
-        "there is no robot 'forklift'; there are butler, cart, hsr, locobot, porter (looked in "
-        f"configs/robots, {SHIPPED / 'robots'}), or give the path of a file"
+        "there is no robot 'forklift'; there are bench_arm, butler, cart, hsr, locobot, porter "
+        f"(looked in configs/robots, {SHIPPED / 'robots'}), or give the path of a file"
     )
 
 

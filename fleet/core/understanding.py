@@ -13,7 +13,7 @@ from fleet.core.model.derived import holds
 from fleet.core.state import State
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Reading, WantedGoal, read
-from keyexpr_schema.facts import NOTHING, Value
+from keyexpr_schema.facts import LOCATED, NOTHING, Value
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus, Precedence
 
 NO_READING = Reading("")
@@ -87,13 +87,17 @@ def _reading(state: State, goal: Goal) -> Reading | Ambiguity:
 
 
 def _one_goal(reading: Reading) -> WantedGoal:
-    """What a reading wants, if that is something which the fleet can carry out.
+    """What a reading wants, if that is something which the fleet can carry out; who wants to have
+    it done where something is wants it found.
 
     Raises:
         NotUnderstood: it is no wish, or one for another time.
     """
-    text = reading.text
-    if reading.question is not None:
+    text, asked = reading.text, reading.question
+    if asked is not None and asked.of == "where" and asked.subjects:
+        lost = (Condition(relation=LOCATED, subject=name, value=True) for name in asked.subjects)
+        return WantedGoal((tuple(lost),))
+    if asked is not None:
         raise NotUnderstood(f"{text!r} is a question: ask it with `robotctl ask`")
     if not reading.goals:
         raise NotUnderstood(

@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from fleet.core import events
-from keyexpr_schema.facts import AT, FactKey
+from keyexpr_schema.facts import AT, LOCATED, FactKey
 from keyexpr_schema.payloads.goals import Goal, GoalState, Precedence
 from tests.support.fleet_model import FleetModel, fleet
 from tests.support.household import at, carrier, manipulator
@@ -77,10 +77,15 @@ def test_a_sentence_that_can_mean_several_things_asks_which() -> None:
     assert len(model.goal_states["g"].candidates) == 2
 
 
+def test_where_something_is_is_a_wish_to_have_it_found() -> None:
+    (condition,) = _told("Where is cup 1?").goal_states["g"].conditions
+    assert (condition.relation, condition.subject) == (LOCATED, "cup_1")
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("Where is cup 1?", "ask it with `robotctl ask`"),
+        ("How many cups are in the kitchen?", "ask it with `robotctl ask`"),
         ("Cup 1 is in the kitchen", "tell it with `robotctl world add`"),
         ("Keep cup 1 in the kitchen", "nothing to do"),
         ("Bring cup 1 to the hallway every day at 7", "again and again"),

@@ -6,7 +6,7 @@ import asyncio
 import os
 import signal
 import sys
-from asyncio.subprocess import PIPE, Process
+from asyncio.subprocess import PIPE, Process, SubprocessStreamProtocol
 from contextlib import suppress
 
 import msgspec
@@ -27,10 +27,11 @@ from fleet.service.planning.messages import (
 
 START_TIMEOUT_S = 60.0
 """For a process to greet; it takes half a second on an idle core."""
-
-
 END_TIMEOUT_S = 5.0
-"""For what a killed process has left behind; somebody it started may keep its pipe."""
+"""For a killed process to be gone."""
+
+_STREAM_LIMIT = 2**16
+"""The default of asyncio's streams, bytes."""
 
 
 class PlanningProcessEnded(FleetError):
@@ -47,6 +48,7 @@ class PlanningProcess:
     def __init__(self, start: Start) -> None:
         self._start = start
         self._process: Process | None = None
+        self._transport: asyncio.SubprocessTransport | None = None
         self._ready: Ready | None = None
         self._starting = asyncio.Lock()
 
@@ -65,12 +67,7 @@ class PlanningProcess:
         async with self._starting:
             if self._ready is None or self.pid is None:
                 await self.close()
-                self._process = await asyncio.create_subprocess_exec(
-                    *(sys.executable, "-P", "-m", "fleet.service.planning.worker"),
-                    stdin=PIPE,
-                    stdout=PIPE,
-                    start_new_session=True,
-                )
+                self._process, self._transport = await _started()
                 self._ready = await self._greeted(self._process)
             return self._ready
 
@@ -100,17 +97,18 @@ class PlanningProcess:
             _kill(self._process)
 
     async def close(self) -> None:
-        """End it, and wait until it has ended."""
+        """End it, and wait until it has ended; its pipes are closed, also if this is cancelled."""
         process, self._process, self._ready = self._process, None, None
-        if process is None:
+        transport, self._transport = self._transport, None
+        if process is None or transport is None:
             return
-        assert process.stdin is not None and process.stdout is not None
-        _kill(process)
-        process.stdin.close()
-        with suppress(TimeoutError):
-            async with asyncio.timeout(END_TIMEOUT_S):
-                await process.wait()
-                await process.stdout.read()  # what is left in the pipe would keep it open
+        try:
+            _kill(process)
+            with suppress(TimeoutError):
+                async with asyncio.timeout(END_TIMEOUT_S):
+                    await process.wait()
+        finally:
+            transport.close()
 
     async def _greeted(self, process: Process) -> Ready:
         try:
@@ -139,6 +137,20 @@ class PlanningProcess:
             code = await process.wait()
             how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
             raise PlanningProcessEnded(f"the planning process ended ({how})") from None
+
+
+async def _started() -> tuple[Process, asyncio.SubprocessTransport]:
+    """As `create_subprocess_exec`, which keeps the transport, that is, the pipes, to itself."""
+    loop = asyncio.get_running_loop()
+    transport, protocol = await loop.subprocess_exec(
+        lambda: SubprocessStreamProtocol(limit=_STREAM_LIMIT, loop=loop),
+        *(sys.executable, "-P", "-m", "fleet.service.planning.worker"),
+        stdin=PIPE,
+        stdout=PIPE,
+        stderr=None,
+        start_new_session=True,
+    )
+    return Process(transport, protocol, loop), transport
 
 
 def _kill(process: Process) -> None:

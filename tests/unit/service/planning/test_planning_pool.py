@@ -125,6 +125,11 @@ PLANNERS = (
 )
 
 
+def open_files() -> set[str]:
+    """The numbers of the files and pipes that this process has open."""
+    return {each.name for each in Path("/proc/self/fd").iterdir()}
+
+
 REASON = ReplanReason(scope=ReplanScope.ANEW, number=1, sentence="so")
 
 
@@ -251,14 +256,16 @@ async def test_a_process_that_closes_its_pipe_is_no_better_than_one_that_ended(s
 
 
 async def test_who_is_left_behind_with_the_pipe_holds_nobody_up(site: Path) -> None:
-    async with pool() as running:
-        running.submit(replace(given(1, "leaves"), limit_s=5.0))
-        try:
+    before = open_files()
+    try:
+        async with pool() as running:
+            running.submit(replace(given(1, "leaves"), limit_s=5.0))
             answer = await answer_of(running)
             assert isinstance(answer, PlanningFailed)
             await plan(running, 2)
-        finally:
-            os.kill(int((site / "child").read_text()), signal.SIGKILL)
+        await until(lambda: open_files() <= before)
+    finally:
+        os.kill(int((site / "child").read_text()), signal.SIGKILL)
 
 
 @pytest.mark.parametrize(

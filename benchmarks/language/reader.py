@@ -104,7 +104,6 @@ def _goal(goal: WantedGoal) -> WantedMeaning:
         stages=tuple(map(_rows, goal.stages)),
         always=_rows(goal.always),
         never=_rows(goal.never),
-        before=frozenset((_wanted(first), _wanted(then)) for first, then in goal.before),
         when=_rows(goal.when),
         priority=goal.priority,
         due_s=goal.due_s,

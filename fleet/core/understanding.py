@@ -13,7 +13,7 @@ from fleet.core.state import State
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Reading, WantedGoal, read
 from keyexpr_schema.facts import LOCATED, NOTHING, Value
-from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus, Precedence
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 
 NO_READING = Reading("")
 
@@ -124,14 +124,12 @@ def _in_force(state: State, goal: Goal, wanted: WantedGoal) -> Goal:
     due_s = goal.due_s
     if due_s is None and wanted.due_s is not None:
         due_s = (goal.said_s or state.time_s) + wanted.due_s
-    rows = [Precedence(first=first, then=then) for first, then in wanted.before]
     return replace(
         goal,
         priority=goal.priority or wanted.priority,
         due_s=due_s,
         always=tuple(dict.fromkeys((*goal.always, *wanted.always))),
         never=tuple(dict.fromkeys((*goal.never, *wanted.never))),
-        sometime_before=tuple(dict.fromkeys((*goal.sometime_before, *rows))),
     )
 
 

@@ -16,8 +16,8 @@ class WantedGoal:
     `stages` come one after the other; all conditions of a stage hold together at its end. `always`
     must hold all the time, and of `never` nothing may. `priority` above 0 is for what is urgent.
     `not_before_s` and `due_s` count from now, in seconds; `every` is a line of cron or an ISO 8601
-    period. `when` must hold before it is begun. Of each pair of `before`, the first must hold
-    before the second does. `by` are robots that shall do it.
+    period. `when` must hold before it is begun. `by` are robots that shall do it. "A before B"
+    are stages.
     """
 
     stages: tuple[tuple[Condition, ...], ...] = ()
@@ -28,7 +28,6 @@ class WantedGoal:
     due_s: float | None = None
     every: str | None = None
     when: tuple[Condition, ...] = ()
-    before: tuple[tuple[Condition, Condition], ...] = ()
     by: tuple[str, ...] = ()
 
 

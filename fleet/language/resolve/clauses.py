@@ -10,11 +10,9 @@ from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.ellipsis import Continuations
 from fleet.language.resolve.frames import SAY_IT
+from fleet.language.resolve.ground import ground_of
 from fleet.language.resolve.looking import Looking
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import PlaceResolver
 from fleet.language.resolve.questions import Questions
-from fleet.language.resolve.referents import Referents
 from fleet.language.resolve.scene import Scene
 from fleet.language.resolve.shall import Shall
 from fleet.language.resolve.skilled import Skilled
@@ -38,20 +36,14 @@ class Clauses:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        who = Referents(scene)
-        nouns = NounResolver(scene, who)
-        places = PlaceResolver(scene, who, nouns)
-        wishes = Wishes(scene, who, nouns, places)
-        looking = Looking(scene, who, nouns, places, wishes)
-        skilled = Skilled(scene, who, nouns, places)
-        tidiness = Tidiness(scene, nouns, places, wishes)
-        claims = Claims(scene, who, nouns, places, wishes)
-        questions = Questions(scene, who, nouns, wishes)
-        shall = Shall(scene, who, nouns, places, wishes, looking, skilled, claims)
-        commands = Commands(
-            scene, who, nouns, places, wishes, looking, skilled, tidiness, questions
-        )
-        ellipsis = Continuations(scene, who, nouns, wishes, claims, commands)
+        ground = ground_of(scene)
+        wishes = Wishes(ground)
+        looking, skilled = Looking(ground, wishes), Skilled(ground)
+        claims, questions = Claims(ground, wishes), Questions(ground, wishes)
+        shall = Shall(ground, wishes, looking, skilled, claims)
+        tidiness = Tidiness(ground, wishes)
+        commands = Commands(ground, wishes, looking, skilled, tidiness, questions)
+        ellipsis = Continuations(ground, wishes, claims, commands)
         self.topic = ellipsis.topic
         self._by_kind: dict[str, Callable[[Clause], None]] = {
             name.removeprefix("on_"): getattr(part, name)

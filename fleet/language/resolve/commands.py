@@ -8,13 +8,11 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of
+from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.looking import ROBOTS_TELL, Looking
 from fleet.language.resolve.mentions import NounPhrase, Subject
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import PlaceResolver
 from fleet.language.resolve.questions import Questions
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import THINGS, Scene
+from fleet.language.resolve.scene import THINGS
 from fleet.language.resolve.skilled import Skilled
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.resolve.tidiness import Tidiness
@@ -35,26 +33,20 @@ class Commands:
 
     def __init__(
         self,
-        scene: Scene,
-        who: Referents,
-        nouns: NounResolver,
-        places: PlaceResolver,
+        ground: Ground,
         wishes: Wishes,
         looking: Looking,
         skilled: Skilled,
         tidiness: Tidiness,
         questions: Questions,
     ) -> None:
-        self.scene = scene
-        self._clause: Clause | None = None
-        self.who = who
-        self.nouns = nouns
-        self.places = places
+        self.scene, self.who, self.nouns, self.places = ground
         self.wishes = wishes
         self.looking = looking
         self.skilled = skilled
         self.tidiness = tidiness
         self.questions = questions
+        self._clause: Clause | None = None
 
     def on_do(self, clause: Clause) -> None:
         """`bring the soup to Anna`, `bring me my mug, washed`."""

@@ -8,11 +8,10 @@ from fleet.errors import NotUnderstood
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.frames import EXAMPLE, framed
+from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Subject
-from fleet.language.resolve.nouns import NounResolver
 from fleet.language.resolve.places import WHERE, Where
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import PLACES, THINGS, Scene
+from fleet.language.resolve.scene import PLACES, THINGS
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import (
     Clause,
@@ -24,18 +23,8 @@ from fleet.language.tree.nodes import (
 class Continuations:
     """Turns clauses that go on from one before into wishes."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        who: Referents,
-        nouns: NounResolver,
-        wishes: Wishes,
-        claims: Claims,
-        commands: Commands,
-    ) -> None:
-        self.scene = scene
-        self.who = who
-        self.nouns = nouns
+    def __init__(self, ground: Ground, wishes: Wishes, claims: Claims, commands: Commands) -> None:
+        self.scene, self.who, self.nouns, self.places = ground
         self.wishes = wishes
         self.claims = claims
         self.commands = commands

@@ -9,10 +9,9 @@ from msgspec.structs import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.frames import framed
+from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import PLACES, THINGS, Question, Scene
+from fleet.language.resolve.scene import PLACES, THINGS, Question
 from fleet.language.resolve.states import of_each
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import (
@@ -28,10 +27,8 @@ from keyexpr_schema.payloads.goals import Condition
 class Questions:
     """Turns questions into data."""
 
-    def __init__(self, scene: Scene, who: Referents, nouns: NounResolver, wishes: Wishes) -> None:
-        self.scene = scene
-        self.who = who
-        self.nouns = nouns
+    def __init__(self, ground: Ground, wishes: Wishes) -> None:
+        self.scene, self.who, self.nouns, self.places = ground
         self.wishes = wishes
 
     def _asks(self, clause: Clause) -> None:

@@ -8,12 +8,10 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT, Frame, framed, frames_of
+from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.looking import Looking
 from fleet.language.resolve.mentions import Mention
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import PlaceResolver
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import PLACES, THINGS, Scene
+from fleet.language.resolve.scene import PLACES, THINGS
 from fleet.language.resolve.skilled import Skilled
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.resolve.wishes import Wishes
@@ -42,20 +40,9 @@ class Shall:
     """Turns clauses about what shall be so into wishes."""
 
     def __init__(
-        self,
-        scene: Scene,
-        who: Referents,
-        nouns: NounResolver,
-        places: PlaceResolver,
-        wishes: Wishes,
-        looking: Looking,
-        skilled: Skilled,
-        claims: Claims,
+        self, ground: Ground, wishes: Wishes, looking: Looking, skilled: Skilled, claims: Claims
     ) -> None:
-        self.scene = scene
-        self.who = who
-        self.nouns = nouns
-        self.places = places
+        self.scene, self.who, self.nouns, self.places = ground
         self.wishes = wishes
         self.looking = looking
         self.skilled = skilled
@@ -70,9 +57,6 @@ class Shall:
             raise NotUnderstood(f"{modal!r} is uncertain; say what holds, or what should hold")
         if self.scene.mode == "fact":
             raise NotUnderstood(f"{self.scene.said.line!r} is a goal and not a fact: {SAY_IT}")
-        got = any(w.word == "get" for w in clause.words)
-        if got and clause.predicate is not None and clause.predicate.kind == "placed":
-            raise NotUnderstood(f"{self.scene.said.clause!r}: that is what somebody does")
         got = any(w.word == "get" for w in clause.words)
         if got and clause.predicate is not None and clause.predicate.kind == "placed":
             raise NotUnderstood(f"{self.scene.said.clause!r}: that is what somebody does")

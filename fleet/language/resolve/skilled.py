@@ -8,11 +8,9 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed
 from fleet.language.resolve.frames import Frame
+from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import WHERE, PlaceResolver
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import Scene
+from fleet.language.resolve.places import WHERE
 from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.vocabulary import SkillPhrase
 from keyexpr_schema.facts import (
@@ -24,13 +22,8 @@ from keyexpr_schema.payloads.world import Feature
 class Skilled:
     """Turns clauses that ask for a skill into wishes."""
 
-    def __init__(
-        self, scene: Scene, who: Referents, nouns: NounResolver, places: PlaceResolver
-    ) -> None:
-        self.scene = scene
-        self.who = who
-        self.nouns = nouns
-        self.places = places
+    def __init__(self, ground: Ground) -> None:
+        self.scene, self.who, self.nouns, self.places = ground
 
     def skill(
         self, frame: Frame, frames: Sequence[SkillFrame], who: Sequence[Subject] | None = None

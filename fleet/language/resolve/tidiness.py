@@ -8,10 +8,8 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.frames import HOME_HINT, Frame
+from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention, NounPhrase
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import PlaceResolver
-from fleet.language.resolve.scene import Scene
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import (
     Nouns,
@@ -22,12 +20,8 @@ from keyexpr_schema.payloads.world import Feature
 class Tidiness:
     """Turns clauses about order into wishes that things are where they belong."""
 
-    def __init__(
-        self, scene: Scene, nouns: NounResolver, places: PlaceResolver, wishes: Wishes
-    ) -> None:
-        self.scene = scene
-        self.nouns = nouns
-        self.places = places
+    def __init__(self, ground: Ground, wishes: Wishes) -> None:
+        self.scene, self.who, self.nouns, self.places = ground
         self.wishes = wishes
 
     def tidy(self, frame: Frame) -> None:

@@ -8,11 +8,10 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import listed, one_of, reason_for
 from fleet.language.resolve.frames import EXAMPLE, HOME_HINT, Frame
+from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import WHERE, Locative, PlaceResolver, Where
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import THINGS, Scene
+from fleet.language.resolve.places import WHERE, Locative, Where
+from fleet.language.resolve.scene import THINGS
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tree.nodes import (
     Place,
@@ -31,13 +30,8 @@ _LOOSE = frozenset({"back", "away", "up", "over", "down", "off", "out"})
 class Wishes:
     """Turns clauses about where things and robots shall be into wishes."""
 
-    def __init__(
-        self, scene: Scene, who: Referents, nouns: NounResolver, places: PlaceResolver
-    ) -> None:
-        self.scene = scene
-        self.who = who
-        self.nouns = nouns
-        self.places = places
+    def __init__(self, ground: Ground) -> None:
+        self.scene, self.who, self.nouns, self.places = ground
 
     def move(self, frame: Frame) -> None:
         """`bring NP to PLACE`, `give NP to ROBOT`, `give ROBOT NP`, `put NP back`.

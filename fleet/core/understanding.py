@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from dataclasses import replace as changed
 
 from msgspec.structs import replace
 
@@ -73,14 +72,7 @@ def _rejected(status: GoalStatus, reason: str) -> GoalStatus:
 def _reading(state: State, goal: Goal) -> Reading | Ambiguity:
     if goal.conditions:
         return Reading(goal.text, (WantedGoal((goal.conditions,)),))
-    vocabulary = state.vocabulary()
-    if goal.speaker is not None and not vocabulary.is_person(goal.speaker):
-        known = sorted(filter(vocabulary.is_person, state.objects))
-        raise NotUnderstood(
-            f"{goal.speaker!r}, who says it, is no person that is known; "
-            f"known are {', '.join(known) or 'none'}"
-        )
-    found = read(goal.text, changed(vocabulary, speaker=goal.speaker))
+    found = read(goal.text, state.vocabulary().spoken_by(goal.speaker))
     if isinstance(found, Ambiguity) and goal.meant is not None:
         return dict(found.candidates).get(goal.meant, found)
     return found

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import msgspec
 
+from fleet.errors import NotUnderstood
 from fleet.language.words.wordbook import Wordbook, shipped_language
 from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -118,3 +119,16 @@ class Vocabulary:
     def is_person(self, name: str) -> bool:
         """Whether somebody of that name is there, whom things can be given to."""
         return Feature.PERSON in self.good_for.get(name, ())
+
+    def spoken_by(self, speaker: str | None) -> Vocabulary:
+        """The same names, in the mouth of a person; of nobody in particular without one.
+
+        Raises:
+            NotUnderstood: nobody of that name is known.
+        """
+        if speaker is not None and not self.is_person(speaker):
+            known = ", ".join(sorted(filter(self.is_person, self.objects))) or "none"
+            raise NotUnderstood(
+                f"{speaker!r}, who says it, is no person that is known; known are {known}"
+            )
+        return replace(self, speaker=speaker)

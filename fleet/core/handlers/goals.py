@@ -20,10 +20,10 @@ from fleet.core.state_updates import (
     touch,
     without_goal,
 )
-from fleet.core.understanding import understood
+from fleet.core.understanding import Understood, understood
 from fleet.language import Reading
 from keyexpr_schema.facts import AT, IN, ON, SEARCHED
-from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.goals import Goal, GoalState
 from keyexpr_schema.payloads.world import Fact
 
 
@@ -36,7 +36,7 @@ def goal_put(state: State, event: events.GoalPut) -> State:
     state = set_spec(state, goal)
     if known_ended:
         return state  # under an earlier planner
-    return _take_goal(state, goal)
+    return _take_goal(state, goal, understood(state, goal, None))
 
 
 def goal_deleted(state: State, event: events.GoalDeleted) -> State:
@@ -103,7 +103,7 @@ def understand_again(state: State) -> State:
         goal = state.goal_specs.get(goal.goal, goal)
         read = understood(state, goal, status)
         if status.state is GoalState.REJECTED and read.status.reason != status.reason:
-            state = _take_goal(state, goal, status)
+            state = _take_goal(state, goal, read)
         elif (
             status.state is GoalState.WAITING
             and read.status.stages
@@ -131,9 +131,8 @@ def next_stage(state: State, goal: str) -> State:
     return _begin_stage(set_goal(state, status), goal)
 
 
-def _take_goal(state: State, goal: Goal, known: GoalStatus | None = None) -> State:
+def _take_goal(state: State, goal: Goal, read: Understood) -> State:
     """Say what a goal means; a sentence that the grammar refuses may go to a language model."""
-    read = understood(state, goal, known)
     status = read.status
     state = set_goal(set_spec(state, goal, read.goal), status)
     state = _presume(state, goal.goal, read.reading)

@@ -18,6 +18,10 @@ class BadLanguageFile(FleetError):
     """A file with words cannot be read; one sentence says which file, where and why."""
 
 
+class BadLanguageConfig(FleetError):
+    """Configuration of language is wrong; one sentence says where and why."""
+
+
 class BadLlmConfig(FleetError):
     """Configuration or prompts of a language model are wrong; one sentence says where and why."""
 

@@ -17,6 +17,7 @@ from fleet.core.state import Policy
 from fleet.errors import FleetError
 from fleet.history.archive import Archive
 from fleet.history.retention import Retention
+from fleet.language import load_language_config
 from fleet.llm.configuration import load_llm_config
 from fleet.llm.conversation import LanguageModel
 from fleet.service.event_journal import EventJournal
@@ -51,7 +52,8 @@ def run(
     try:
         skills = load_all_skills(skill_files)
         model = LanguageModel(load_llm_config(llm_file))
-        policy = replace(policy or Policy(), interpreter=model.configured)
+        language = load_language_config(llm_file)
+        policy = replace(policy or Policy(), interpreter=model.configured, confirm=language.confirm)
         pool = PlanningPool(llm_file, data_dir / "failed-planning-jobs")
         asyncio.run(_run(endpoints, realm, data_dir, pool, skills, policy, retention))
     except (FleetError, SchemaError) as error:

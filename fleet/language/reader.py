@@ -189,16 +189,16 @@ class Reader:
 
     def _each(self, which: WhichOne, segment: Segment, states: Sequence[_State]) -> list[_State]:
         """The readings in which a noun phrase means one, then another of those that it can."""
-        if len(which.names) > _CHOICES or len(states) > _CHOICES:
+        if len(which.choices) > _CHOICES or len(states) > _CHOICES:
             return []
         found: list[_State] = []
-        for name in which.names:
+        for meant in which.choices:
             forked = []
             for state in states:
                 if which.key in state.said.chosen:
                     return []
                 said = state.said.copy()
-                said.chosen[which.key] = name
+                said.chosen[which.key] = meant
                 asked = state.asked or str(which)
                 forked.append(_State(said, state.cost, state.question, asked))
             with suppress(NotUnderstood):

@@ -113,6 +113,8 @@ class Commands:
             except NotUnderstood as problem:
                 self.scene.said = before
                 problems.append(problem)
+                if self.skilled.fits(frame, phrases):
+                    break
         raise problems[0]
 
     def _for_me(self, frame: Frame, skills: Sequence[SkillFrame]) -> Frame:

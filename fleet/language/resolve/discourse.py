@@ -38,7 +38,7 @@ class Discourse:
     """`move`: "and the book to the kitchen" may follow; `be`: "and the book in the hallway"."""
     verb: str = ""
     addressees: list[Subject] = field(default_factory=list)
-    chosen: dict[int, str] = field(default_factory=dict)
+    chosen: dict[int, tuple[str, ...]] = field(default_factory=dict)
     """Whom a noun phrase means of several, by the token at which it begins, while that is asked."""
     extra: list[tuple[Mention, tuple[tuple[str, Value], ...]]] = field(default_factory=list)
     """States that are wanted as well: "bring me a cooked egg"."""

@@ -15,6 +15,7 @@ from fleet.language.resolve.scene import THINGS
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tree.nodes import (
     Place,
+    Quantity,
 )
 from keyexpr_schema.facts import (
     AT,
@@ -24,6 +25,8 @@ from keyexpr_schema.facts import (
 )
 from keyexpr_schema.payloads.world import Feature
 
+_MOST = 20
+"""Of so many things of all kinds it is asked whether all are meant."""
 _LOOSE = frozenset({"back", "away", "up", "over", "down", "off", "out"})
 
 
@@ -63,6 +66,7 @@ class Wishes:
             frame = replace(frame, places=tuple(p for p in frame.places if p.role != "along"))
             moved += [s for n in moved_more for s in self.nouns.subjects(n, THINGS, "an object")]
         fetching = frame.verb.split()[0] in self.scene.tagger.book.fetching
+        fetching = fetching or self._lies_there(frame, moved)
         where, home = self.whereto(frame, each=not give, fetching=fetching)
         speaker = self.scene.vocabulary.speaker
         brings = frame.verb.split()[0] in ("bring", "get", "fetch", "retrieve") and speaker
@@ -118,6 +122,16 @@ class Wishes:
     def relation_of(self, thing: str) -> str:
         good_for = self.scene.vocabulary.good_for.get(thing, ())
         return IN if Feature.CONTAINS in good_for else ON if Feature.SUPPORTS in good_for else AT
+
+    def _lies_there(self, frame: Frame, moved: Sequence[Subject]) -> bool:
+        """`put away the things on the desk`: whether it says where they are, and not where to."""
+        places = [p for p in frame.places if p.role == "in" and not p.special]
+        if "tidy" not in frame.senses or frame.apart or not places:
+            return False
+        where = self.places.where([self.places.locative(p) for p in places], fetching=True)
+        names = {n for s in moved for n in (s.names if isinstance(s, NounPhrase) else s.subjects)}
+        is_at = self.scene.vocabulary.is_at
+        return where.source is not None and any(is_at(n, where.source) for n in names)
 
     @staticmethod
     def _only_things(moved: Sequence[Subject]) -> bool:
@@ -245,6 +259,8 @@ class Wishes:
         """Wish that these are at the target, or at home."""
         if where.each:
             return self._to_each(moved, where)
+        for subject in moved if not home else ():
+            self._not_too_many(subject)
         self.scene.said.moved = list(moved)
         able = [self.who.drivers(self.who.movable(subject)) for subject in moved]
         mentions = [self.from_where(subject, where) for subject in able]
@@ -262,6 +278,23 @@ class Wishes:
             receiver = Mention((where.target,), "robot", self.scene.said.ended)
             self.scene.said.recent = [*self.scene.said.recent, receiver]
         return None
+
+    def _not_too_many(self, subject: Subject) -> None:
+        """Whether so much may go to one place: "bring everything to the garage".
+
+        Raises:
+            NotUnderstood: it would be nearly all that there is.
+        """
+        if not isinstance(subject, NounPhrase) or not subject.generic or subject.source is not None:
+            return
+        if subject.type != "object" or subject.quantity is not Quantity.ALL:
+            return
+        movable = self.who.movable(subject)
+        if isinstance(movable, NounPhrase) and len(movable.names) > _MOST:
+            raise NotUnderstood(
+                f"{subject.text!r} would be {len(movable.names)} things: say of what kind they "
+                "are, or where"
+            )
 
     def _put(self, mention: Mention, where: Where, target: str) -> None:
         if mention.type == "robot":

@@ -27,7 +27,7 @@ from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.tokens import tokens_of
-from keyexpr_schema.facts import Literal
+from keyexpr_schema.facts import AT, Literal
 from keyexpr_schema.payloads.goals import Condition
 
 MOST_CHARACTERS = 8_000
@@ -167,6 +167,10 @@ class Reader:
                 except NotUnderstood as problem:
                     problems.append((cost, problem))
                 else:
+                    if question is not None and state.question is not None:
+                        twice = f"{self.line!r} asks two things: ask one at a time"
+                        problems.append((cost, NotUnderstood(twice)))
+                        continue
                     found.append(
                         _State(said, state.cost + cost, question or state.question, state.asked)
                     )
@@ -232,6 +236,8 @@ class Reader:
                     if not isinstance(value, bool):
                         raise NotUnderstood(f'{said.clause!r}: say "if …" with what holds then')
                     value = not value
+                if relation == AT:
+                    relation = self.vocabulary.relation_to(str(value))
                 said.when.append(Condition(relation=relation, subject=subject, value=value))
             said.elliptic = ""
         return said, scene.question
@@ -308,7 +314,8 @@ class Reader:
             raise NotUnderstood(f"{self.line!r} ends before it says what to do: {EXAMPLE}")
         goals = tuple(replace(goal, priority=said.urgent) for goal in said.goals)
         presumed = tuple(dict.fromkeys(said.presumed))
-        return Reading(self.line, goals, facts, state.question, presumed, tuple(self.remarks))
+        remarks = (*self.remarks, *said.remarks)
+        return Reading(self.line, goals, facts, state.question, presumed, remarks)
 
     def _close(self, said: Discourse, now: datetime | None) -> None:
         """End the goal that was being said: other times or conditions hold for what follows.

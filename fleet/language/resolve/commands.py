@@ -18,11 +18,7 @@ from fleet.language.resolve.stages import GoalDraft
 from fleet.language.resolve.tidiness import Tidiness
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.skill_words import SkillFrame
-from fleet.language.tree.nodes import (
-    Clause,
-    Nouns,
-    Particle,
-)
+from fleet.language.tree.nodes import Clause, Nouns, Particle, Quantity
 from keyexpr_schema.facts import AT, HELD, LOCATED
 from keyexpr_schema.payloads.goals import Condition
 
@@ -183,10 +179,22 @@ class Commands:
         assert clause.subject is not None and clause.verb is not None
         self._verb(replace(clause, arguments=(clause.subject, *clause.arguments)), None)
 
+    def on_none_there(self, clause: Clause) -> None:
+        """`no forklift in the packing area`."""
+        assert clause.subject is not None
+        where, home = self.wishes.whereto(framed(clause.arguments))
+        if where.target is None or home:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say where: name a place")
+        self.scene.said.never.extend(
+            Condition(relation=where.relation, subject=name, value=where.target)
+            for s in self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+            for name in (s.names if isinstance(s, NounPhrase) else s.subjects)
+        )
+
     def on_not_allowed(self, clause: Clause) -> None:
         """`Scout isn't allowed in the office`."""
         assert clause.subject is not None
-        who = self.nouns.subjects(clause.subject, ("robot",), "a robot")
+        who = self._all_of(clause.subject)
         names = [n for s in who for n in self.who.resolve(s).subjects]
         places = self._entered(framed(clause.arguments))
         self.scene.said.never.extend(
@@ -198,8 +206,17 @@ class Commands:
         assert clause.verb is not None
         who = None
         if clause.subject is not None:
-            who = self.nouns.subjects(clause.subject, ("robot",), "a robot")
+            who = self._all_of(clause.subject)
         self._never(clause, who)
+
+    def _all_of(self, nouns: Nouns) -> list[Subject]:
+        """The robots that must not: "robots" are all of them."""
+        return [
+            replace(s, quantity=Quantity.ALL)
+            if isinstance(s, NounPhrase) and s.plural and s.quantity is Quantity.BARE
+            else s
+            for s in self.nouns.subjects(nouns, ("robot",), "a robot")
+        ]
 
     def _never(self, clause: Clause, who: Sequence[Subject] | None) -> None:
         assert clause.verb is not None

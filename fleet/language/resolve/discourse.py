@@ -50,6 +50,8 @@ class Discourse:
     """Goals that ended with their sentence, for which a time or condition was said."""
     again: Any = None
     """The verb and arguments of the last clause: "and then the second one"."""
+    remarks: list[str] = field(default_factory=list)
+    """Clauses that ask for nothing."""
     began: int = 0
     ended: int = 0
     facts: dict[FactKey, Value] = field(default_factory=dict)
@@ -84,6 +86,7 @@ class Discourse:
             chosen=dict(self.chosen),
             extra=list(self.extra),
             goals=list(self.goals),
+            remarks=list(self.remarks),
         )
 
     def quote(self, first: int, last: int) -> str:

@@ -339,10 +339,7 @@ class Wishes:
 
     def to_spot(self, mention: Mention, spot: str | None) -> None:
         """Wish that it is in that place, or on or in that thing."""
-        good_for = self.scene.vocabulary.good_for.get(spot or "", ())
-        on = Feature.SUPPORTS in good_for
-        within = Feature.CONTAINS in good_for
-        self.scene.said.draft.add(AT if on == within else ON if on else IN, mention, spot)
+        self.scene.said.draft.add(self.scene.vocabulary.relation_to(spot or ""), mention, spot)
 
     def throw_away(self, frame: Frame) -> None:
         """`throw away the newspaper`: into the one bin there is."""

@@ -23,6 +23,7 @@ from fleet.language.resolve.stages import GoalDraft
 from fleet.language.segments import Segment, Sentence, cut, sentences_of
 from fleet.language.tagging.tagger import Lexeme, tagger_of
 from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
+from fleet.language.timing import timed
 from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
@@ -80,6 +81,8 @@ class Reader:
         self.text, self.vocabulary, self.mode, self.within = text, vocabulary, mode, within
         self.tagger = tagger_of(vocabulary)
         self.remarks: list[str] = []
+        self.later: Sequence[Sentence] = ()
+        """The sentences after the one that is being read, but for remarks."""
         self.why = Explanations(text, self.tokens, self.tagger, mode)
         self.line = " ".join(text.split())
 
@@ -95,8 +98,9 @@ class Reader:
         if self.mode != "fact":
             lexemes = marked(lexemes, self.tokens, self.text, self.vocabulary, self.tagger)
         dangling = False
-        for words in sentences_of(lexemes):
-            sentence = cut(words)
+        sentences = [cut(words) for words in sentences_of(lexemes)]
+        for number, sentence in enumerate(sentences):
+            self.later = [s for s in sentences[number + 1 :] if not self._said_of_oneself(s)]
             self.why.check(sentence)
             timed = bool(sentence.times) or any(part.role for part in sentence.segments)
             for state in states:
@@ -120,11 +124,15 @@ class Reader:
 
     # --- one sentence after the other -------------------------------------------------------------
     def _sentence(self, sentence: Sentence, states: list[_State]) -> list[_State]:
-        for segment in sentence.segments:
+        for number, segment in enumerate(sentence.segments):
             if segment.joint == "then":
                 for state in states:
                     state.said.draft.next_stage()
-            states = self._segment(segment, states)
+            try:
+                states = self._segment(segment, states)
+            except NotUnderstood as problem:
+                left = sentence.segments[number:]
+                raise self.why.rather(problem, left, self.later) from None
         return states
 
     def _segment(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
@@ -157,7 +165,12 @@ class Reader:
             found = self._each(which, segment, states)
         if not found:
             strange = [w for w in segment.words if "UNK" in w.tags]
-            named = strange and strange[0].text in str(which) and _NAMING.search(str(which))
+            named = (
+                bool(strange)
+                and strange[0].text in str(which)
+                and _NAMING.search(str(which)) is not None
+                and not self.why.asks_for(segment)
+            )
             if not problems or (strange and not named):
                 raise self.why.ungrammatical(segment, 0)
             raise min(problems, key=lambda row: row[0])[1]
@@ -253,9 +266,11 @@ class Reader:
         remark = words[:end]
         shown = self.why.quote(remark)
         special = reason_for([(word.word, word.text) for word in remark])
-        if special or any("NOUN" in word.tags for word in remark):
+        known = next((word.text for word in remark if "NOUN" in word.tags), None)
+        if special or known:
+            matters = f"{known!r} is spoken of in {shown!r}, which" if known else f"{shown!r}"
             raise NotUnderstood(
-                f"{shown!r} is no goal, and may matter: leave it out, or tell it as a fact"
+                f"{matters} is no goal, and may matter: leave it out, or tell it as a fact"
             )
         self.remarks.append(shown)
         return self._sentence(cut(words[end:]), states) if end < len(words) else states
@@ -314,7 +329,7 @@ class Reader:
                 when=tuple(dict.fromkeys(said.when)),
                 by=tuple(dict.fromkeys(said.by)),
             )
-            said.goals.append(self._timed(goal, said, now))
+            said.goals.append(timed(goal, said, now))
         elif said.times and self.mode == "fact":
             named = [(token.word, token.spoken) for token in self.tokens]
             reason = reason_for(named, "a fact")
@@ -324,30 +339,6 @@ class Reader:
             raise NotUnderstood(f"{what}, but nothing is to be done then")
         said.draft = GoalDraft(self.vocabulary.is_at)
         said.always, said.never, said.when, said.times, said.by = [], [], [], [], []
-
-    @staticmethod
-    def _timed(goal: WantedGoal, said: Discourse, now: datetime | None) -> WantedGoal:
-        every = next((time for time in said.times if time.kind == "every"), None)
-        for time in said.times:
-            if time is every:
-                at = next((t for t in said.times if t.kind == "start" and t.hour is not None), None)
-                if at is not None and time.every_s is None:
-                    time = replace(time, hour=at.hour, minute=at.minute)
-                goal = replace(goal, every=time.recurrence)
-                continue
-            if every is not None and time.kind == "start" and time.hour is not None:
-                continue
-            if time.after_s is None and now is None:
-                raise NotUnderstood("a time of day is named, and what time it is now is not known")
-            seconds = time.after_s if now is None or time.after_s is not None else time.seconds(now)
-            if time.until is not None and now is not None:
-                end = replace(time, hour=time.until[0], minute=time.until[1])
-                goal = replace(goal, due_s=end.seconds(now))
-            if time.kind == "due" or (time.hour is not None and not said.done):
-                goal = replace(goal, due_s=seconds)
-            else:
-                goal = replace(goal, not_before_s=seconds)
-        return goal
 
 
 def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Reading | Ambiguity:

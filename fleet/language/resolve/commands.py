@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import reason_for
-from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of
+from fleet.language.resolve.frames import Frame, framed, frames_of, no_use
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.looking import ROBOTS_TELL, Looking
 from fleet.language.resolve.mentions import NounPhrase, Subject
@@ -21,6 +21,7 @@ from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tree.nodes import (
     Clause,
     Nouns,
+    Particle,
 )
 from keyexpr_schema.facts import (
     AT,
@@ -91,7 +92,10 @@ class Commands:
         problems: list[NotUnderstood] = []
         frames = frames_of(self.scene.tagger, clause.verb, clause.arguments, ("VERB", "FIN", "GER"))
         if not frames:
-            raise NotUnderstood(f"{clause.verb.text!r} is not understood as a goal: {EXAMPLE}")
+            behind = [word.lexeme.last for word in clause.arguments if isinstance(word, Particle)]
+            end = min([*behind[:1], clause.verb.last + 1, clause.last])
+            said = self.scene.said.quote(clause.verb.first, end)
+            raise no_use(self.scene.tagger, clause.verb, said)
         for frame, phrases in frames:
             before = self.scene.said
             self.scene.said = before.copy()

@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 
 from fleet.errors import NotUnderstood
-from fleet.language.methods.model import SKILL_NEED, CompoundTask, Method, filled
+from fleet.language.methods.model import SKILL_NEED, Method, filled
 from fleet.language.reading import MethodUse, Reading, WantedGoal
 from fleet.language.resolve.discourse import Discourse
 from fleet.language.resolve.mentions import Mention
@@ -28,11 +28,16 @@ Row = tuple[int, str, Reading]
 
 
 class CannotBeDone(NotUnderstood):
-    """No method of a task can be taken; `passed_over` says why, method by method."""
+    """No method of a task can be taken.
 
-    def __init__(self, sentence: str, task: CompoundTask, passed_over: Sequence[str]) -> None:
+    `said` called it; `passed_over` are its methods, and why they cannot be taken.
+    """
+
+    def __init__(
+        self, sentence: str, said: str, task: str, passed_over: Sequence[tuple[str, str]]
+    ) -> None:
         super().__init__(sentence)
-        self.task, self.passed_over = task, tuple(passed_over)
+        self.said, self.task, self.passed_over = said, task, tuple(passed_over)
 
 
 class EndlessTask(NotUnderstood):
@@ -60,7 +65,7 @@ def expanded(
         what = "is a part of itself" if task.name in within else "has tasks in tasks too deep"
         raise EndlessTask(f"{said!r} {what}: {way}; say in {task.file} what it means")
     given = dict(call.lexeme.given)
-    passed: list[str] = []
+    passed: list[tuple[str, str]] = []
     for number, method in enumerate(task.methods, 1):
         text = method.text(given)
         try:
@@ -71,13 +76,16 @@ def expanded(
         except EndlessTask:
             raise
         except NotUnderstood as problem:
-            passed.append(str(problem))
+            passed.append((text, str(problem)))
             continue
         use = MethodUse(said, task.name, number, text, tuple(passed))
         best = [(asked, _with(reading, use)) for cost, asked, reading in rows if cost == rows[0][0]]
         return best if len(best) > 1 else [("", best[0][1])]
-    numbered = [f"({n}) {why}" for n, why in enumerate(passed, 1)] if passed[1:] else passed
-    raise CannotBeDone(f"{said!r} cannot be done here: {'; '.join(numbered)}", task, passed)
+    reasons = [why for _, why in passed]
+    if reasons[1:]:
+        reasons = [f"({number}) {why}" for number, why in enumerate(reasons, 1)]
+    sentence = f"{said!r} cannot be done here: {'; '.join(reasons)}"
+    raise CannotBeDone(sentence, said, task.name, passed)
 
 
 def _with(reading: Reading, use: MethodUse) -> Reading:

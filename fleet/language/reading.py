@@ -36,14 +36,14 @@ class MethodUse:
     """A task that a text called by name (`said`), and the method by which it is done here.
 
     `text` is what the method says, with parameters filled in; `number` counts the task's methods
-    from 1, and `passed_over` says why those before it cannot be taken.
+    from 1, and `passed_over` are those before it, and why they cannot be taken.
     """
 
     said: str
     task: str
     number: int
     text: str
-    passed_over: tuple[str, ...] = ()
+    passed_over: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,10 @@ class BadTaskFile(FleetError):
     right."""
 
 
+class BadLanguageConfig(FleetError):
+    """Configuration of language is wrong; one sentence says where and why."""
+
+
 class BadLlmConfig(FleetError):
     """Configuration or prompts of a language model are wrong; one sentence says where and why."""
 

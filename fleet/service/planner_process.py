@@ -17,6 +17,7 @@ from fleet.core.state import Policy
 from fleet.errors import FleetError
 from fleet.history.archive import Archive
 from fleet.history.retention import Retention
+from fleet.language import load_language_config
 from fleet.llm.configuration import load_llm_config
 from fleet.llm.conversation import LanguageModel
 from fleet.service.event_journal import EventJournal
@@ -53,8 +54,13 @@ def run(
     try:
         skills = load_all_skills(skill_files)
         model = LanguageModel(load_llm_config(llm_file))
-        tasks = load_all_tasks(task_files)
-        policy = replace(policy or Policy(), interpreter=model.configured, tasks=tasks)
+        language = load_language_config(llm_file)
+        policy = replace(
+            policy or Policy(),
+            interpreter=model.configured,
+            confirm=language.confirm,
+            tasks=load_all_tasks(task_files),
+        )
         pool = PlanningPool(llm_file, data_dir / "failed-planning-jobs")
         asyncio.run(_run(endpoints, realm, data_dir, pool, skills, policy, retention))
     except (FleetError, SchemaError) as error:

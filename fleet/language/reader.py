@@ -319,17 +319,20 @@ class Reader:
         Raises:
             NotUnderstood: it cannot be, or a time belongs to nothing.
         """
-        stages = said.draft.conditions(self.vocabulary.speaker)
-        wants = bool(stages or said.always or said.never)
+        wanted = [
+            (by, draft.conditions(self.vocabulary.speaker)) for by, draft in said.draft.of_each()
+        ]
+        wants = bool(any(stages for _, stages in wanted) or said.always or said.never)
         if wants:
-            goal = WantedGoal(
-                stages,
-                tuple(dict.fromkeys(said.always)),
-                tuple(dict.fromkeys(said.never)),
-                when=tuple(dict.fromkeys(said.when)),
-                by=tuple(dict.fromkeys(said.by)),
-            )
-            said.goals.append(timed(goal, said, now))
+            for number, (by, stages) in enumerate(wanted):
+                goal = WantedGoal(
+                    stages,
+                    () if number else tuple(dict.fromkeys(said.always)),
+                    () if number else tuple(dict.fromkeys(said.never)),
+                    when=tuple(dict.fromkeys(said.when)),
+                    by=by,
+                )
+                said.goals.append(timed(goal, said, now))
         elif said.times and self.mode == "fact":
             named = [(token.word, token.spoken) for token in self.tokens]
             reason = reason_for(named, "a fact")
@@ -338,7 +341,7 @@ class Reader:
             what = f"{said.time_words!r} names a time" if said.times else '"If" names a condition'
             raise NotUnderstood(f"{what}, but nothing is to be done then")
         said.draft = GoalDraft(self.vocabulary.is_at)
-        said.always, said.never, said.when, said.times, said.by = [], [], [], [], []
+        said.always, said.never, said.when, said.times = [], [], [], []
 
 
 def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Reading | Ambiguity:

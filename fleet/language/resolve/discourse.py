@@ -42,8 +42,6 @@ class Discourse:
     """Whom a noun phrase means of several, by the token at which it begins, while that is asked."""
     extra: list[tuple[Mention, tuple[tuple[str, Value], ...]]] = field(default_factory=list)
     """States that are wanted as well: "bring me a cooked egg"."""
-    by: list[str] = field(default_factory=list)
-    """Robots that shall do it."""
     person: str | None = None
     """Whom "him" and "her" mean."""
     carrier: str | None = None
@@ -87,7 +85,6 @@ class Discourse:
             times=list(self.times),
             chosen=dict(self.chosen),
             extra=list(self.extra),
-            by=list(self.by),
             goals=list(self.goals),
             methods=list(self.methods),
         )

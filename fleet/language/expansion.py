@@ -6,7 +6,7 @@ A method's sentences are read like any others; so whatever goes for goals goes f
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 
 from fleet.errors import NotUnderstood
 from fleet.language.methods.model import SKILL_NEED, Method, filled
@@ -117,28 +117,35 @@ def _check(reading: Reading) -> None:
     """Whether it says no more than what shall be done."""
     if reading.question is not None or reading.facts:
         raise NotUnderstood(f"{reading.text!r} says more than what is to be done")
-    plain = (
+    plain = tuple(
         WantedGoal(g.stages, g.always, g.never, by=g.by, priority=g.priority) for g in reading.goals
     )
-    if len(reading.goals) != 1 or tuple(plain) != reading.goals:
+    if plain != reading.goals:
         raise NotUnderstood(f"{reading.text!r} says when; say that along with the task instead")
 
 
-def take(said: Discourse, call: TaskCall, reading: Reading) -> None:
+def take(said: Discourse, call: TaskCall, reading: Reading, robots: Container[str]) -> None:
     """Take what a task means into what a text has said so far."""
-    (goal,) = reading.goals
-    key = -_KEYS * (call.lexeme.first + 1)
-    for number, stage in enumerate(goal.stages):
-        if number:
-            said.draft.next_stage()
-        for condition in stage:
-            named = condition.subjects
-            key -= 1
-            wish = Wish(condition.relation, named, condition.value, key, open=len(named) > 1)
-            said.draft.stages[-1].append(wish)
-    said.always.extend(goal.always)
-    said.never.extend(goal.never)
-    said.by.extend((*call.by, *goal.by))
+    stages, key = said.draft.stages, -_KEYS * (call.lexeme.first + 1)
+    begins = len(stages) - 1
+    for goal in reading.goals:
+        for number, stage in enumerate(goal.stages, begins):
+            if number == len(stages):
+                stages.append([])
+            for condition in stage:
+                named, key = condition.subjects, key - 1
+                stages[number].append(
+                    Wish(
+                        condition.relation,
+                        named,
+                        condition.value,
+                        key,
+                        open=len(named) > 1,
+                        by=None if named[0] in robots else call.by or goal.by,
+                    )
+                )
+        said.always.extend(goal.always)
+        said.never.extend(goal.never)
     said.presumed.extend(reading.presumed)
     said.methods.extend(reading.methods)
     said.recent, said.done = list[Mention](), True

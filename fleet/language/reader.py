@@ -182,7 +182,7 @@ class Reader:
         for asked, reading in expanded(call, self.vocabulary, self.within, self._said_by_method):
             for state in states:
                 said = state.said.copy()
-                take(said, call, reading)
+                take(said, call, reading, self.vocabulary.robots)
                 found.append(_State(said, state.cost, state.question, state.asked or asked))
         return found[:_READINGS]
 

@@ -83,7 +83,7 @@ class Reader:
         self.remarks: list[str] = []
         self.later: Sequence[Sentence] = ()
         """The sentences after the one that is being read, but for remarks."""
-        self.why = Explanations(text, self.tokens, self.tagger, mode)
+        self.why = Explanations(text, self.tokens, self.tagger, mode, vocabulary.tasks)
         self.line = " ".join(text.split())
 
     def read(self, now: datetime | None) -> list[tuple[int, str, Reading]]:

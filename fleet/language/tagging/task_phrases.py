@@ -14,9 +14,22 @@ from fleet.language.words.morphology import gerund
 from fleet.language.words.tokens import Token, number_of
 
 _BEGINS = frozenset(
-    {"AND", "COMMA", "THEN", "POLITE", "TIME", "URGENT", "LATER", "BEFORE", "AFTER", "ORD", "END"}
+    {
+        "AND",
+        "COMMA",
+        "THEN",
+        "POLITE",
+        "TIME",
+        "URGENT",
+        "LATER",
+        "BEFORE",
+        "AFTER",
+        "ORD",
+        "END",
+        "MODAL",
+    }
 )
-_ENDS = (_BEGINS - {"ORD"}) | {"IF", "WHEN", "UNLESS"}
+_ENDS = (_BEGINS - {"ORD", "MODAL"}) | {"IF", "WHEN", "UNLESS"}
 _LONGEST_NAME = 8
 """Words that a parameter may have."""
 _KEPT: deque[tuple[tuple[CompoundTask, ...], TaskPhrases]] = deque(maxlen=4)
@@ -119,14 +132,14 @@ def marked(
 
 
 def called(words: Sequence[Lexeme], tagger: Tagger) -> TaskCall | None:
-    """The task that a clause calls, by itself or with robots addressed before: "hsr, …"."""
+    """The task that a clause calls, by itself or of a robot: "hsr, …", "hsr should …"."""
     if not words or not isinstance(words[-1], TaskLexeme) or words[-1].task is None:
         return None
     call, before = words[-1], words[:-1]
     if not before:
         return TaskCall(call, words[-1].task)
     robots = [e.id for e in tagger.entities(before[0].words) if e.type == "robot"]
-    if len(before) == 2 and "COMMA" in before[1].tags and len(robots) == 1:
+    if len(before) == 2 and before[1].tags & {"COMMA", "MODAL"} and len(robots) == 1:
         return TaskCall(call, words[-1].task, tuple(robots))
     return None
 

@@ -89,7 +89,7 @@ def _read(
     answer = read_answer(text, ParaphraseAnswer)
     if isinstance(answer, str):
         return Rejected.because("malformed", answer)
-    sentences = [" ".join(each.split()) for each in answer.sentences]
+    sentences = [" ".join(cleaned(each).split()) for each in answer.sentences]
     if not any(sentences):
         reason = cleaned(answer.reason).strip()
         return f"the language model says: {reason or 'it cannot be said in other words'}"

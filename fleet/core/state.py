@@ -14,6 +14,7 @@ from fleet.core.model.world import WorldModel
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.table import Table
 from fleet.language import Confirm, Vocabulary
+from fleet.language.methods.model import CompoundTask
 from fleet.language.vocabulary import SkillPhrase, StateWord
 from keyexpr_schema.facts import HOLDING, FactKey
 from keyexpr_schema.payloads.durations import Durations
@@ -36,7 +37,7 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     to confirm. `lost_after_s`: a robot whose worker is gone for
     longer (wall time, s) counts as lost. `planning_limit_s`: a plan has to be made within that many
     seconds. `skill_phrases` are skills that goals can ask for by name, and
-    `state_words` words for states.
+    `state_words` words for states, `tasks` what people call by names of its own.
     """
 
     approval: bool = False
@@ -47,6 +48,7 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     planning_limit_s: float = 120.0
     skill_phrases: tuple[SkillPhrase, ...] = msgspec.field(default=(), name="deeds")
     state_words: tuple[StateWord, ...] = ()
+    tasks: tuple[CompoundTask, ...] = ()
 
 
 class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -128,6 +130,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             around,
             believed=FactValues(self.facts),
             state_words=self.policy.state_words,
+            tasks=self.policy.tasks,
         )
 
     def world(self) -> WorldModel:

@@ -185,7 +185,8 @@ def _in_force(state: State, goal: Goal, wanted: WantedGoal) -> Goal:
 
 def _note(state: State, reading: Reading) -> str | None:
     """What a goal's sentence says besides what must hold, so that no word is lost unseen."""
-    notes = [f"{remark!r} asks for nothing" for remark in reading.remarks]
+    notes = [f"{use.said!r} is taken for: {use.text}" for use in reading.methods]
+    notes += [f"{remark!r} asks for nothing" for remark in reading.remarks]
     facts = FactValues(state.facts)
     for literal in reading.presumed:
         (relation, subject), value = literal

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections import deque
-from collections.abc import MutableMapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 
 from fleet.errors import NotUnderstood
+from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, parsed
 from fleet.language.reading import Ambiguity, Reading, WantedGoal
@@ -21,7 +21,8 @@ from fleet.language.resolve.mentions import WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.segments import Segment, Sentence, cut, sentences_of
-from fleet.language.tagging.tagger import Lexeme, Tagger
+from fleet.language.tagging.tagger import Lexeme, tagger_of
+from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
 from fleet.language.timing import timed
 from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
@@ -39,25 +40,6 @@ _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
 _READINGS = 12
 """Readings of what was read so far that are followed up."""
-_KEPT: deque[tuple[Vocabulary, Tagger]] = deque(maxlen=4)
-
-
-def tagger_of(vocabulary: Vocabulary) -> Tagger:
-    """The tagger of a vocabulary: made once for the very same names, where these cannot change."""
-    for known, tagger in _KEPT:
-        if (
-            known.places is vocabulary.places
-            and known.objects is vocabulary.objects
-            and known.robots is vocabulary.robots
-            and known.skill_phrases is vocabulary.skill_phrases
-            and known.wordbook is vocabulary.wordbook
-        ):
-            return tagger
-    tagger = Tagger(vocabulary)
-    mappings = (vocabulary.places, vocabulary.objects, vocabulary.robots)
-    if not any(isinstance(names, MutableMapping) for names in mappings):
-        _KEPT.append((vocabulary, tagger))
-    return tagger
 
 
 class _State:
@@ -73,8 +55,11 @@ class _State:
 class Reader:
     """Reads one text."""
 
-    def __init__(self, text: str, vocabulary: Vocabulary, mode: str = "") -> None:
-        """`mode`: only a `goal` or a `fact` is understood; else anything.
+    def __init__(
+        self, text: str, vocabulary: Vocabulary, mode: str = "", within: tuple[str, ...] = ()
+    ) -> None:
+        """`mode`: only a `goal` or a `fact` is understood; else anything. `within`: the tasks by
+        whose methods the text is said.
 
         Raises:
             NotUnderstood: the text is empty, or too long.
@@ -93,12 +78,12 @@ class Reader:
             )
         if not any(token.word[0].isalnum() for token in self.tokens):
             raise NotUnderstood(f"the sentence is empty: say {what}")
-        self.text, self.vocabulary, self.mode = text, vocabulary, mode
+        self.text, self.vocabulary, self.mode, self.within = text, vocabulary, mode, within
         self.tagger = tagger_of(vocabulary)
         self.remarks: list[str] = []
         self.later: Sequence[Sentence] = ()
         """The sentences after the one that is being read, but for remarks."""
-        self.why = Explanations(text, self.tokens, self.tagger, mode)
+        self.why = Explanations(text, self.tokens, self.tagger, mode, vocabulary.tasks)
         self.line = " ".join(text.split())
 
     def read(self, now: datetime | None) -> list[tuple[int, str, Reading]]:
@@ -110,6 +95,8 @@ class Reader:
         draft = GoalDraft(self.vocabulary.is_at)
         states = [_State(Discourse(self.text, self.tokens, draft, self.vocabulary.is_person))]
         lexemes = self.tagger.tagged(self.tokens, self.text)
+        if self.mode != "fact":
+            lexemes = marked(lexemes, self.tokens, self.text, self.vocabulary, self.tagger)
         dangling = False
         sentences = [cut(words) for words in sentences_of(lexemes)]
         for number, sentence in enumerate(sentences):
@@ -149,6 +136,9 @@ class Reader:
         return states
 
     def _segment(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
+        if (call := called(segment.words, self.tagger)) and not (segment.role or segment.always):
+            return self._task(call, states)
+        segment = replace(segment, words=spoken_out(segment.words))
         if len(segment.words) > MOST_WORDS_TOGETHER:
             raise NotUnderstood(
                 f"{len(segment.words)} words are too many for one clause: say it in several"
@@ -190,6 +180,18 @@ class Reader:
             raise min(problems, key=lambda row: row[0])[1]
         found.sort(key=lambda state: state.cost)
         return found[:_READINGS]
+
+    def _task(self, call: TaskCall, states: Sequence[_State]) -> list[_State]:
+        found: list[_State] = []
+        for asked, reading in expanded(call, self.vocabulary, self.within, self._said_by_method):
+            for state in states:
+                said = state.said.copy()
+                take(said, call, reading, self.vocabulary.robots)
+                found.append(_State(said, state.cost, state.question, state.asked or asked))
+        return found[:_READINGS]
+
+    def _said_by_method(self, text: str, within: tuple[str, ...]) -> list[Row]:
+        return Reader(text, self.vocabulary, within=within).read(None)
 
     def _each(self, which: WhichOne, segment: Segment, states: Sequence[_State]) -> list[_State]:
         """The readings in which a noun phrase means one, then another of those that it can."""
@@ -315,7 +317,8 @@ class Reader:
         goals = tuple(replace(goal, priority=said.urgent) for goal in said.goals)
         presumed = tuple(dict.fromkeys(said.presumed))
         remarks = (*self.remarks, *said.remarks)
-        return Reading(self.line, goals, facts, state.question, presumed, remarks)
+        methods = tuple(dict.fromkeys(said.methods))
+        return Reading(self.line, goals, facts, state.question, presumed, remarks, methods)
 
     def _close(self, said: Discourse, now: datetime | None) -> None:
         """End the goal that was being said: other times or conditions hold for what follows.

@@ -24,6 +24,7 @@ from fleet.service.event_journal import EventJournal
 from fleet.service.planner_service import PlannerService
 from fleet.service.planning.pool import PlanningPool
 from fleet.service.skill_models import load_all_skills
+from fleet.service.task_files import load_all_tasks
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.transport.session import SessionConfig, open_session
 
@@ -33,6 +34,7 @@ def run(
     realm: str,
     data_dir: Path,
     skill_files: tuple[Path, ...] = (),
+    task_files: tuple[Path, ...] = (),
     llm_file: Path | None = None,
     policy: Policy | None = None,
     retention: Retention | None = None,
@@ -41,7 +43,7 @@ def run(
 
     The event journal and the archive of what is over lie in `data_dir`; `retention` says how long
     that keeps its keys. It waits for a router as long as there is none. `skill_files` are those of
-    `load_all_skills`, `llm_file` that of `compose`.
+    `load_all_skills`, `task_files` those of `load_all_tasks`, `llm_file` that of `compose`.
 
     Raises:
         SystemExit: with 1 and one sentence on stderr, when it cannot start or is superseded.
@@ -53,7 +55,12 @@ def run(
         skills = load_all_skills(skill_files)
         model = LanguageModel(load_llm_config(llm_file))
         language = load_language_config(llm_file)
-        policy = replace(policy or Policy(), interpreter=model.configured, confirm=language.confirm)
+        policy = replace(
+            policy or Policy(),
+            interpreter=model.configured,
+            confirm=language.confirm,
+            tasks=load_all_tasks(task_files),
+        )
         pool = PlanningPool(llm_file, data_dir / "failed-planning-jobs")
         asyncio.run(_run(endpoints, realm, data_dir, pool, skills, policy, retention))
     except (FleetError, SchemaError) as error:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.frames import Frame, framed, frames_of, no_use
+from fleet.language.resolve.going import Going
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.looking import ROBOTS_TELL, Looking
 from fleet.language.resolve.mentions import NounPhrase, Subject
@@ -41,6 +42,7 @@ class Commands:
         self.skilled = skilled
         self.tidiness = tidiness
         self.questions = questions
+        self.going = Going(ground, wishes)
         self._clause: Clause | None = None
 
     def on_do(self, clause: Clause) -> None:
@@ -135,13 +137,13 @@ class Commands:
             self.scene.said.again = self._clause
         self.scene.said.elliptic = "move" if senses & {"move", "go", "give"} else ""
         if "go" in senses and not frame.themes and ("move" not in senses or _whereto(frame)):
-            return self.wishes.go(frame, who)
+            return self.going.go(frame, who)
         if "patrol" in senses and any(not self.who.any_robot(s) for s in who or ()):
             self.who.check_robots(who or ())
             return self.looking.patrol(frame, who or ())
         self._check_who(who)
         if "bin" in senses:
-            return self.wishes.throw_away(frame)
+            return self.tidiness.throw_away(frame)
         if "clear" in senses and "tidy" not in senses:
             return self.tidiness.clear(frame)
         if "move" in senses and (frame.themes or "tidy" not in senses):

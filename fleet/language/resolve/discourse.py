@@ -46,6 +46,8 @@ class Discourse:
     """Whom "him" and "her" mean."""
     carrier: str | None = None
     """What something was put in or on last: "put the cup inside"."""
+    methods: list[Any] = field(default_factory=list)
+    """How tasks are done that were called by name."""
     goals: list[Any] = field(default_factory=list)
     """Goals that ended with their sentence, for which a time or condition was said."""
     again: Any = None
@@ -87,6 +89,7 @@ class Discourse:
             extra=list(self.extra),
             goals=list(self.goals),
             remarks=list(self.remarks),
+            methods=list(self.methods),
         )
 
     def quote(self, first: int, last: int) -> str:

@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import listed, one_of, reason_for
+from fleet.language.refusals import listed, one_of
 from fleet.language.resolve.frames import EXAMPLE, HOME_HINT, Frame
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
-from fleet.language.resolve.places import WHERE, Locative, Where
+from fleet.language.resolve.places import Locative, Where
 from fleet.language.resolve.scene import THINGS
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tree.nodes import (
-    Place,
     Quantity,
 )
 from keyexpr_schema.facts import (
@@ -73,7 +72,7 @@ class Wishes:
         whereto = where.target is not None or bool(where.each) or home
         if inside is not None and not whereto:
             where = replace(where, target=inside, target_type="object")
-            where = replace(where, relation=self.relation_of(inside))
+            where = replace(where, relation=self._relation_of(inside))
         elif beneficiary is not None and not whereto and not (tidy and not fetch):
             where = replace(where, target=beneficiary, target_type="object")
         elif (to_speaker and not whereto) or (
@@ -119,7 +118,7 @@ class Wishes:
         rest = tuple(p for p in frame.particles if p not in inside)
         return replace(frame, particles=rest), carrier
 
-    def relation_of(self, thing: str) -> str:
+    def _relation_of(self, thing: str) -> str:
         good_for = self.scene.vocabulary.good_for.get(thing, ())
         return IN if Feature.CONTAINS in good_for else ON if Feature.SUPPORTS in good_for else AT
 
@@ -340,63 +339,3 @@ class Wishes:
     def to_spot(self, mention: Mention, spot: str | None) -> None:
         """Wish that it is in that place, or on or in that thing."""
         self.scene.said.draft.add(self.scene.vocabulary.relation_to(spot or ""), mention, spot)
-
-    def throw_away(self, frame: Frame) -> None:
-        """`throw away the newspaper`: into the one bin there is."""
-        if len(frame.themes) != 1:
-            raise NotUnderstood(f"{self.scene.said.clause!r} does not say what to throw away")
-        bins = {
-            e.id
-            for words in self.scene.tagger.book.bins
-            for e in self.scene.lexicon.meant(words)
-            if Feature.CONTAINS in self.scene.vocabulary.good_for.get(e.id, ())
-        }
-        if not bins:
-            raise NotUnderstood(f"{self.scene.said.clause!r}: no bin is known to throw it into")
-        where, _ = self.whereto(frame, fetching=True)
-        if where.target is None and len(bins) != 1:
-            raise NotUnderstood(f"it could be {one_of(sorted(bins))}: say which bin")
-        target = where.target or min(bins)
-        moved = self.nouns.subjects(frame.themes[0], THINGS, "an object")
-        where = replace(where, target=target, target_type="object", relation=IN)
-        return self.to_target(moved, where, False)
-
-    def go(self, frame: Frame, who: Sequence[Subject] | None) -> None:
-        """`go to PLACE`; any robot goes if nobody is named."""
-        if frame.home or (frame.particle_words & {"back"} and not frame.places):
-            raise NotUnderstood("a robot has no home: name the place where it shall go")
-        if frame.verb in ("head for", "make for", "enter"):
-            frame = self._headed_for(frame)
-        if via := [p for p in frame.places if p.role == "via" and p.nouns is not None]:
-            return self._by_way_of(frame, via, who)
-        if other := [p for p in frame.places if p.role not in WHERE]:
-            shown = [(word, word) for word in other[0].preposition.split()]
-            text = self.scene.said.quote(other[0].first, other[0].last)
-            raise NotUnderstood(reason_for(shown) or f"{text!r} is not understood")
-        where, _ = self.whereto(frame)
-        if where.target is None or where.target_type == "robot":
-            known = listed(self.scene.lexicon.known(("place",)))
-            raise NotUnderstood(
-                f"{self.scene.said.clause!r} ends where a place is missing; known are {known}"
-            )
-        if who is not None:
-            return self.to_target(who, where, False)
-        self.scene.said.moved = [robot := self.who.some_robot()]
-        self.scene.said.draft.add(AT, robot, self.places.place_of(where.target), means=True)
-        return None
-
-    def _headed_for(self, frame: Frame) -> Frame:
-        """The same with what is headed for, or entered, as the place to go to."""
-        places = tuple(replace(p, role="to") if p.role == "for" else p for p in frame.places)
-        for nouns in frame.themes:
-            first, last = nouns.items[0].first, nouns.items[-1].last
-            places = (Place("to", "", nouns, first, last), *places)
-        return replace(frame, places=places, themes=())
-
-    def _by_way_of(self, frame: Frame, via: Sequence[Place], who: Sequence[Subject] | None) -> None:
-        """`go to the garden via the garage`: one after the other."""
-        rest = tuple(p for p in frame.places if p not in via)
-        for place in via:
-            self.go(replace(frame, places=(replace(place, role="to"),)), who)
-            self.scene.said.draft.next_stage()
-        return self.go(replace(frame, places=rest), who)

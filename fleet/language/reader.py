@@ -8,10 +8,11 @@ from collections.abc import MutableMapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
+from typing import Any
 
 from fleet.errors import NotUnderstood
 from fleet.language.explaining import Explanations
-from fleet.language.grammar.chart import NotGrammatical, parsed
+from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.reading import Ambiguity, Reading, WantedGoal
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.clauses import Clauses
@@ -33,30 +34,35 @@ from keyexpr_schema.payloads.goals import Condition
 MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 80
+"""In one clause; of a long list one for each thing."""
 _CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
 _READINGS = 12
 """Readings of what was read so far that are followed up."""
-_KEPT: deque[tuple[Vocabulary, Tagger]] = deque(maxlen=4)
+_KEPT: deque[tuple[tuple[Any, ...], Tagger]] = deque(maxlen=4)
+"""Taggers that were made, by the names that they were made from."""
 
 
 def tagger_of(vocabulary: Vocabulary) -> Tagger:
-    """The tagger of a vocabulary: made once for the very same names, where these cannot change."""
+    """The tagger of a vocabulary: made once for the same names.
+
+    Mappings that cannot change are the same only if they are the very same, which costs nothing.
+    """
+    mappings = (vocabulary.places, vocabulary.objects, vocabulary.robots)
+    names = (
+        vocabulary.wordbook,
+        *(tuple(m.items()) if isinstance(m, MutableMapping) else m for m in mappings),
+        vocabulary.skill_phrases,
+        vocabulary.state_words,
+    )
     for known, tagger in _KEPT:
-        if (
-            known.places is vocabulary.places
-            and known.objects is vocabulary.objects
-            and known.robots is vocabulary.robots
-            and known.skill_phrases is vocabulary.skill_phrases
-            and known.wordbook is vocabulary.wordbook
-        ):
+        pairs = zip(known, names, strict=True)
+        if all(one is other or (isinstance(one, tuple) and one == other) for one, other in pairs):
             return tagger
     tagger = Tagger(vocabulary)
-    mappings = (vocabulary.places, vocabulary.objects, vocabulary.robots)
-    if not any(isinstance(names, MutableMapping) for names in mappings):
-        _KEPT.append((vocabulary, tagger))
+    _KEPT.append((names, tagger))
     return tagger
 
 
@@ -149,7 +155,8 @@ class Reader:
         return states
 
     def _segment(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
-        if len(segment.words) > MOST_WORDS_TOGETHER:
+        words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
+        if words > MOST_WORDS_TOGETHER:
             raise NotUnderstood(
                 f"{len(segment.words)} words are too many for one clause: say it in several"
             )

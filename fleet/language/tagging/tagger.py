@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fleet.language.tagging.lexicon import ENTITY_TYPES, Entity, Lexicon, lexicon_of
+from fleet.language.tagging.lexicon import ENTITY_TYPES, Entity, Lexicon
 from fleet.language.tagging.skill_words import SkillWords
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.times import TimePhrase, time_at
@@ -45,7 +45,7 @@ class Tagger:
 
     def __init__(self, vocabulary: Vocabulary) -> None:
         self.book = vocabulary.wordbook
-        self.lexicon: Lexicon = lexicon_of(vocabulary)
+        self.lexicon = Lexicon(vocabulary)
         self.verbs = SkillWords(vocabulary)
         self.phrases: dict[Phrase, frozenset[str]] = dict(self.book.phrases)
         more: dict[Phrase, set[str]] = {}

@@ -6,15 +6,28 @@ import re
 from collections.abc import Sequence
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import SUBORDINATE, Misused, listed, nearest, reason_for, suggestion
+from fleet.language.methods.model import CompoundTask
+from fleet.language.refusals import (
+    SUBORDINATE,
+    Misused,
+    alike,
+    listed,
+    nearest,
+    reason_for,
+    suggestion,
+)
 from fleet.language.resolve.frames import EXAMPLE, SAY_IT, no_use
 from fleet.language.segments import Segment, Sentence
 from fleet.language.tagging.lexicon import ENTITY_TYPES
+from fleet.language.tagging.skill_words import SKILL
 from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.words.tokens import Token
 
 _BEFORE_NOUNS = frozenset({"DET", "INDEF", "UNIV", "NUM", "ORD", "ADJ", "OTHER", "ANOTHER"})
 _NEVER_READ = frozenset({"UNTIL", "MIGHT", "SUPPOSED"})
+_NAMES = frozenset(
+    {"NOUN", "DET", "INDEF", "UNIV", "NUM", "ORD", "PREP", "ADJ", "PEOPLE", "ME", "I"}
+)
 _SHOWN_TOGETHER = 3
 """Unknown words in a row that are named together."""
 _REFUSED_OF_GOALS = ("IF", "WHEN", "UNLESS", "UNTIL", "BEFORE", "AFTER", "TIME", "DONT", "NEVER",
@@ -24,8 +37,16 @@ _REFUSED_OF_GOALS = ("IF", "WHEN", "UNLESS", "UNTIL", "BEFORE", "AFTER", "TIME",
 class Explanations:
     """Says why parts of one text are not understood."""
 
-    def __init__(self, text: str, tokens: Sequence[Token], tagger: Tagger, mode: str) -> None:
+    def __init__(
+        self,
+        text: str,
+        tokens: Sequence[Token],
+        tagger: Tagger,
+        mode: str,
+        tasks: Sequence[CompoundTask] = (),
+    ) -> None:
         self.text, self.tokens, self.tagger, self.mode = text, tokens, tagger, mode
+        self.tasks = tasks
 
     def what(self) -> str:
         return "a fact" if self.mode == "fact" else "a goal"
@@ -108,6 +129,14 @@ class Explanations:
         strange = [i for i, w in enumerate(words) if "UNK" in w.tags or w.tags <= {"USE"}]
         example = SAY_IT if self.mode == "fact" else EXAMPLE
         unheard = [i for i in strange if not reason_for([(words[i].word, words[i].text)])]
+        if unheard and self._is_like_a_task(words, unheard[0]):
+            whole = words if len(words) <= _SHOWN_TOGETHER else words[: unheard[0] + 1]
+            named = self.quote(whole[-_SHOWN_TOGETHER:])
+            tasks = alike([task.shown for task in self.tasks], named)
+            return NotUnderstood(
+                f"nothing is known of {named!r}; tasks known are {tasks}; teach it in a file of "
+                "tasks (`robotctl planner --tasks FILE`)"
+            )
         if strange:
             at = (unheard or strange)[0]
         elif at >= len(words) and "PREP" in words[-1].tags:
@@ -152,16 +181,37 @@ class Explanations:
             return NotUnderstood(f"{text!r} is not understood as {self.what()}{hint}: {example}")
         return NotUnderstood(f"{text!r} is not understood after {self.quote(words[:at])!r}")
 
+    def _is_like_a_task(self, words: Sequence[Lexeme], unheard: int) -> bool:
+        """`make breakfast`: whether it asks for something that has a name, and nobody knows it."""
+        if self.mode == "fact" or not self.tasks or len(words) < 2:
+            return False
+        first, *rest = words
+        verbs = self.tagger.verbs
+        heads = verbs.heads(first.words, "VERB")
+        entries = [e for head in heads for e in verbs.entries[head] if not e.behind]
+        senses = {sense for entry in entries for sense in entry.senses}
+        calls = {said.split()[0] for task in self.tasks for said in task.says}
+        if senses and not (senses == {SKILL} and first.word in calls):
+            return False
+        if first.tags & _NAMES or any(not w.tags & (_BEFORE_NOUNS | {"UNK"}) for w in rest):
+            return False
+        named = self.tagger.lexicon.names_in(ENTITY_TYPES) if unheard else {
+            entry.base for entries in verbs.entries.values() for entry in entries
+        }  # fmt: skip
+        return not suggestion(words[unheard].word, named, self.tagger.book.everyday)
+
     def _wants_more(self, word: Lexeme) -> bool:
         """`turn`: whether it is a verb only with a word behind it."""
         verbs = self.tagger.verbs
         entries = [e for head in verbs.heads(word.words, "VERB") for e in verbs.entries[head]]
         return bool(entries) and all(entry.behind for entry in entries)
 
-    @staticmethod
-    def asks_for(segment: Segment) -> bool:
+    def asks_for(self, segment: Segment) -> bool:
         """`book meeting room 1`: whether an unknown word begins it that is used as a verb."""
         first, *rest = segment.words
+        unheard = self._unheard(segment.words)
+        if unheard is not None and self._is_like_a_task(segment.words, unheard):
+            return True
         named = bool(rest) and bool(rest[0].tags & (_BEFORE_NOUNS | {"NOUN"}))
         return "UNK" in first.tags and named
 

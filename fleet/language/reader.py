@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections import deque
-from collections.abc import MutableMapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
-from typing import Any
 
 from fleet.errors import NotUnderstood
+from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.reading import Ambiguity, Reading, WantedGoal
@@ -22,7 +21,8 @@ from fleet.language.resolve.mentions import WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.segments import Segment, Sentence, cut, sentences_of
-from fleet.language.tagging.tagger import Lexeme, Tagger
+from fleet.language.tagging.tagger import Lexeme, tagger_of
+from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
 from fleet.language.timing import timed
 from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
@@ -41,29 +41,6 @@ _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
 _READINGS = 12
 """Readings of what was read so far that are followed up."""
-_KEPT: deque[tuple[tuple[Any, ...], Tagger]] = deque(maxlen=4)
-"""Taggers that were made, by the names that they were made from."""
-
-
-def tagger_of(vocabulary: Vocabulary) -> Tagger:
-    """The tagger of a vocabulary: made once for the same names.
-
-    Mappings that cannot change are the same only if they are the very same, which costs nothing.
-    """
-    mappings = (vocabulary.places, vocabulary.objects, vocabulary.robots)
-    names = (
-        vocabulary.wordbook,
-        *(tuple(m.items()) if isinstance(m, MutableMapping) else m for m in mappings),
-        vocabulary.skill_phrases,
-        vocabulary.state_words,
-    )
-    for known, tagger in _KEPT:
-        pairs = zip(known, names, strict=True)
-        if all(one is other or (isinstance(one, tuple) and one == other) for one, other in pairs):
-            return tagger
-    tagger = Tagger(vocabulary)
-    _KEPT.append((names, tagger))
-    return tagger
 
 
 class _State:
@@ -79,8 +56,11 @@ class _State:
 class Reader:
     """Reads one text."""
 
-    def __init__(self, text: str, vocabulary: Vocabulary, mode: str = "") -> None:
-        """`mode`: only a `goal` or a `fact` is understood; else anything.
+    def __init__(
+        self, text: str, vocabulary: Vocabulary, mode: str = "", within: tuple[str, ...] = ()
+    ) -> None:
+        """`mode`: only a `goal` or a `fact` is understood; else anything. `within`: the tasks by
+        whose methods the text is said.
 
         Raises:
             NotUnderstood: the text is empty, or too long.
@@ -99,12 +79,12 @@ class Reader:
             )
         if not any(token.word[0].isalnum() for token in self.tokens):
             raise NotUnderstood(f"the sentence is empty: say {what}")
-        self.text, self.vocabulary, self.mode = text, vocabulary, mode
+        self.text, self.vocabulary, self.mode, self.within = text, vocabulary, mode, within
         self.tagger = tagger_of(vocabulary)
         self.remarks: list[str] = []
         self.later: Sequence[Sentence] = ()
         """The sentences after the one that is being read, but for remarks."""
-        self.why = Explanations(text, self.tokens, self.tagger, mode)
+        self.why = Explanations(text, self.tokens, self.tagger, mode, vocabulary.tasks)
         self.line = " ".join(text.split())
 
     def read(self, now: datetime | None) -> list[tuple[int, str, Reading]]:
@@ -116,6 +96,8 @@ class Reader:
         draft = GoalDraft(self.vocabulary.is_at)
         states = [_State(Discourse(self.text, self.tokens, draft, self.vocabulary.is_person))]
         lexemes = self.tagger.tagged(self.tokens, self.text)
+        if self.mode != "fact":
+            lexemes = marked(lexemes, self.tokens, self.text, self.vocabulary, self.tagger)
         dangling = False
         sentences = [cut(words) for words in sentences_of(lexemes)]
         for number, sentence in enumerate(sentences):
@@ -155,6 +137,9 @@ class Reader:
         return states
 
     def _segment(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
+        if (call := called(segment.words, self.tagger)) and not (segment.role or segment.always):
+            return self._task(call, states)
+        segment = replace(segment, words=spoken_out(segment.words))
         words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
         if words > MOST_WORDS_TOGETHER:
             raise NotUnderstood(
@@ -193,6 +178,18 @@ class Reader:
             raise min(problems, key=lambda row: row[0])[1]
         found.sort(key=lambda state: state.cost)
         return found[:_READINGS]
+
+    def _task(self, call: TaskCall, states: Sequence[_State]) -> list[_State]:
+        found: list[_State] = []
+        for asked, reading in expanded(call, self.vocabulary, self.within, self._said_by_method):
+            for state in states:
+                said = state.said.copy()
+                take(said, call, reading, self.vocabulary.robots)
+                found.append(_State(said, state.cost, state.question, state.asked or asked))
+        return found[:_READINGS]
+
+    def _said_by_method(self, text: str, within: tuple[str, ...]) -> list[Row]:
+        return Reader(text, self.vocabulary, within=within).read(None)
 
     def _each(self, which: WhichOne, segment: Segment, states: Sequence[_State]) -> list[_State]:
         """The readings in which a noun phrase means one, then another of those that it can."""
@@ -315,7 +312,8 @@ class Reader:
             raise NotUnderstood(f"{self.line!r} ends before it says what to do: {EXAMPLE}")
         goals = tuple(replace(goal, priority=said.urgent) for goal in said.goals)
         presumed = tuple(dict.fromkeys(said.presumed))
-        return Reading(self.line, goals, facts, state.question, presumed, tuple(self.remarks))
+        remarks, methods = tuple(self.remarks), tuple(dict.fromkeys(said.methods))
+        return Reading(self.line, goals, facts, state.question, presumed, remarks, methods)
 
     def _close(self, said: Discourse, now: datetime | None) -> None:
         """End the goal that was being said: other times or conditions hold for what follows.
@@ -323,17 +321,20 @@ class Reader:
         Raises:
             NotUnderstood: it cannot be, or a time belongs to nothing.
         """
-        stages = said.draft.conditions(self.vocabulary.speaker)
-        wants = bool(stages or said.always or said.never)
+        wanted = [
+            (by, draft.conditions(self.vocabulary.speaker)) for by, draft in said.draft.of_each()
+        ]
+        wants = bool(any(stages for _, stages in wanted) or said.always or said.never)
         if wants:
-            goal = WantedGoal(
-                stages,
-                tuple(dict.fromkeys(said.always)),
-                tuple(dict.fromkeys(said.never)),
-                when=tuple(dict.fromkeys(said.when)),
-                by=tuple(dict.fromkeys(said.by)),
-            )
-            said.goals.append(timed(goal, said, now))
+            for number, (by, stages) in enumerate(wanted):
+                goal = WantedGoal(
+                    stages,
+                    () if number else tuple(dict.fromkeys(said.always)),
+                    () if number else tuple(dict.fromkeys(said.never)),
+                    when=tuple(dict.fromkeys(said.when)),
+                    by=by,
+                )
+                said.goals.append(timed(goal, said, now))
         elif said.times and self.mode == "fact":
             named = [(token.word, token.spoken) for token in self.tokens]
             reason = reason_for(named, "a fact")
@@ -342,7 +343,7 @@ class Reader:
             what = f"{said.time_words!r} names a time" if said.times else '"If" names a condition'
             raise NotUnderstood(f"{what}, but nothing is to be done then")
         said.draft = GoalDraft(self.vocabulary.is_at)
-        said.always, said.never, said.when, said.times, said.by = [], [], [], [], []
+        said.always, said.never, said.when, said.times = [], [], [], []
 
 
 def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Reading | Ambiguity:

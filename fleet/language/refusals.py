@@ -129,6 +129,14 @@ def nearest(names: Sequence[str], phrase: str) -> str:
     return listed(sorted(names, key=lambda n: -like[n] if like[n] >= _NEAR else 0))
 
 
+def alike(phrases: Iterable[str], phrase: str) -> str:
+    """At most five of the phrases, in quotes, those first that are most like the phrase."""
+    several = list(phrases)
+    ranked = sorted(several, key=lambda known: -fuzz.WRatio(phrase.casefold(), known))
+    shown = ", ".join(f"{known!r}" for known in ranked[:_SHOWN])
+    return f"{shown}, …" if len(several) > _SHOWN else shown
+
+
 def listed(names: Iterable[str]) -> str:
     """At most five of the names with commas, or `none yet`."""
     several = list(names)

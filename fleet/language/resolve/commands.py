@@ -23,9 +23,7 @@ from fleet.language.tree.nodes import (
     Nouns,
     Particle,
 )
-from keyexpr_schema.facts import (
-    AT,
-)
+from keyexpr_schema.facts import AT, HELD, LOCATED
 from keyexpr_schema.payloads.goals import Condition
 
 
@@ -90,7 +88,9 @@ class Commands:
         assert clause.verb is not None
         self._clause = clause
         problems: list[NotUnderstood] = []
-        frames = frames_of(self.scene.tagger, clause.verb, clause.arguments, ("VERB", "FIN", "GER"))
+        frames = frames_of(
+            self.scene.tagger, clause.verb, clause.arguments, ("VERB", "FIN", "GER", "PART")
+        )
         if not frames:
             behind = [word.lexeme.last for word in clause.arguments if isinstance(word, Particle)]
             end = min([*behind[:1], clause.verb.last + 1, clause.last])
@@ -161,6 +161,20 @@ class Commands:
     def _check_who(self, who: Sequence[Subject] | None) -> None:
         if who is not None:
             self.who.check_who(who)
+
+    def on_whether_done(self, clause: Clause) -> None:
+        """`has anyone watered the fern?`: whether that is so which it would have made so."""
+        before = self.scene.said
+        self.scene.said = said = before.copy()
+        said.draft = GoalDraft(self.scene.vocabulary.is_at)
+        try:
+            self._verb(clause, None)
+            stages = self.scene.said.draft.conditions()
+        finally:
+            self.scene.said = before
+        if len(stages) != 1 or any(c.relation in (HELD, LOCATED) for c in stages[0]):
+            raise NotUnderstood(f"{said.clause!r} is a question that is not understood")
+        self.questions.whether(stages[0])
 
     def on_needs_doing(self, clause: Clause) -> None:
         """`the living room needs tidying up`."""

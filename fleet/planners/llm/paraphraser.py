@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import datetime
 
 import msgspec
 
 from fleet.core.understanding import one_goal
 from fleet.errors import NotUnderstood
-from fleet.language import Ambiguity, Vocabulary, read
+from fleet.language import Ambiguity, Reading, Vocabulary, read
 from fleet.llm.budget import Budget
 from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
-from fleet.llm.quoting import cleaned
+from fleet.llm.quoting import cleaned, printable
 from fleet.llm.structured_output import StructuredAnswer, read_answer, schema_of
 from fleet.planners.llm.prompt_text import frames_text, sentence_text
 
@@ -53,13 +54,15 @@ class LlmParaphraser:
         refusal: str,
         vocabulary: Vocabulary,
         now: datetime | None = None,
+        check: Callable[[Reading], object] = one_goal,
         budget: Budget | None = None,
     ) -> Paraphrase | str:
-        """The sentence in others that are read as a goal, or a sentence that says why not.
+        """The sentence in others that are read, as a goal, or a sentence that says why not.
 
-        `refusal` is why the grammar does not take it, `now` what the clock says. What the grammar
-        does not take of an answer goes back with the reason, as often as the configuration allows.
-        Blocks, and never raises.
+        `refusal` is why the grammar does not take it, `now` what the clock says; `check` raises
+        `NotUnderstood` for a reading that is none of what is wanted. What is not understood of an
+        answer goes back with the reason, as often as the configuration allows. Blocks, and never
+        raises.
         """
         said: Paraphrase | str | GivenUp = self._model.ask(
             system="paraphrase-system",
@@ -71,17 +74,22 @@ class LlmParaphraser:
                 "form": _FORM,
             },
             schema=schema_of(ParaphraseAnswer),
-            read=lambda text: _read(text, vocabulary, now),
+            read=lambda text: _read(text, vocabulary, now, check),
             budget=budget,
         )
         return said.reason if isinstance(said, GivenUp) else said
 
 
-def _read(text: str, vocabulary: Vocabulary, now: datetime | None) -> Paraphrase | str | Rejected:
+def _read(
+    text: str,
+    vocabulary: Vocabulary,
+    now: datetime | None,
+    check: Callable[[Reading], object],
+) -> Paraphrase | str | Rejected:
     answer = read_answer(text, ParaphraseAnswer)
     if isinstance(answer, str):
         return Rejected.because("malformed", answer)
-    sentences = [" ".join(each.split()) for each in answer.sentences]
+    sentences = [" ".join(printable(each).split()) for each in answer.sentences]
     if not any(sentences):
         reason = cleaned(answer.reason).strip()
         return f"the language model says: {reason or 'it cannot be said in other words'}"
@@ -92,7 +100,7 @@ def _read(text: str, vocabulary: Vocabulary, now: datetime | None) -> Paraphrase
     try:
         found = read(said, vocabulary, now)
         if not isinstance(found, Ambiguity):
-            one_goal(found)
+            check(found)
     except NotUnderstood as error:
         return Rejected.because("not-understood", str(error))
     return Paraphrase(said)

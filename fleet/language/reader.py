@@ -11,7 +11,7 @@ from datetime import datetime
 from fleet.errors import NotUnderstood
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
-from fleet.language.grammar.chart import NotGrammatical, parsed
+from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.reading import Ambiguity, Reading, WantedGoal
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.clauses import Clauses
@@ -34,6 +34,7 @@ from keyexpr_schema.payloads.goals import Condition
 MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 80
+"""In one clause; of a long list one for each thing."""
 _CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 _NAMING = re.compile(r"not a known|as a goal")
@@ -139,7 +140,8 @@ class Reader:
         if (call := called(segment.words, self.tagger)) and not (segment.role or segment.always):
             return self._task(call, states)
         segment = replace(segment, words=spoken_out(segment.words))
-        if len(segment.words) > MOST_WORDS_TOGETHER:
+        words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
+        if words > MOST_WORDS_TOGETHER:
             raise NotUnderstood(
                 f"{len(segment.words)} words are too many for one clause: say it in several"
             )

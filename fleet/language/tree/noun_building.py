@@ -174,9 +174,6 @@ class NounBuilder:
         return replace(noun, first=first, last=last)
 
     def make_headless(self, children: tuple[Any, ...], start: int, end: int) -> Any:
-        following = self.words[end].tags if end < len(self.words) else frozenset()
-        if following & {"NOUN", "UNK", "ONE", "ORD", "BASKET"} or "NUM" in following:
-            return None
         words = [word for child in children for word in child.words]
         tags = frozenset().union(*(word.tags for word in words))
         spoken = tuple(word.word for word in words)

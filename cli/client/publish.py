@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from keyexpr_schema.transport.session import Session
 
 
+YES = "yes"
+"""Says that a goal means the one thing that was made of it."""
 CLOCK_S = 0.6
 """How long to listen for a simulation's clock [s, wall]; it ticks several times as often."""
 
@@ -178,12 +180,13 @@ async def answer_goal(session: Session, spec: Goal, status: GoalStatus, which: s
     """Store, confirmed, which of the things that a goal's sentence can mean is meant.
 
     Raises:
-        BadArgument: its sentence is plain, or `which` is no number or words of a candidate.
+        BadArgument: its sentence is plain, or `which` is no number or words of a candidate, nor
+            `YES` where there is one.
     """
     candidates = status.candidates
     if not candidates:
         raise BadArgument(f"goal {spec.goal} does not ask anything: it is {status.state.value}")
-    number = int(which) if which.isdecimal() else 0
+    number = int(which) if which.isdecimal() else int(which == YES and not candidates[1:])
     meant = candidates[number - 1] if 1 <= number <= len(candidates) else which
     if meant not in candidates:
         listed = "; ".join(f"{i} ({words})" for i, words in enumerate(candidates, 1))

@@ -103,9 +103,9 @@ async def add(
             longest_s = (timeout_s, timeout_s) if wait else (READ_S, MODEL_READ_S)
             what = f"goal {spec.goal} (it is stored)"
             await view.until_read((spec.goal,), what, *longest_s)
-            if view.goal_status[spec.goal].candidates and call.interactive:
-                asked = view.goal_status[spec.goal]
-                spec = await answer_goal(session, spec, asked, _asked_back(asked))
+            asked = view.goal_status[spec.goal]
+            if asked.candidates and call.interactive and (said := _asked_back(asked)):
+                spec = await answer_goal(session, spec, asked, said)
                 await view.until(lambda: not view.goal_status[spec.goal].candidates, READ_S, what)
             if plan and view.goal_status[spec.goal].state is GoalState.WAITING:
                 call.inform(sentence(spec, view.goal_status[spec.goal]))
@@ -135,7 +135,11 @@ async def add(
 
 
 def _asked_back(status: GoalStatus) -> str:
-    """What somebody at the terminal says to what a goal's sentence can mean."""
+    """What somebody at the terminal says to what a goal's sentence can mean; nothing: not that."""
+    if status.paraphrase is not None and not status.candidates[1:]:
+        typer.echo(f"  a language model says it as “{status.paraphrase}”", err=True)
+        typer.echo(f"  understood as {status.candidates[0]}", err=True)
+        return "1" if typer.confirm("Is that meant", err=True) else ""
     for number, words in enumerate(status.candidates, 1):
         typer.echo(f"  {number}  {words}", err=True)
     said: str = typer.prompt("It can mean each of these; which", err=True)
@@ -148,7 +152,8 @@ def sentence(spec: Goal, status: GoalStatus, planned: bool = True) -> str:
     from keyexpr_schema.payloads.goals import GoalState
 
     means = meaning_of(status)
-    meaning = f", understood as {means}" if means else ""
+    said = f", said by a language model as “{status.paraphrase}”" if status.paraphrase else ""
+    meaning = f"{said}, understood as {means}" if means else ""
     hint = ""
     if status.state is GoalState.WAITING and not planned:
         hint = f"; plan it with `robotctl plan create big-dag makespan {spec.goal}`"
@@ -162,10 +167,12 @@ async def answer(
     goal: GoalArgument,
     which: Annotated[
         str,
-        typer.Argument(metavar="WHICH", help="Its number in what it can mean, or its words."),
+        typer.Argument(metavar="WHICH", help="Its number in what it can mean, its words, or yes."),
     ],
 ) -> None:
-    """Say which of several things a goal's sentence means (`goal show` lists them)."""
+    """Say which of several things a goal's sentence means (`goal show` lists them), or that it
+    means what a language model has made of it.
+    """
     from cli.client.fleet_view import fleet_view
     from cli.client.planner_requests import check_planner
     from cli.client.publish import answer_goal

@@ -74,6 +74,9 @@ def goal_page(row: GoalRow) -> Group:
         head = "understood  " if number == 0 else "then        "
         now = "  ← now" if len(found) > 1 and number == status.stage else ""
         lines.append(Text(f"{head}{' and '.join(str(each) for each in stage)}{now}"))
+    if status.paraphrase is not None:
+        lines.append(Text(f"said as     “{status.paraphrase}” by a language model, as the grammar"))
+        lines.append(Text(f"            refuses it: {status.refusal}"))
     lines += [
         Text(f"{'can mean' if number == 1 else '':<12}{number}  {words}")
         for number, words in enumerate(status.candidates, 1)

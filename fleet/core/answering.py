@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace as changed
 
 from msgspec.structs import replace
 
@@ -12,7 +11,7 @@ from fleet.core.model.derived import carriers, is_located
 from fleet.core.state import State
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Question, read
-from keyexpr_schema.facts import AT, HELD, IN, ON, FactKey, Value, render_value
+from keyexpr_schema.facts import AT, HELD, IN, ON, FactKey, render_value
 from keyexpr_schema.payloads.goals import Condition
 from keyexpr_schema.payloads.questions import AnsweredFact, QuestionQuery, QuestionReply
 from keyexpr_schema.payloads.world import Fact
@@ -25,11 +24,8 @@ MOST_NAMED = 20
 
 def answer(state: State, asked: QuestionQuery) -> QuestionReply:
     """What is believed of what is asked; or why it is not understood."""
-    words = changed(state.vocabulary(), speaker=asked.speaker)
-    if asked.speaker is not None and not words.is_person(asked.speaker):
-        return QuestionReply(reason=f"{asked.speaker!r}, who asks, is no person that is known")
     try:
-        reading = read(asked.text, words)
+        reading = read(asked.text, state.vocabulary().spoken_by(asked.speaker))
     except NotUnderstood as error:
         return QuestionReply(reason=str(error))
     if isinstance(reading, Ambiguity):
@@ -193,10 +189,11 @@ class _Answers:
 
     def _who_has(self, conditions: Sequence[Condition]) -> QuestionReply:
         keys = [key for condition in conditions for key in self._bases(condition)]
+        is_person = self._state.vocabulary().is_person
         holders: list[str] = []
         for key in keys:
             around = carriers(key.subject, self._values.get, self._state, aboard=True)
-            holders += [c for c in around if c in self._state.robots or self._is_person(c)]
+            holders += [c for c in around if c in self._state.robots or is_person(c)]
         said = [self._named(holder) for holder in holders]
         rest = [self._said(key) for key in keys] if not said else []
         return QuestionReply(
@@ -204,10 +201,6 @@ class _Answers:
             subjects=tuple(holders),
             facts=tuple(self._facts(keys)),
         )
-
-    def _is_person(self, name: Value) -> bool:
-        thing = self._state.objects.get(str(name))
-        return thing is not None and thing.is_a("person")
 
     # --- what doing ------------------------------------------------------------------------------
     def _doing(self, subjects: Sequence[str]) -> QuestionReply:

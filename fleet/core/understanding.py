@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from dataclasses import replace as changed
 
 from msgspec.structs import replace
 
+from fleet.core.confirmation import to_confirm
 from fleet.core.indexes.fact_views import FactValues
 from fleet.core.model.declarations import misfit, relations_of
 from fleet.core.model.derived import holds
@@ -14,7 +14,7 @@ from fleet.core.state import State
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Reading, WantedGoal, read
 from keyexpr_schema.facts import LOCATED, NOTHING, Value
-from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus, Precedence
+from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 
 NO_READING = Reading("")
 
@@ -24,16 +24,23 @@ class Understood:
     """A goal as its sentence is read now: how it stands, and what of it is in force.
 
     `goal` is what was put with what the sentence adds to it: what must always or never hold, and
-    in which order, how urgent it is, and when it is due.
+    in which order, how urgent it is, and when it is due. `unread`: the grammar refuses it, and no
+    language model has been asked to say it in other words.
     """
 
     status: GoalStatus
     goal: Goal
     reading: Reading = NO_READING
+    unread: bool = False
 
 
-def understood(state: State, goal: Goal, known: GoalStatus | None) -> Understood:
-    """What a goal that was put means; `known` is how it stood, if it is not a new one."""
+def understood(
+    state: State, goal: Goal, known: GoalStatus | None, asked: GoalStatus | None = None
+) -> Understood:
+    """What a goal that was put means; `known` is how it stood, if it is not a new one.
+
+    `asked` is how it stood, if a language model may have been asked about the same words.
+    """
     status = GoalStatus(
         goal=goal.goal,
         state=GoalState.WAITING,
@@ -41,52 +48,87 @@ def understood(state: State, goal: Goal, known: GoalStatus | None) -> Understood
         given_wall_s=state.wall_time_s if known is None else known.given_wall_s,
     )
     try:
-        reading = _reading(state, goal)
-        if isinstance(reading, Ambiguity):
-            words = tuple(words for words, _ in reading.candidates)
-            asked = replace(status, candidates=words)
-            return Understood(_rejected(asked, reading.sentence), goal)
-        wanted = _one_goal(reading)
-        for stage in wanted.stages:
-            for condition in stage:
-                _check_condition(state, condition)
-        in_force = _in_force(state, goal, wanted)
-        for condition in in_force.constraints:
-            _check_relation(state, condition)
-            _check_condition(state, condition)
+        found = _reading(state, goal, goal.text)
+    except NotUnderstood as error:
+        return _in_other_words(state, goal, status, str(error), asked or known)
+    try:
+        return _taken(state, goal, status, found)
     except NotUnderstood as error:
         return Understood(_rejected(status, str(error)), goal)
+
+
+def _taken(state: State, goal: Goal, status: GoalStatus, found: Reading | Ambiguity) -> Understood:
+    """What becomes of a goal that can be read.
+
+    Raises:
+        NotUnderstood: it is nothing that the fleet can carry out.
+    """
+    if isinstance(found, Ambiguity):
+        words = tuple(words for words, _ in found.candidates)
+        return Understood(_rejected(replace(status, candidates=words), found.sentence), goal)
+    wanted = one_goal(found)
+    for stage in wanted.stages:
+        for condition in stage:
+            _check_condition(state, condition)
+    in_force = _in_force(state, goal, wanted)
+    for condition in in_force.constraints:
+        _check_relation(state, condition)
+        _check_condition(state, condition)
     status = replace(
         status,
         conditions=wanted.stages[0],
         stages=wanted.stages,
-        understood=None if goal.conditions else reading.understood_as,
-        note=_note(state, reading),
+        understood=None if goal.conditions else found.understood_as,
+        note=_note(state, found),
     )
-    return Understood(status, in_force, reading)
+    return Understood(status, in_force, found)
+
+
+def _in_other_words(
+    state: State, goal: Goal, status: GoalStatus, refusal: str, asked: GoalStatus | None
+) -> Understood:
+    """What becomes of a goal that the grammar refuses: what a language model has made of it is read
+    by the same grammar, and a person says whether it is meant."""
+    if asked is None or asked.refusal is None:
+        return Understood(_rejected(status, refusal), goal, unread=True)
+    if (words := asked.paraphrase) is None:
+        if asked.refusal != refusal:  # there are other names now
+            return Understood(_rejected(status, refusal), goal, unread=True)
+        return Understood(_rejected(replace(status, refusal=refusal), asked.reason or ""), goal)
+    status = replace(status, refusal=refusal, paraphrase=words)
+    said = f"a language model says {goal.text!r} as {words!r}"
+    try:
+        read = _taken(state, goal, status, _reading(state, goal, words))
+    except NotUnderstood as error:
+        return Understood(_rejected(status, f"{refusal}; {said}: {error}"), goal)
+    if read.status.candidates:
+        return Understood(_rejected(read.status, f"{said}: {read.status.reason}"), goal)
+    meaning = read.status.understood or ""
+    wanted = [row for stage in read.status.stages for row in stage]
+    wanted += read.goal.constraints
+    if meaning == goal.meant or not to_confirm(state, goal, wanted, read.reading.facts):
+        return read
+    sentence = (
+        f"{said}, which is understood as {meaning}; nothing is done unless you say that it is "
+        f"meant, with `robotctl goal answer {goal.goal} yes`"
+    )
+    return Understood(_rejected(replace(status, candidates=(meaning,)), sentence), goal)
 
 
 def _rejected(status: GoalStatus, reason: str) -> GoalStatus:
     return replace(status, state=GoalState.REJECTED, reason=reason)
 
 
-def _reading(state: State, goal: Goal) -> Reading | Ambiguity:
+def _reading(state: State, goal: Goal, text: str) -> Reading | Ambiguity:
     if goal.conditions:
         return Reading(goal.text, (WantedGoal((goal.conditions,)),))
-    vocabulary = state.vocabulary()
-    if goal.speaker is not None and not vocabulary.is_person(goal.speaker):
-        known = sorted(filter(vocabulary.is_person, state.objects))
-        raise NotUnderstood(
-            f"{goal.speaker!r}, who says it, is no person that is known; "
-            f"known are {', '.join(known) or 'none'}"
-        )
-    found = read(goal.text, changed(vocabulary, speaker=goal.speaker))
+    found = read(text, state.vocabulary().spoken_by(goal.speaker))
     if isinstance(found, Ambiguity) and goal.meant is not None:
         return dict(found.candidates).get(goal.meant, found)
     return found
 
 
-def _one_goal(reading: Reading) -> WantedGoal:
+def one_goal(reading: Reading) -> WantedGoal:
     """What a reading wants, if that is something which the fleet can carry out; who wants to have
     it done where something is wants it found.
 
@@ -132,20 +174,19 @@ def _in_force(state: State, goal: Goal, wanted: WantedGoal) -> Goal:
     due_s = goal.due_s
     if due_s is None and wanted.due_s is not None:
         due_s = (goal.said_s or state.time_s) + wanted.due_s
-    rows = [Precedence(first=first, then=then) for first, then in wanted.before]
     return replace(
         goal,
         priority=goal.priority or wanted.priority,
         due_s=due_s,
         always=tuple(dict.fromkeys((*goal.always, *wanted.always))),
         never=tuple(dict.fromkeys((*goal.never, *wanted.never))),
-        sometime_before=tuple(dict.fromkeys((*goal.sometime_before, *rows))),
     )
 
 
 def _note(state: State, reading: Reading) -> str | None:
     """What a goal's sentence says besides what must hold, so that no word is lost unseen."""
-    notes = [f"{remark!r} asks for nothing" for remark in reading.remarks]
+    notes = [f"{use.said!r} is taken for: {use.text}" for use in reading.methods]
+    notes += [f"{remark!r} asks for nothing" for remark in reading.remarks]
     facts = FactValues(state.facts)
     for literal in reading.presumed:
         (relation, subject), value = literal

@@ -20,11 +20,14 @@ from fleet.core.state_updates import (
     touch,
     without_goal,
 )
-from fleet.core.understanding import understood
+from fleet.core.understanding import Understood, understood
 from fleet.language import Reading
 from keyexpr_schema.facts import AT, IN, ON, SEARCHED
-from keyexpr_schema.payloads.goals import Goal, GoalState, GoalStatus
+from keyexpr_schema.payloads.goals import Goal, GoalState
 from keyexpr_schema.payloads.world import Fact
+
+IN_OTHER_WORDS_SINCE_LOGIC = 5
+"""Before, a language model was asked about questions back, too, and what the fleet cannot do."""
 
 
 def goal_put(state: State, event: events.GoalPut) -> State:
@@ -33,10 +36,13 @@ def goal_put(state: State, event: events.GoalPut) -> State:
     if state.goal_specs.get(goal.goal, state.goals.get(goal.goal)) == goal:
         return state
     known_ended = goal.goal not in state.goals and goal.goal in state.goal_states
+    before = state.goal_specs.get(goal.goal, state.goals.get(goal.goal))
+    same_words = before is not None and (goal.text, goal.speaker) == (before.text, before.speaker)
+    asked = state.goal_states.get(goal.goal) if same_words else None
     state = set_spec(state, goal)
     if known_ended:
         return state  # under an earlier planner
-    return _take_goal(state, goal)
+    return _take_goal(state, goal, understood(state, goal, None, asked))
 
 
 def goal_deleted(state: State, event: events.GoalDeleted) -> State:
@@ -69,7 +75,10 @@ def _goal_taken_out(state: State, entry: PlanEntry, goal: str) -> State:
 
 
 def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
-    """Take over what a language model read in a goal's sentence, or that it read nothing."""
+    """Read how a language model says a goal's sentence, or take over that it knows no other words.
+
+    What models of earlier versions have read in one is taken over as it was.
+    """
     goal = state.goals.get(event.goal)
     if event.goal not in state.interpreting or (
         goal is not None and event.text not in (None, goal.text)
@@ -79,6 +88,10 @@ def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
     status = state.goal_states.get(event.goal)
     if status is None:
         return state
+    if event.paraphrase is not None and goal is not None:
+        said = replace(status, paraphrase=event.paraphrase)
+        goal = state.goal_specs.get(goal.goal, goal)
+        return _take_goal(state, goal, understood(state, goal, said))
     if not event.stages:
         reason = f"{status.reason}; a language model did not understand it either: {event.reason}"
         return set_goal(state, replace(status, state=GoalState.REJECTED, reason=reason))
@@ -103,11 +116,12 @@ def understand_again(state: State) -> State:
         goal = state.goal_specs.get(goal.goal, goal)
         read = understood(state, goal, status)
         if status.state is GoalState.REJECTED and read.status.reason != status.reason:
-            state = _take_goal(state, goal, status)
+            state = _take_goal(state, goal, read)
         elif (
             status.state is GoalState.WAITING
             and read.status.stages
             and read.status.stages != status.stages
+            and read.status.paraphrase == status.paraphrase
         ):
             # "some robot" now has more to choose from
             state = set_goal(set_spec(state, goal, read.goal), read.status)
@@ -131,20 +145,26 @@ def next_stage(state: State, goal: str) -> State:
     return _begin_stage(set_goal(state, status), goal)
 
 
-def _take_goal(state: State, goal: Goal, known: GoalStatus | None = None) -> State:
+def _take_goal(state: State, goal: Goal, read: Understood) -> State:
     """Say what a goal means; a sentence that the grammar refuses may go to a language model."""
-    read = understood(state, goal, known)
     status = read.status
     state = set_goal(set_spec(state, goal, read.goal), status)
     state = _presume(state, goal.goal, read.reading)
     source = f"{PLANNER_SOURCE}:{goal.goal}"
     state, _ = take_word(state, read.reading.facts, source, goal.said_s or state.time_s)
-    if status.state is GoalState.REJECTED and state.policy.interpreter and not goal.conditions:
-        state = set_goal(state, replace(status, state=GoalState.READING))
+    if state.policy.interpreter and _is_for_model(state, goal, read):
+        state = set_goal(state, replace(status, state=GoalState.READING, refusal=status.reason))
         interpreting = tuple(dict.fromkeys([*state.interpreting, goal.goal]))
         state = replace(state, interpreting=interpreting)
         return touch(state, Touch(Part.INTERPRETING, goal.goal))
     return _begin_stage(_without_reading(state, goal.goal), goal.goal)
+
+
+def _is_for_model(state: State, goal: Goal, read: Understood) -> bool:
+    """Whether a language model is asked to say a goal's sentence in other words."""
+    if state.logic < IN_OTHER_WORDS_SINCE_LOGIC:
+        return read.status.state is GoalState.REJECTED and not goal.conditions
+    return read.unread
 
 
 def _without_reading(state: State, goal: str) -> State:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace as changed
 
 from msgspec.structs import replace
 
@@ -294,12 +293,10 @@ def _sentence(state: State, ask: ControlRequest) -> TaskAdded | str:
             f'{DO} takes text="a sentence", robot=NAME if one robot shall do it, and speaker=NAME '
             "of the person who says it, if that is somebody"
         )
-    if speaker is not None and not state.vocabulary().is_person(speaker):
-        return f"there is no person {speaker}"
     if robot is not None and robot not in state.robots:
         return f"there is no robot {robot}; known are {', '.join(sorted(state.robots)) or 'none'}"
     try:
-        stages = read_goal(text, changed(state.vocabulary(), speaker=speaker)).stages
+        stages = read_goal(text, state.vocabulary().spoken_by(speaker)).stages
     except NotUnderstood as error:
         return f"{text!r}: {error}"
     return TaskAdded(

@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
 from fleet.language.resolve.frames import SAY_IT, framed, frames_of
+from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention
-from fleet.language.resolve.nouns import NounResolver
-from fleet.language.resolve.places import PlaceResolver
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import PLACES, THINGS, Scene
+from fleet.language.resolve.scene import PLACES, THINGS
 from fleet.language.resolve.states import of_each
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.tagger import Lexeme
@@ -35,18 +33,8 @@ from keyexpr_schema.facts import (
 class Claims:
     """Collects facts; a later one may not contradict an earlier one."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        who: Referents,
-        nouns: NounResolver,
-        places: PlaceResolver,
-        wishes: Wishes,
-    ) -> None:
-        self.scene = scene
-        self.who = who
-        self.nouns = nouns
-        self.places = places
+    def __init__(self, ground: Ground, wishes: Wishes) -> None:
+        self.scene, self.who, self.nouns, self.places = ground
         self.wishes = wishes
 
     def fact(self, relation: str, subject: str, value: Value) -> None:

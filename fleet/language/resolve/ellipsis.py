@@ -8,34 +8,24 @@ from fleet.errors import NotUnderstood
 from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.frames import EXAMPLE, framed
-from fleet.language.resolve.mentions import Subject
-from fleet.language.resolve.nouns import NounResolver
+from fleet.language.resolve.ground import Ground
+from fleet.language.resolve.mentions import NounPhrase, Subject
 from fleet.language.resolve.places import WHERE, Where
-from fleet.language.resolve.referents import Referents
-from fleet.language.resolve.scene import PLACES, THINGS, Scene
+from fleet.language.resolve.scene import PLACES, THINGS
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import (
     Clause,
     Nouns,
     Place,
+    Quantity,
 )
 
 
 class Continuations:
     """Turns clauses that go on from one before into wishes."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        who: Referents,
-        nouns: NounResolver,
-        wishes: Wishes,
-        claims: Claims,
-        commands: Commands,
-    ) -> None:
-        self.scene = scene
-        self.who = who
-        self.nouns = nouns
+    def __init__(self, ground: Ground, wishes: Wishes, claims: Claims, commands: Commands) -> None:
+        self.scene, self.who, self.nouns, self.places = ground
         self.wishes = wishes
         self.claims = claims
         self.commands = commands
@@ -123,6 +113,10 @@ class Continuations:
         noun = self.nouns.subject(clause.subject.items[0], ("object",), "an object")
         will_do = self.who.resolve(self.who.movable(noun)).subjects
         asked = [m for m in self.scene.said.recent if m.open and set(m.subjects) & set(will_do)]
+        speaker = self.scene.vocabulary.speaker
+        anything = isinstance(noun, NounPhrase) and noun.quantity is Quantity.ANY
+        if not asked and anything and not clause.arguments and speaker and not self.scene.mode:
+            return self._to_person(clause.subject, speaker)  # "some fruit would be nice"
         if len(asked) != 1:
             raise NotUnderstood(
                 f"{self.scene.said.clause!r}: nothing was asked for before that it could do for"
@@ -132,3 +126,4 @@ class Continuations:
         if clause.arguments:
             where, home = self.wishes.whereto(framed(clause.arguments))
             self.wishes.to_target([meant], where, home)
+        return None

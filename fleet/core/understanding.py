@@ -95,7 +95,7 @@ def _in_other_words(
         if asked.refusal != refusal:  # there are other names now
             return Understood(_rejected(status, refusal), goal, unread=True)
         return Understood(_rejected(replace(status, refusal=refusal), asked.reason or ""), goal)
-    status = replace(status, refusal=refusal, paraphrase=words)
+    status = replace(status, refusal=refusal, paraphrase=words, teaches=asked.teaches)
     said = f"a language model says {goal.text!r} as {words!r}"
     try:
         read = _taken(state, goal, status, _reading(state, goal, words))

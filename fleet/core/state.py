@@ -23,7 +23,7 @@ from keyexpr_schema.payloads.requests import Answer
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Fact, Object, Place, Statement, StatementStatus
 
-LOGIC = 4
+LOGIC = 5
 """Counts up whenever the core comes to handle an event otherwise than before."""
 
 
@@ -87,7 +87,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     team_number: int = 0
     """Counts the times that a robot has come, or came to be planned with."""
     waiting_for_robots: Table[str, int] = Table()
-    """Goals without a plan that no robot could help with, and `team_number` then."""
+    """Goals without a plan that no robot could help with, and `team_number` then; -1 for those that
+    are planned at once without being asked for, since their time has come."""
     plans: Table[str, PlanEntry] = Table()
     past_plans: tuple[str, ...] = ()
     plans_made: int = 0

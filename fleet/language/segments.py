@@ -10,15 +10,16 @@ from fleet.language.words.times import TimePhrase
 
 _OPENING = frozenset({"KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID", "ASKWHERE"})
 _CLAUSAL = _OPENING | {"VERB", "FIN", "GER", "BE", "MODAL", "HAVE", "PREP", "CAUSE", "BELONG"}
-_CONDITIONS = {"IF": "when", "WHEN": "when", "UNLESS": "unless"}
+_CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless"}
 
 
 @dataclass(frozen=True)
 class Segment:
     """Words that are parsed together.
 
-    `joint` is what stands before them: "", "and" or "then". `role`: `when` or `unless` for a
-    condition, else "". `dangling`: an "and" or "then" that nothing follows stands behind them.
+    `joint` is what stands before them: "", "and" or "then". `role`: `if`, `when` or `unless`
+    for a condition, else "". `dangling`: an "and" or "then" that nothing follows stands behind
+    them.
     """
 
     words: tuple[Lexeme, ...]
@@ -202,7 +203,7 @@ def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
     if words and words[0].words == ("should",):  # "should the door be open, close it"
         end = next((j for j, word in enumerate(words) if "COMMA" in word.tags), None)
         if end is not None:
-            return [("when", list(words[:end])), ("", list(words[end + 1 :]))]
+            return [("if", list(words[:end])), ("", list(words[end + 1 :]))]
     return [("", list(words))]
 
 

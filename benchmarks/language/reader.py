@@ -46,7 +46,7 @@ Answer = Read | AskedBack | Refused
 def answer(text: str, world: str) -> Answer:
     """What the product makes of a text that is said in that world."""
     try:
-        found = read(text, _vocabulary(world), NOW)
+        found = read(text, vocabulary_of(world), NOW)
     except NotUnderstood as refused:
         return Refused(str(refused))
     if isinstance(found, Ambiguity):
@@ -55,7 +55,8 @@ def answer(text: str, world: str) -> Answer:
 
 
 @cache
-def _vocabulary(name: str) -> Vocabulary:
+def vocabulary_of(name: str) -> Vocabulary:
+    """All that can be spoken of in a world of the suite."""
     world = load_language_world(name)
     carriers = {thing: world.carriers(thing) for thing in (*world.objects, *world.robots)}
     skills = skills_of(world)

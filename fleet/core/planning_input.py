@@ -79,14 +79,15 @@ class PlanningInput(msgspec.Struct, frozen=True, kw_only=True, tag="plan"):
 
 
 class InterpretationInput(msgspec.Struct, frozen=True, kw_only=True, tag="interpret"):
-    """A goal's sentence for a language model, with the names and relations it can use."""
+    """A goal's sentence, which the grammar refuses, for a language model: with the reason, and with
+    the names and skills that other words for it can use."""
 
     time_s: float
     wall_time_s: float
     goal: str
     text: str
+    refusal: str
     vocabulary: Vocabulary
-    skills: dict[str, SkillModel]
 
 
 def planning_input(state: State, job: PlanningJob) -> PlanningInput:
@@ -133,13 +134,14 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
 
 
 def interpretation_input(state: State, goal: str) -> InterpretationInput:
-    """A goal's sentence with what a language model needs to know to read it."""
+    """A goal's sentence with what a language model needs to know to say it otherwise."""
     words = state.vocabulary()
     return InterpretationInput(
         time_s=state.time_s,
         wall_time_s=state.wall_time_s,
         goal=goal,
         text=state.goals[goal].text,
+        refusal=state.goal_states[goal].refusal or "",
         vocabulary=changed(
             words,
             places=dict(words.places),
@@ -151,7 +153,6 @@ def interpretation_input(state: State, goal: str) -> InterpretationInput:
             believed=dict(words.believed),
             speaker=state.goals[goal].speaker,
         ),
-        skills=state.skills,
     )
 
 

@@ -33,6 +33,21 @@ class WantedGoal:
 
 
 @dataclass(frozen=True)
+class MethodUse:
+    """A task that a text called by name (`said`), and the method by which it is done here.
+
+    `text` is what the method says, with parameters filled in; `number` counts the task's methods
+    from 1, and `passed_over` are those before it, and why they cannot be taken.
+    """
+
+    said: str
+    task: str
+    number: int
+    text: str
+    passed_over: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
 class Reading:
     """What a text asks for, says or asks.
 
@@ -47,6 +62,8 @@ class Reading:
     question: Question | None = None
     presumed: tuple[Literal, ...] = ()
     remarks: tuple[str, ...] = ()
+    methods: tuple[MethodUse, ...] = ()
+    """How the tasks are done that it calls by name."""
 
     @property
     def stages(self) -> tuple[tuple[Condition, ...], ...]:

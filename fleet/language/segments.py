@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from fleet.language.tagging.tagger import Lexeme
 from fleet.language.words.times import TimePhrase
 
-_OPENING = frozenset({"KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID", "ASKWHERE"})
+_OPENING = frozenset({"KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID"})
+_ASKED = frozenset({"WHERE", "HOWMANY", "WHICH", "WHAT", "WHO"})
 _CLAUSAL = _OPENING | {"VERB", "FIN", "GER", "BE", "MODAL", "HAVE", "PREP", "CAUSE", "BELONG"}
 _CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless"}
 
@@ -79,6 +80,7 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             urgent = urgent or -1
         elif "POLITE" not in word.tags or word.tags & {"NOUN"}:
             kept.append(word)
+    kept = _asked(kept)
     while kept and (kept[0].words == ("but",) or "COMMA" in kept[0].tags):
         kept.pop(0)  # "no rush, but …"
     segments: list[Segment] = []
@@ -114,6 +116,27 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
     return Sentence(
         tuple(words), tuple(segments), tuple(times), urgent, dangling, named, telegraphic
     )
+
+
+def _asked(words: list[Lexeme]) -> list[Lexeme]:
+    """Without "tell me" and the like before a question, and with "tell me if" as one."""
+    if len(words) > 2 and "TAG" in words[-1].tags and "COMMA" in words[-2].tags:
+        words = [replace(words[-1], tags=frozenset({"ASKIF"})), *words[:-2]]  # "…, isn't it?"
+    kept: list[Lexeme] = []
+    for i, word in enumerate(words):
+        following = words[i + 1].tags if i + 1 < len(words) else frozenset()
+        if "ASK" in word.tags and following & {"IF", "WHETHER"}:
+            kept.append(replace(words[i + 1], tags=frozenset({"ASKIF"})))
+        elif (
+            kept
+            and kept[-1] is not word
+            and "ASK" in words[i - 1].tags
+            and word.tags & {"IF", "WHETHER"}
+        ):
+            continue
+        elif not ("ASK" in word.tags and following & _ASKED):
+            kept.append(word)
+    return kept
 
 
 def _content(words: Sequence[Lexeme]) -> list[Lexeme]:

@@ -9,6 +9,7 @@ from functools import cached_property
 import msgspec
 
 from fleet.errors import NotUnderstood
+from fleet.language.methods.model import OBJECT, PERSON, PLACE, ROBOT, CompoundTask
 from fleet.language.words.wordbook import Wordbook, shipped_language
 from keyexpr_schema.facts import FactKey, Value
 from keyexpr_schema.payloads.robots import RobotSpec
@@ -86,6 +87,8 @@ class Vocabulary:
     believed: Mapping[FactKey, Value] = field(default_factory=dict)
     language: Wordbook | None = None
     state_words: tuple[StateWord, ...] = ()
+    tasks: tuple[CompoundTask, ...] = ()
+    """What people call by names of its own: "set the table"."""
 
     @property
     def wordbook(self) -> Wordbook:
@@ -132,3 +135,20 @@ class Vocabulary:
                 f"{speaker!r}, who says it, is no person that is known; known are {known}"
             )
         return replace(self, speaker=speaker)
+
+    def of_type(self, type_: str) -> frozenset[str]:
+        """All that is of a type as files write it: `place`, `person`, `robot`, `object`, or kinds,
+        categories and features of things (`cup & openable | glass`)."""
+        if type_ == PLACE:
+            return frozenset(self.places)
+        if type_ == ROBOT:
+            return frozenset(self.robots)
+        if type_ == PERSON:
+            return frozenset(filter(self.is_person, self.objects))
+        if type_ == OBJECT:
+            return frozenset(self.objects)
+        return frozenset(name for name, thing in self.objects.items() if _is_of(thing, type_))
+
+    def can(self, skill: str) -> bool:
+        """Whether a skill of that name can be asked for by name."""
+        return any(skill in (each.skill, each.verb) for each in self.skill_phrases)

@@ -83,7 +83,7 @@ class Goal(Payload, frozen=True, kw_only=True):
     never: tuple[Condition, ...] = ()
     sometime_before: tuple[Precedence, ...] = ()
     meant: str | None = None
-    """Of several things that the text can mean, this one: a candidate of `GoalStatus`."""
+    """What the text means, of what it can mean: a candidate of `GoalStatus`."""
     when: tuple[Condition, ...] = ()
     only_if: tuple[Condition, ...] = ()
     not_before_s: float | None = None
@@ -104,7 +104,7 @@ class GoalState(str, Enum):
     """Where a goal stands."""
 
     READING = "reading"
-    """A language model works out what the sentence means."""
+    """A language model says the sentence in simpler words."""
     WAITING = "waiting"
     PLANNED = "planned"
     RUNNING = "running"
@@ -155,7 +155,12 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     understood: str | None = None
     """What the sentence was understood as, said back in words."""
     candidates: tuple[str, ...] = ()
-    """What the sentence can mean, where that is several things; somebody has to say which."""
+    """What the sentence can mean, where that is several things, or where a language model has said
+    it in other words; somebody has to say which is meant."""
+    refusal: str | None = None
+    """Why the grammar does not take the sentence, where a language model was asked about it."""
+    paraphrase: str | None = None
+    """What the language model says in its place, in sentences that the grammar reads."""
     given_s: float | None = None
     given_wall_s: float | None = None
     time_s: float = 0.0

@@ -31,21 +31,27 @@ from keyexpr_schema.facts import AT, IN, ON
 from keyexpr_schema.payloads.goals import ENDED_GOALS, Goal, GoalState
 from keyexpr_schema.payloads.world import Fact
 
+IN_OTHER_WORDS_SINCE_LOGIC = 5
+"""Before, a language model was asked about questions back, too, and what the fleet cannot do."""
+
 
 def goal_put(state: State, event: events.GoalPut) -> State:
     """Keep the goal and say what it is understood to mean; a changed goal begins anew."""
     goal = event.goal
     if state.goal_specs.get(goal.goal, state.goals.get(goal.goal)) == goal:
         return state
-    known = state.goal_states.get(goal.goal)
-    if goal.goal not in state.goals:
-        if known is not None and known.state in ENDED_GOALS:
-            return set_spec(state, goal)  # under an earlier planner
-        return _take_goal(state, goal, understood(state, goal, known))
+    known, before = state.goal_states.get(goal.goal), state.goals.get(goal.goal)
+    if before is None and known is not None and known.state in ENDED_GOALS:
+        return set_spec(state, goal)  # under an earlier planner
+    said = None if before is None else state.goal_specs.get(goal.goal, before)
+    same_words = said is not None and (goal.text, goal.speaker) == (said.text, said.speaker)
+    asked = known if same_words else None
+    if before is None:
+        return _take_goal(state, goal, understood(state, goal, known, asked))
     for part in known.parts if known is not None else ():
         state = _dropped(state, part)
     state = replace(state, waiting_for_robots=state.waiting_for_robots.without(goal.goal))
-    state = _take_goal(state, goal, understood(state, goal, None))
+    state = _take_goal(state, goal, understood(state, goal, None, asked))
     if state.goal_states[goal.goal].state in (*HELD, GoalState.NOT_NEEDED):
         state = _without_work(state, goal.goal, f"goal {goal.goal} is for later now")
     return state
@@ -92,7 +98,10 @@ def _goal_taken_out(state: State, entry: PlanEntry, goal: str, sentence: str) ->
 
 
 def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
-    """Take over what a language model read in a goal's sentence, or that it read nothing."""
+    """Read how a language model says a goal's sentence, or take over that it knows no other words.
+
+    What models of earlier versions have read in one is taken over as it was.
+    """
     goal = state.goals.get(event.goal)
     if event.goal not in state.interpreting or (
         goal is not None and event.text not in (None, goal.text)
@@ -102,6 +111,10 @@ def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
     status = state.goal_states.get(event.goal)
     if status is None:
         return state
+    if event.paraphrase is not None and goal is not None:
+        said = replace(status, paraphrase=event.paraphrase)
+        goal = state.goal_specs.get(goal.goal, goal)
+        return _take_goal(state, goal, understood(state, goal, said))
     if not event.stages:
         reason = f"{status.reason}; a language model did not understand it either: {event.reason}"
         return set_goal(state, replace(status, state=GoalState.REJECTED, reason=reason))
@@ -133,6 +146,7 @@ def understand_again(state: State) -> State:
             status.state is GoalState.WAITING
             and read.status.stages
             and read.status.stages != status.stages
+            and read.status.paraphrase == status.paraphrase
         ):
             # "some robot" now has more to choose from
             state = set_goal(set_spec(state, goal, read.goal), read.status)
@@ -163,8 +177,8 @@ def _take_goal(state: State, goal: Goal, read: Understood) -> State:
     state = _presume(state, goal.goal, read.reading)
     source = f"{PLANNER_SOURCE}:{goal.goal}"
     state, _ = take_word(state, read.reading.facts, source, goal.said_s or state.time_s)
-    if status.state is GoalState.REJECTED and state.policy.interpreter and not goal.conditions:
-        state = set_goal(state, replace(status, state=GoalState.READING))
+    if state.policy.interpreter and _is_for_model(state, goal, read):
+        state = set_goal(state, replace(status, state=GoalState.READING, refusal=status.reason))
         interpreting = tuple(dict.fromkeys([*state.interpreting, goal.goal]))
         state = replace(state, interpreting=interpreting)
         return touch(state, Touch(Part.INTERPRETING, goal.goal))
@@ -173,6 +187,13 @@ def _take_goal(state: State, goal: Goal, read: Understood) -> State:
         state = with_part(state, goal.goal, part, means)
         state = begin(state, state.goal_states[goal.goal].parts[-1])
     return begin(state, goal.goal) if status.state is not GoalState.REJECTED else state
+
+
+def _is_for_model(state: State, goal: Goal, read: Understood) -> bool:
+    """Whether a language model is asked to say a goal's sentence in other words."""
+    if state.logic < IN_OTHER_WORDS_SINCE_LOGIC:
+        return read.status.state is GoalState.REJECTED and not goal.conditions
+    return read.unread
 
 
 def _without_reading(state: State, goal: str) -> State:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import reason_for
-from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of
+from fleet.language.resolve.frames import Frame, framed, frames_of, no_use
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.looking import ROBOTS_TELL, Looking
 from fleet.language.resolve.mentions import NounPhrase, Subject
@@ -21,10 +21,9 @@ from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tree.nodes import (
     Clause,
     Nouns,
+    Particle,
 )
-from keyexpr_schema.facts import (
-    AT,
-)
+from keyexpr_schema.facts import AT, HELD, LOCATED
 from keyexpr_schema.payloads.goals import Condition
 
 
@@ -89,9 +88,14 @@ class Commands:
         assert clause.verb is not None
         self._clause = clause
         problems: list[NotUnderstood] = []
-        frames = frames_of(self.scene.tagger, clause.verb, clause.arguments, ("VERB", "FIN", "GER"))
+        frames = frames_of(
+            self.scene.tagger, clause.verb, clause.arguments, ("VERB", "FIN", "GER", "PART")
+        )
         if not frames:
-            raise NotUnderstood(f"{clause.verb.text!r} is not understood as a goal: {EXAMPLE}")
+            behind = [word.lexeme.last for word in clause.arguments if isinstance(word, Particle)]
+            end = min([*behind[:1], clause.verb.last + 1, clause.last])
+            said = self.scene.said.quote(clause.verb.first, end)
+            raise no_use(self.scene.tagger, clause.verb, said)
         for frame, phrases in frames:
             before = self.scene.said
             self.scene.said = before.copy()
@@ -157,6 +161,20 @@ class Commands:
     def _check_who(self, who: Sequence[Subject] | None) -> None:
         if who is not None:
             self.who.check_who(who)
+
+    def on_whether_done(self, clause: Clause) -> None:
+        """`has anyone watered the fern?`: whether that is so which it would have made so."""
+        before = self.scene.said
+        self.scene.said = said = before.copy()
+        said.draft = GoalDraft(self.scene.vocabulary.is_at)
+        try:
+            self._verb(clause, None)
+            stages = self.scene.said.draft.conditions()
+        finally:
+            self.scene.said = before
+        if len(stages) != 1 or any(c.relation in (HELD, LOCATED) for c in stages[0]):
+            raise NotUnderstood(f"{said.clause!r} is a question that is not understood")
+        self.questions.whether(stages[0])
 
     def on_needs_doing(self, clause: Clause) -> None:
         """`the living room needs tidying up`."""

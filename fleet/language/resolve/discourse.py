@@ -42,12 +42,12 @@ class Discourse:
     """Whom a noun phrase means of several, by the token at which it begins, while that is asked."""
     extra: list[tuple[Mention, tuple[tuple[str, Value], ...]]] = field(default_factory=list)
     """States that are wanted as well: "bring me a cooked egg"."""
-    by: list[str] = field(default_factory=list)
-    """Robots that shall do it."""
     person: str | None = None
     """Whom "him" and "her" mean."""
     carrier: str | None = None
     """What something was put in or on last: "put the cup inside"."""
+    methods: list[Any] = field(default_factory=list)
+    """How tasks are done that were called by name."""
     goals: list[Any] = field(default_factory=list)
     """Goals that ended with their sentence, for which a time or condition was said."""
     again: Any = None
@@ -87,8 +87,8 @@ class Discourse:
             times=list(self.times),
             chosen=dict(self.chosen),
             extra=list(self.extra),
-            by=list(self.by),
             goals=list(self.goals),
+            methods=list(self.methods),
         )
 
     def quote(self, first: int, last: int) -> str:

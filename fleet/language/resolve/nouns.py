@@ -318,9 +318,7 @@ class NounResolver:
         spare = len(left.names) - len(opened)
         many = spare > 1 or made.plural
         if not gone or spare < 1 or (opened and other != "another" and many):
-            raise NotUnderstood(
-                f"{made.text!r} could be {' or '.join(made.names)}: call it by its name"
-            )
+            raise NotUnderstood(f"{made.text!r} could be {one_of(made.names)}: call it by its name")
         return replace(left, quantity=Quantity.ANY) if opened else left
 
     @property
@@ -339,13 +337,15 @@ class NounResolver:
     def unknown(self, noun: Noun, types: Sequence[EntityType], what: str) -> NotUnderstood:
         """The phrase names nothing known of these types."""
         strange = [word for word in noun.head if "UNK" in word.tags]
-        shown = self.scene.said.quote(noun.first, noun.last)
+        end = strange[-1].last if strange else noun.last
+        shown = self.scene.said.quote(noun.first, end)
         names = self.scene.lexicon.names_in(types) | set(ORDINALS)
         single = [word.text for word in strange] or [word.text for word in noun.head]
+        everyday = self.scene.tagger.book.everyday
         hint = ""
-        for part in (shown, " ".join(words_of(shown)), *single):
+        for part in (shown, " ".join(words_of(shown)), *single) if strange else ():
             if part.casefold() not in ORDINALS and not hint:
-                hint = suggestion(part, names)
+                hint = suggestion(part, names, everyday)
         known = nearest(self.scene.lexicon.known(types), " ".join(single))
         bare = what.removeprefix("a ").removeprefix("an ")
         return NotUnderstood(f"{shown!r} is not a known {bare}{hint}; known are {known}")
@@ -360,7 +360,7 @@ def _numbered(found: tuple[Entity, ...], number: int, text: str) -> tuple[Entity
         e for e in found if any(str(number) in name for name in e.names)
     )
     if not chosen:
-        known = ", ".join(dict.fromkeys(e.stands_for for e in found))
+        known = listed(dict.fromkeys(e.stands_for for e in found))
         raise NotUnderstood(f"{text!r}: there is no number {number}; known are {known}")
     return chosen
 

@@ -146,7 +146,12 @@ class Referents:
     @staticmethod
     def any_robot(subject: Subject) -> bool:
         """Whether it leaves open which robot."""
-        return isinstance(subject, NounPhrase) and subject.generic and subject.count is None
+        return (
+            isinstance(subject, NounPhrase)
+            and subject.generic
+            and subject.count is None
+            and subject.source is None
+        )
 
     def check_who(self, who: Sequence[Subject]) -> None:
         """Whether it can be said who does it.
@@ -161,7 +166,8 @@ class Referents:
                 if self.scene.mode != "goal":
                     mention = self.resolve(subject)
                     if not (mention.open and set(names) == set(self.scene.vocabulary.robots)):
-                        self.scene.said.by.extend(mention.subjects)
+                        draft = self.scene.said.draft
+                        draft.by = tuple(dict.fromkeys((*draft.by, *mention.subjects)))
                     continue
                 raise NotUnderstood(
                     f"{' and '.join(names)} cannot be told to do it: a goal says what must hold, "

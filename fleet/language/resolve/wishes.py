@@ -69,7 +69,7 @@ class Wishes:
         whereto = where.target is not None or bool(where.each) or home
         if inside is not None and not whereto:
             where = replace(where, target=inside, target_type="object")
-            where = replace(where, relation=self._relation_of(inside))
+            where = replace(where, relation=self.relation_of(inside))
         elif beneficiary is not None and not whereto and not (tidy and not fetch):
             where = replace(where, target=beneficiary, target_type="object")
         elif (to_speaker and not whereto) or (
@@ -115,7 +115,7 @@ class Wishes:
         rest = tuple(p for p in frame.particles if p not in inside)
         return replace(frame, particles=rest), carrier
 
-    def _relation_of(self, thing: str) -> str:
+    def relation_of(self, thing: str) -> str:
         good_for = self.scene.vocabulary.good_for.get(thing, ())
         return IN if Feature.CONTAINS in good_for else ON if Feature.SUPPORTS in good_for else AT
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import MutableMapping, Sequence
 from dataclasses import dataclass
 
 from fleet.language.tagging.lexicon import ENTITY_TYPES, Entity, Lexicon, lexicon_of
@@ -160,3 +161,24 @@ class Tagger:
             if tags is not None:
                 return at + length, tags
         return at, frozenset()
+
+
+_KEPT: deque[tuple[Vocabulary, Tagger]] = deque(maxlen=4)
+
+
+def tagger_of(vocabulary: Vocabulary) -> Tagger:
+    """The tagger of a vocabulary: made once for the very same names, where these cannot change."""
+    for known, tagger in _KEPT:
+        if (
+            known.places is vocabulary.places
+            and known.objects is vocabulary.objects
+            and known.robots is vocabulary.robots
+            and known.skill_phrases is vocabulary.skill_phrases
+            and known.wordbook is vocabulary.wordbook
+        ):
+            return tagger
+    tagger = Tagger(vocabulary)
+    mappings = (vocabulary.places, vocabulary.objects, vocabulary.robots)
+    if not any(isinstance(names, MutableMapping) for names in mappings):
+        _KEPT.append((vocabulary, tagger))
+    return tagger

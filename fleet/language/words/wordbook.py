@@ -74,8 +74,9 @@ class Wordbook:
     def __init__(self, words: Mapping[str, Iterable[str]], verbs: Mapping[str, Any]) -> None:
         found: dict[Phrase, set[str]] = defaultdict(set)
         self.remarks = tuple(map(phrase_of, words.get("REMARK", ())))
+        self.everyday = frozenset(words.get("EVERYDAY", ()))
         for tag, phrases in words.items():
-            if tag == "REMARK":
+            if tag in ("REMARK", "EVERYDAY"):
                 continue
             for text in phrases:
                 found[phrase_of(text)].add(tag)

@@ -118,7 +118,10 @@ def recurrence_of(goal: Goal) -> Recurrence:
 
 def when_shown(goal: Goal, at_s: float) -> str:
     """A time on the fleet's clock [s] in words: as clocks will show it, where that is known."""
-    shown = said_at(goal)
+    try:
+        shown = said_at(goal)
+    except NotUnderstood:
+        shown = None
     if shown is None:
         return f"{at_s:.0f} s on the fleet's clock"
     then = shown + timedelta(seconds=at_s - goal.said_s)

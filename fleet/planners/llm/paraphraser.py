@@ -12,7 +12,7 @@ from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Reading, Vocabulary, read
 from fleet.llm.budget import Budget
 from fleet.llm.conversation import GivenUp, LanguageModel, Rejected
-from fleet.llm.quoting import cleaned
+from fleet.llm.quoting import cleaned, printable
 from fleet.llm.structured_output import StructuredAnswer, read_answer, schema_of
 from fleet.planners.llm.prompt_text import frames_text, sentence_text
 
@@ -89,7 +89,7 @@ def _read(
     answer = read_answer(text, ParaphraseAnswer)
     if isinstance(answer, str):
         return Rejected.because("malformed", answer)
-    sentences = [" ".join(each.split()) for each in answer.sentences]
+    sentences = [" ".join(printable(each).split()) for each in answer.sentences]
     if not any(sentences):
         reason = cleaned(answer.reason).strip()
         return f"the language model says: {reason or 'it cannot be said in other words'}"

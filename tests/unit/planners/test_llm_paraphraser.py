@@ -84,6 +84,16 @@ def test_what_the_grammar_does_not_take_goes_back_with_the_reason(
     assert words in server.prompt(1)
 
 
+def test_what_a_model_says_cannot_write_to_a_terminal(model_client: ModelClient) -> None:
+    made, _ = paraphrase(
+        model_client, said("Bring cup 1\x1b[2J\u202e to the hallway."), max_repairs=0
+    )
+    assert "\x1b" not in str(made)
+    assert "\u202e" not in str(made)
+    made, _ = paraphrase(model_client, said("Bring cup 1\n to the hallway.\x07"))
+    assert made == Paraphrase("Bring cup 1 to the hallway.")
+
+
 def test_what_can_mean_several_things_is_left_to_people(model_client: ModelClient) -> None:
     made, server = paraphrase(model_client, said("Bring the cup to the living room."))
     assert made == Paraphrase("Bring the cup to the living room.")

@@ -25,7 +25,11 @@ class Going:
 
     def go(self, frame: Frame, who: Sequence[Subject] | None) -> None:
         """`go to PLACE`; any robot goes if nobody is named."""
-        if frame.home or (frame.particle_words & {"back"} and not frame.places):
+        back = bool(frame.particle_words & {"back"}) and not frame.places
+        if back and frame.verb == "come" and self.scene.vocabulary.speaker is not None:
+            here = Place("to", "", None, self.scene.said.began, self.scene.said.ended, "here")
+            return self.go(replace(frame, particles=(), places=(here,)), who)
+        if frame.home or back:
             raise NotUnderstood("a robot has no home: name the place where it shall go")
         if frame.verb in ("head for", "make for", "enter"):
             frame = self._headed_for(frame)

@@ -262,6 +262,7 @@ class Wishes:
             self._not_too_many(subject)
         self.scene.said.moved = list(moved)
         able = [self.who.drivers(self.who.movable(subject)) for subject in moved]
+        able = [self._at_home(subject) for subject in able] if home else able
         mentions = [self.from_where(subject, where) for subject in able]
         for mention in mentions:
             if home:
@@ -277,6 +278,14 @@ class Wishes:
             receiver = Mention((where.target,), "robot", self.scene.said.ended)
             self.scene.said.recent = [*self.scene.said.recent, receiver]
         return None
+
+    def _at_home(self, subject: Subject) -> Subject:
+        """Of "everything" what has a home."""
+        if not isinstance(subject, NounPhrase) or not subject.generic:
+            return subject
+        things = self.scene.vocabulary.objects
+        homely = subject.among([n for n in subject.names if self.is_spot(things[n].home)])
+        return homely if homely.found and subject.type == "object" else subject
 
     def _not_too_many(self, subject: Subject) -> None:
         """Whether so much may go to one place: "bring everything to the garage".

@@ -92,7 +92,18 @@ class NounResolver:
         if chosen is not None and set(chosen) <= set(made.names):
             several = Quantity.ALL if len(chosen) > 1 else made.quantity
             return replace(made.among(chosen), quantity=several, exact=True, source=None)
-        return self._salient(self._spoken_briefly(noun, made))
+        return self._where_sent(self._salient(self._spoken_briefly(noun, made)))
+
+    def _where_sent(self, made: NounPhrase) -> NounPhrase:
+        """Of several, those where somebody was just sent: "go to room 102, turn the light off"."""
+        if made.quantity is not Quantity.THE or made.plural or made.source is not None:
+            return made
+        last = self.scene.said.draft.stages[-1][-1:]
+        if made.ordinal is not None or len(made.names) < 2 or not (last and last[0].means):
+            return made
+        place, is_at = str(last[0].value), self.scene.vocabulary.is_at
+        there = made.among([name for name in made.names if is_at(name, place)])
+        return there if there.found else made
 
     def _spoken_briefly(self, noun: Noun, made: NounPhrase) -> NounPhrase:
         """Bare plurals of a sentence without articles are all of them: "lights off"."""
@@ -117,6 +128,10 @@ class NounResolver:
 
     def _described_by_words(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
         text = self.scene.said.quote(noun.first, noun.last)
+        if noun.floor:  # it can be cleaned; what lies on it is in the place, and nowhere in it
+            if "place" not in types or {"robot", "object"} & set(types):
+                raise self.unknown(noun, types, what)
+            types = ("place",)
         made = NounPhrase((), text, noun.first, noun.quantity, count=noun.count)
         made = self._headed(noun, made, types, what)
         made = self._owned(noun, made)

@@ -11,7 +11,7 @@ from datetime import datetime
 from fleet.errors import NotUnderstood
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
-from fleet.language.grammar.chart import NotGrammatical, parsed
+from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.reading import Ambiguity, Reading, WantedGoal
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.clauses import Clauses
@@ -28,12 +28,13 @@ from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.tokens import tokens_of
-from keyexpr_schema.facts import Literal
+from keyexpr_schema.facts import AT, Literal
 from keyexpr_schema.payloads.goals import Condition
 
 MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 80
+"""In one clause; of a long list one for each thing."""
 _CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 _NAMING = re.compile(r"not a known|as a goal")
@@ -108,7 +109,7 @@ class Reader:
                 said.elliptic, said.addressees, said.done, said.again = "", [], False, None
                 said.telegraphic = sentence.telegraphic
                 said.urgent = said.urgent or sentence.urgent
-                if timed or said.times or said.when:
+                if timed or said.times or said.when or said.only_if:
                     with suppress(NotUnderstood):  # the last sentence says it again
                         self._close(said, now)
                 said.times, said.time_words = list(sentence.times), sentence.time_words
@@ -139,7 +140,8 @@ class Reader:
         if (call := called(segment.words, self.tagger)) and not (segment.role or segment.always):
             return self._task(call, states)
         segment = replace(segment, words=spoken_out(segment.words))
-        if len(segment.words) > MOST_WORDS_TOGETHER:
+        words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
+        if words > MOST_WORDS_TOGETHER:
             raise NotUnderstood(
                 f"{len(segment.words)} words are too many for one clause: say it in several"
             )
@@ -157,6 +159,10 @@ class Reader:
                 except NotUnderstood as problem:
                     problems.append((cost, problem))
                 else:
+                    if question is not None and state.question is not None:
+                        twice = f"{self.line!r} asks two things: ask one at a time"
+                        problems.append((cost, NotUnderstood(twice)))
+                        continue
                     found.append(
                         _State(said, state.cost + cost, question or state.question, state.asked)
                     )
@@ -191,16 +197,16 @@ class Reader:
 
     def _each(self, which: WhichOne, segment: Segment, states: Sequence[_State]) -> list[_State]:
         """The readings in which a noun phrase means one, then another of those that it can."""
-        if len(which.names) > _CHOICES or len(states) > _CHOICES:
+        if len(which.choices) > _CHOICES or len(states) > _CHOICES:
             return []
         found: list[_State] = []
-        for name in which.names:
+        for meant in which.choices:
             forked = []
             for state in states:
                 if which.key in state.said.chosen:
                     return []
                 said = state.said.copy()
-                said.chosen[which.key] = name
+                said.chosen[which.key] = meant
                 asked = state.asked or str(which)
                 forked.append(_State(said, state.cost, state.question, asked))
             with suppress(NotUnderstood):
@@ -234,7 +240,10 @@ class Reader:
                     if not isinstance(value, bool):
                         raise NotUnderstood(f'{said.clause!r}: say "if …" with what holds then')
                     value = not value
-                said.when.append(Condition(relation=relation, subject=subject, value=value))
+                if relation == AT:
+                    relation = self.vocabulary.relation_to(str(value))
+                rows = said.when if segment.role == "when" else said.only_if
+                rows.append(Condition(relation=relation, subject=subject, value=value))
             said.elliptic = ""
         return said, scene.question
 
@@ -310,7 +319,8 @@ class Reader:
             raise NotUnderstood(f"{self.line!r} ends before it says what to do: {EXAMPLE}")
         goals = tuple(replace(goal, priority=said.urgent) for goal in said.goals)
         presumed = tuple(dict.fromkeys(said.presumed))
-        remarks, methods = tuple(self.remarks), tuple(dict.fromkeys(said.methods))
+        remarks = (*self.remarks, *said.remarks)
+        methods = tuple(dict.fromkeys(said.methods))
         return Reading(self.line, goals, facts, state.question, presumed, remarks, methods)
 
     def _close(self, said: Discourse, now: datetime | None) -> None:
@@ -331,17 +341,19 @@ class Reader:
                     () if number else tuple(dict.fromkeys(said.never)),
                     when=tuple(dict.fromkeys(said.when)),
                     by=by,
+                    only_if=tuple(dict.fromkeys(said.only_if)),
                 )
                 said.goals.append(timed(goal, said, now))
         elif said.times and self.mode == "fact":
             named = [(token.word, token.spoken) for token in self.tokens]
             reason = reason_for(named, "a fact")
             raise NotUnderstood(reason or f"{self.line!r} names a time, which a fact cannot")
-        elif said.times or said.when:
+        elif said.times or said.when or said.only_if:
             what = f"{said.time_words!r} names a time" if said.times else '"If" names a condition'
             raise NotUnderstood(f"{what}, but nothing is to be done then")
         said.draft = GoalDraft(self.vocabulary.is_at)
-        said.always, said.never, said.when, said.times = [], [], [], []
+        said.always, said.never, said.when, said.only_if = [], [], [], []
+        said.times = []
 
 
 def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Reading | Ambiguity:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import defaultdict, deque
-from collections.abc import Iterable, Iterator, MutableMapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -187,26 +187,6 @@ class Lexicon:
                 for name in names:
                     if name not in self._exact:
                         self._exact[name] = list(meant)
-
-
-_KEPT: deque[tuple[Vocabulary, Lexicon]] = deque(maxlen=4)
-
-
-def lexicon_of(vocabulary: Vocabulary) -> Lexicon:
-    """The lexicon of a vocabulary: made once for the very same places, objects and robots, where
-    those mappings cannot change."""
-    for known, lexicon in _KEPT:
-        if (
-            known.places is vocabulary.places
-            and known.objects is vocabulary.objects
-            and known.robots is vocabulary.robots
-        ):
-            return lexicon
-    lexicon = Lexicon(vocabulary)
-    mappings = (vocabulary.places, vocabulary.objects, vocabulary.robots)
-    if not any(isinstance(names, MutableMapping) for names in mappings):
-        _KEPT.append((vocabulary, lexicon))
-    return lexicon
 
 
 def _entities(vocabulary: Vocabulary) -> Iterator[Entity]:

@@ -109,7 +109,7 @@ class Reader:
                 said.elliptic, said.addressees, said.done, said.again = "", [], False, None
                 said.telegraphic = sentence.telegraphic
                 said.urgent = said.urgent or sentence.urgent
-                if timed or said.times or said.when:
+                if timed or said.times or said.when or said.only_if:
                     with suppress(NotUnderstood):  # the last sentence says it again
                         self._close(said, now)
                 said.times, said.time_words = list(sentence.times), sentence.time_words
@@ -242,7 +242,8 @@ class Reader:
                     value = not value
                 if relation == AT:
                     relation = self.vocabulary.relation_to(str(value))
-                said.when.append(Condition(relation=relation, subject=subject, value=value))
+                rows = said.when if segment.role == "when" else said.only_if
+                rows.append(Condition(relation=relation, subject=subject, value=value))
             said.elliptic = ""
         return said, scene.question
 
@@ -348,17 +349,19 @@ class Reader:
                     () if number else tuple(dict.fromkeys(said.never)),
                     when=tuple(dict.fromkeys(said.when)),
                     by=by,
+                    only_if=tuple(dict.fromkeys(said.only_if)),
                 )
                 said.goals.append(timed(goal, said, now))
         elif said.times and self.mode == "fact":
             named = [(token.word, token.spoken) for token in self.tokens]
             reason = reason_for(named, "a fact")
             raise NotUnderstood(reason or f"{self.line!r} names a time, which a fact cannot")
-        elif said.times or said.when:
+        elif said.times or said.when or said.only_if:
             what = f"{said.time_words!r} names a time" if said.times else '"If" names a condition'
             raise NotUnderstood(f"{what}, but nothing is to be done then")
         said.draft = GoalDraft(self.vocabulary.is_at)
-        said.always, said.never, said.when, said.times = [], [], [], []
+        said.always, said.never, said.when, said.only_if = [], [], [], []
+        said.times = []
 
 
 def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Reading | Ambiguity:

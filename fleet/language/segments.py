@@ -12,15 +12,16 @@ _OPENING = frozenset({"KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID"})
 _ASKED = frozenset({"WHERE", "HOWMANY", "WHICH", "WHAT", "WHO"})
 _CLAUSAL = _OPENING | {"VERB", "FIN", "GER", "BE", "MODAL", "HAVE", "PREP", "CAUSE", "BELONG"}
 _WISHED = frozenset({"should", "must", "ought", "has", "have", "needs", "need"})
-_CONDITIONS = {"IF": "when", "WHEN": "when", "UNLESS": "unless"}
+_CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless"}
 
 
 @dataclass(frozen=True)
 class Segment:
     """Words that are parsed together.
 
-    `joint` is what stands before them: "", "and" or "then". `role`: `when` or `unless` for a
-    condition, else "". `dangling`: an "and" or "then" that nothing follows stands behind them.
+    `joint` is what stands before them: "", "and" or "then". `role`: `if`, `when` or `unless`
+    for a condition, else "". `dangling`: an "and" or "then" that nothing follows stands behind
+    them.
     """
 
     words: tuple[Lexeme, ...]
@@ -91,7 +92,7 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             if "THEN" in word.tags and "NOUN" not in word.tags:
                 segments += _segment(begun, joint, role)
                 joint, begun = "then", []
-            elif word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest):
+            elif word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest, begun):
                 segments += _segment(begun, joint, role)
                 joint, begun = "and", []
             elif "WITHOUT" in word.tags and begun:
@@ -183,8 +184,9 @@ def _clausal(words: Sequence[Lexeme]) -> bool:
     return any(w.tags & _CLAUSAL and not w.tags & {"NOUN"} for w in words)
 
 
-def _opens(rest: Sequence[Lexeme]) -> bool:
-    """Whether what follows begins a clause, and cannot go on with a list."""
+def _opens(rest: Sequence[Lexeme], before: Sequence[Lexeme]) -> bool:
+    """Whether what follows begins a clause, and cannot go on with a list; none goes on with what
+    calls a task."""
     rest = list(rest[:2])
     if rest and rest[0].tags & {"AND", "COMMA"}:
         rest = rest[1:]
@@ -195,7 +197,7 @@ def _opens(rest: Sequence[Lexeme]) -> bool:
     tags = rest[0].tags
     if tags & _OPENING:
         return True
-    return "VERB" in tags and not tags & {"NOUN", "ADJ", "ORD"}
+    return "VERB" in tags and ("TASK" in before[-1].tags or not tags & {"NOUN", "ADJ", "ORD"})
 
 
 def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
@@ -279,7 +281,7 @@ def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
     if words and words[0].words == ("should",):  # "should the door be open, close it"
         end = next((j for j, word in enumerate(words) if "COMMA" in word.tags), None)
         if end is not None:
-            return [("when", list(words[:end])), ("", list(words[end + 1 :]))]
+            return [("if", list(words[:end])), ("", list(words[end + 1 :]))]
     return [("", list(words))]
 
 

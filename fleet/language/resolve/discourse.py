@@ -61,6 +61,7 @@ class Discourse:
     always: list[Condition] = field(default_factory=list)
     never: list[Condition] = field(default_factory=list)
     when: list[Condition] = field(default_factory=list)
+    only_if: list[Condition] = field(default_factory=list)
     times: list[TimePhrase] = field(default_factory=list)
     urgent: int = 0
     time_words: str = ""
@@ -84,6 +85,7 @@ class Discourse:
             always=list(self.always),
             never=list(self.never),
             when=list(self.when),
+            only_if=list(self.only_if),
             times=list(self.times),
             chosen=dict(self.chosen),
             extra=list(self.extra),

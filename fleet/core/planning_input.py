@@ -16,6 +16,7 @@ from fleet.core.model.preconditions import action_of
 from fleet.core.model.skills import SkillModel, Skills
 from fleet.core.model.world import Hopeless, WorldModel
 from fleet.core.plan_entry import PlanningJob
+from fleet.core.standing import standing_constraints
 from fleet.core.state import State
 from fleet.language import Vocabulary
 from keyexpr_schema.facts import SEARCHED, Literal
@@ -94,6 +95,7 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
     world = state.world()
     goals = [state.goals[goal] for goal in job.goals if goal in state.goals]
     reached = [g.goal for g in goals if state.goal_states[g.goal].state is GoalState.REACHED]
+    always, never = standing_constraints(state)
     entry = state.plans.get(job.plan)
     records = entry.records if entry is not None else {}
     return PlanningInput(
@@ -113,8 +115,8 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
                 goal,
                 conditions=_wanted(state.goal_states[goal.goal], world),
                 # What must hold until it is reached need not any longer.
-                always=() if goal.goal in reached else goal.always,
-                never=() if goal.goal in reached else goal.never,
+                always=() if goal.goal in reached else (*goal.always, *always),
+                never=() if goal.goal in reached else (*goal.never, *never),
                 sometime_before=state.goal_states[goal.goal].still_in_order(goal),
             )
             for goal in goals

@@ -95,7 +95,8 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     team_number: int = 0
     """Counts the times that a robot has come, or came to be planned with."""
     waiting_for_robots: Table[str, int] = Table()
-    """Goals without a plan that no robot could help with, and `team_number` then."""
+    """Goals without a plan that no robot could help with, and `team_number` then; -1 for those that
+    are planned at once without being asked for, since their time has come."""
     plans: Table[str, PlanEntry] = Table()
     past_plans: tuple[str, ...] = ()
     plans_made: int = 0

@@ -13,7 +13,7 @@ import msgspec
 from fleet.errors import NotUnderstood
 from fleet.language.methods.model import OBJECT, PERSON, PLACE, ROBOT, CompoundTask
 from fleet.language.words.wordbook import Wordbook, shipped_language
-from keyexpr_schema.facts import FactKey, Value
+from keyexpr_schema.facts import AT, IN, ON, FactKey, Value
 from keyexpr_schema.payloads.robots import RobotSpec
 from keyexpr_schema.payloads.world import Feature, Object, Place
 
@@ -116,6 +116,12 @@ class Vocabulary:
     def movable(self) -> frozenset[str]:
         """What can be moved."""
         return _abilities(self.objects).movable
+
+    def relation_to(self, name: str) -> str:
+        """What must hold of a thing that is at a place, or on or in another thing."""
+        good_for = self.good_for.get(name, frozenset())
+        on, within = Feature.SUPPORTS in good_for, Feature.CONTAINS in good_for
+        return AT if on == within else ON if on else IN
 
     def is_person(self, name: str) -> bool:
         """Whether somebody of that name is there, whom things can be given to."""

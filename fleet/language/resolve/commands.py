@@ -8,6 +8,7 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.frames import Frame, framed, frames_of, no_use
+from fleet.language.resolve.going import Going
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.looking import ROBOTS_TELL, Looking
 from fleet.language.resolve.mentions import NounPhrase, Subject
@@ -18,11 +19,7 @@ from fleet.language.resolve.stages import GoalDraft
 from fleet.language.resolve.tidiness import Tidiness
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.skill_words import SkillFrame
-from fleet.language.tree.nodes import (
-    Clause,
-    Nouns,
-    Particle,
-)
+from fleet.language.tree.nodes import Clause, Nouns, Particle, Quantity
 from keyexpr_schema.facts import AT, HELD, LOCATED
 from keyexpr_schema.payloads.goals import Condition
 
@@ -45,6 +42,7 @@ class Commands:
         self.skilled = skilled
         self.tidiness = tidiness
         self.questions = questions
+        self.going = Going(ground, wishes)
         self._clause: Clause | None = None
 
     def on_do(self, clause: Clause) -> None:
@@ -113,6 +111,8 @@ class Commands:
             except NotUnderstood as problem:
                 self.scene.said = before
                 problems.append(problem)
+                if self.skilled.fits(frame, phrases):
+                    break
         raise problems[0]
 
     def _for_me(self, frame: Frame, skills: Sequence[SkillFrame]) -> Frame:
@@ -137,13 +137,13 @@ class Commands:
             self.scene.said.again = self._clause
         self.scene.said.elliptic = "move" if senses & {"move", "go", "give"} else ""
         if "go" in senses and not frame.themes and ("move" not in senses or _whereto(frame)):
-            return self.wishes.go(frame, who)
+            return self.going.go(frame, who)
         if "patrol" in senses and any(not self.who.any_robot(s) for s in who or ()):
             self.who.check_robots(who or ())
             return self.looking.patrol(frame, who or ())
         self._check_who(who)
         if "bin" in senses:
-            return self.wishes.throw_away(frame)
+            return self.tidiness.throw_away(frame)
         if "clear" in senses and "tidy" not in senses:
             return self.tidiness.clear(frame)
         if "move" in senses and (frame.themes or "tidy" not in senses):
@@ -181,10 +181,22 @@ class Commands:
         assert clause.subject is not None and clause.verb is not None
         self._verb(replace(clause, arguments=(clause.subject, *clause.arguments)), None)
 
+    def on_none_there(self, clause: Clause) -> None:
+        """`no forklift in the packing area`."""
+        assert clause.subject is not None
+        where, home = self.wishes.whereto(framed(clause.arguments))
+        if where.target is None or home:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say where: name a place")
+        self.scene.said.never.extend(
+            Condition(relation=where.relation, subject=name, value=where.target)
+            for s in self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+            for name in (s.names if isinstance(s, NounPhrase) else s.subjects)
+        )
+
     def on_not_allowed(self, clause: Clause) -> None:
         """`Scout isn't allowed in the office`."""
         assert clause.subject is not None
-        who = self.nouns.subjects(clause.subject, ("robot",), "a robot")
+        who = self._all_of(clause.subject)
         names = [n for s in who for n in self.who.resolve(s).subjects]
         places = self._entered(framed(clause.arguments))
         self.scene.said.never.extend(
@@ -196,8 +208,17 @@ class Commands:
         assert clause.verb is not None
         who = None
         if clause.subject is not None:
-            who = self.nouns.subjects(clause.subject, ("robot",), "a robot")
+            who = self._all_of(clause.subject)
         self._never(clause, who)
+
+    def _all_of(self, nouns: Nouns) -> list[Subject]:
+        """The robots that must not: "robots" are all of them."""
+        return [
+            replace(s, quantity=Quantity.ALL)
+            if isinstance(s, NounPhrase) and s.plural and s.quantity is Quantity.BARE
+            else s
+            for s in self.nouns.subjects(nouns, ("robot",), "a robot")
+        ]
 
     def _never(self, clause: Clause, who: Sequence[Subject] | None) -> None:
         assert clause.verb is not None

@@ -88,8 +88,9 @@ class NounResolver:
         """
         made = self.located(noun, self._described_by_words(noun, types, what))
         chosen = self.scene.said.chosen.get(noun.first)
-        if chosen is not None and chosen in made.names:
-            return replace(made.among({chosen}), exact=True, source=None)
+        if chosen is not None and set(chosen) <= set(made.names):
+            several = Quantity.ALL if len(chosen) > 1 else made.quantity
+            return replace(made.among(chosen), quantity=several, exact=True, source=None)
         return self._salient(self._spoken_briefly(noun, made))
 
     def _spoken_briefly(self, noun: Noun, made: NounPhrase) -> NounPhrase:
@@ -100,18 +101,15 @@ class NounResolver:
         return made
 
     def _salient(self, made: NounPhrase) -> NounPhrase:
-        """Of several, the one that was spoken of last: "the plate" after "plate 2"."""
+        """Of several, the one that was spoken of: "the plate" after "plate 2"."""
         if made.quantity is not Quantity.THE or made.plural or made.source is not None:
             return made
         if made.ordinal is not None or made.count is not None or len(made.names) < 2:
             return made
-        for subjects in reversed(self.scene.said.named):
-            named = [name for name in made.names if name in subjects]
-            if len(named) == 1 == len(subjects):
-                return made.among(named)
-            if named:
-                return made
-        return made
+        named = {subjects for subjects in self.scene.said.named if set(subjects) & set(made.names)}
+        if any(len(subjects) > 1 for subjects in named):
+            return made
+        return made.among([name for (name,) in named]) if named else made
 
     def _described_by_words(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
         text = self.scene.said.quote(noun.first, noun.last)
@@ -236,7 +234,19 @@ class NounResolver:
         found = tuple(e for e in self.scene.lexicon.entities if e.type == entity_type)
         if entity_type not in types or not found:
             raise self.unknown(noun, types, what)
-        return replace(made, found=found, quantity=quantity, generic=entity_type == "object")
+        made = replace(made, found=found, quantity=quantity, generic=entity_type == "object")
+        narrowed = noun.relatives or noun.places or noun.but or noun.use
+        if "EVERYTHING" not in tags or narrowed or noun.first in self.scene.said.chosen:
+            return made
+        listed_ = self.listed()
+        return replace(made.among(listed_), generic=False, exact=True) if listed_ else made
+
+    def listed(self) -> tuple[str, ...]:
+        """Things that the text has named, one after the other: "everything" may be those."""
+        names = {n for m in self.scene.said.mentioned if m.type == "object" for n in m.subjects}
+        things = tuple(n for n in self.scene.vocabulary.objects if n in names)
+        several = len(things) > 1 and not any(m.open for m in self.scene.said.mentioned)
+        return things if several else ()
 
     def _owned(self, noun: Noun, made: NounPhrase) -> NounPhrase:
         """Those of an owner: of "Anna's mug" only those; of "my mug" those, if there are any."""

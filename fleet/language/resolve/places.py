@@ -83,7 +83,7 @@ class PlaceResolver:
             shown = [(word, word) for word in place.preposition.split()]
             raise NotUnderstood(reason_for(shown) or f"{text!r} is not understood")
         if place.special == "there":
-            return Locative("to", self._there(place, text))
+            return Locative(place.role, self._there(place, text))
         if place.special == "here":
             return Locative(place.role, self._here(text))
         if place.special in ("anywhere", "house", "home") or place.nouns is None:

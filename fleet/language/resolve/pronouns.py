@@ -65,9 +65,9 @@ class Pronouns:
         if word in PERSONAL and said.person is not None:
             return Mention((said.person,), "object", noun.first)
         if (chosen := said.chosen.get(noun.first)) is not None:
-            types_of = [m.type for m in said.recent if chosen in m.subjects]
+            types_of = [m.type for m in said.recent if set(chosen) & set(m.subjects)]
             of_type: EntityType = types_of[0] if types_of else "object"
-            return Mention((chosen,), of_type, noun.first)
+            return Mention(chosen, of_type, noun.first)
         if "object" not in types and "place" in types and word == "it" and said.last_place:
             return Mention((said.last_place,), "place", noun.first)
         plural = word in _PLURAL or len(noun.words) > 1

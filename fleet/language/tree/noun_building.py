@@ -22,7 +22,8 @@ COSTS = {"bare": 2, "whereto": 2, "named": 6, "told": 1, "being": 0, "item": 5, 
 _THINGS: frozenset[EntityType] = frozenset({"object", "robot"})
 SPOTS: frozenset[EntityType] = frozenset({"place", "surface", "robot"})
 _ALL = _THINGS | SPOTS
-_VERBS = ("VERB", "FIN", "GER", "PART")
+_ROOM = 50
+"""Numbers of things that "1 to 3" may name."""
 
 
 class NounBuilder:
@@ -135,6 +136,11 @@ class NounBuilder:
         made = self.make_noun(children[2:], start, end)
         if made is None:
             return None
+        owner = children[0]
+        if owner.quantity is Quantity.ALL or owner.part:  # "both of Ben's shirts"
+            made = replace(made, quantity=owner.quantity, count=owner.count, part=owner.part)
+            owner = replace(owner, quantity=Quantity.BARE, count=None, part=False, determiner="")
+            return replace(made, whose=owner)
         quantity = Quantity.THE if made.quantity is Quantity.BARE else made.quantity
         return replace(made, whose=children[0], quantity=quantity)
 
@@ -143,6 +149,7 @@ class NounBuilder:
         if any(place.role == "to" or place.special for place in places):
             return None
         nouns = [c for c in children[1:] if isinstance(c, Lexeme) and "BE" not in c.tags]
+        state = None if places else nouns.pop()
         first, last = self.span(start, end)
         return Noun(
             "noun" if nouns else "whatever",
@@ -150,8 +157,14 @@ class NounBuilder:
             last,
             Quantity.ALL,
             head=tuple(nouns[:1]),
-            relatives=(Relative(places),),
+            relatives=(Relative(places, state),),
         )
+
+    def make_general_so(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        states = tuple(c for c in children[1:] if isinstance(c, Lexeme))
+        use = next((c for c in children if isinstance(c, str) and not isinstance(c, Lexeme)), None)
+        noun = Noun("general", 0, 0, head=(children[0],), adjectives=states, use=use)
+        return self._placed_at(noun, start, end)
 
     def make_both_of(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         return self.make_nps(children[1:], start, end) if children[0].word == "both" else None
@@ -209,6 +222,10 @@ class NounBuilder:
         if len(numbers) > 1 and following & {"NOUN", "OF", "UNK"}:
             return None
         return _Numbers(tuple(n for n in numbers if n is not None))
+
+    def make_numbers_through(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        first, last = (c.number for c in children if "NUM" in c.tags)
+        return _Numbers(tuple(range(first, last + 1))) if 0 <= last - first < _ROOM else None
 
     def make_of(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         return _Of(tuple(c for c in children[1:] if isinstance(c, Lexeme)))

@@ -12,6 +12,7 @@ from fleet.language.words.morphology import gerund, participles, third_person
 from fleet.language.words.own_words import OwnWords, shipped_verbs, shipped_words
 from fleet.language.words.tokens import Phrase, tokens_of
 
+_CONTRACTED = frozenset({"that", "it", "there", "what", "who", "where", "somebody", "someone"})
 _GRAMMAR = frozenset(
     [
         "DET",
@@ -64,6 +65,14 @@ class VerbEntry:
         return " ".join((*self.head, *(word for chunk in self.behind for word in chunk)))
 
 
+def _contracted(phrase: Phrase) -> tuple[Phrase, ...]:
+    """The same also with `'s`: "when that is done", "when that's done"."""
+    for i in range(1, len(phrase)):
+        if phrase[i] in ("is", "has") and phrase[i - 1] in _CONTRACTED:
+            return phrase, (*phrase[:i], "'s", *phrase[i + 1 :])
+    return (phrase,)
+
+
 class Wordbook:
     """Words by tag, verbs by head, prepositions by role."""
 
@@ -75,7 +84,8 @@ class Wordbook:
             if tag in ("REMARK", "EVERYDAY"):
                 continue
             for text in phrases:
-                found[phrase_of(text)].add(tag)
+                for phrase in _contracted(phrase_of(text)):
+                    found[phrase].add(tag)
         self.roles: dict[Phrase, str] = {}
         for role, prepositions in verbs["prepositions"].items():
             for text in prepositions:

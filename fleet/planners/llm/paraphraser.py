@@ -7,7 +7,7 @@ from datetime import datetime
 
 import msgspec
 
-from fleet.core.understanding import one_goal
+from fleet.core.understanding import wanted_goals
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Reading, Vocabulary, read
 from fleet.llm.budget import Budget
@@ -54,7 +54,7 @@ class LlmParaphraser:
         refusal: str,
         vocabulary: Vocabulary,
         now: datetime | None = None,
-        check: Callable[[Reading], object] = one_goal,
+        check: Callable[[Reading], object] = wanted_goals,
         budget: Budget | None = None,
     ) -> Paraphrase | str:
         """The sentence in others that are read, as a goal, or a sentence that says why not.

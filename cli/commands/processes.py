@@ -123,6 +123,14 @@ def planner(
             help="Models of more skills than the household's; repeatable.",
         ),
     ] = None,
+    tasks: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--tasks",
+            metavar="FILE",
+            help="More tasks that goals can name than the household's; repeatable.",
+        ),
+    ] = None,
     llm_config: Annotated[
         Path | None,
         typer.Option(
@@ -192,6 +200,7 @@ def planner(
         realm=call.settings.realm,
         data_dir=data_folder(data, "planner", call.settings.realm),
         skill_files=tuple(skills or settings.skills),
+        task_files=tuple(tasks or settings.tasks),
         llm_file=llm_config or settings.llm_config,
         policy=Policy(
             approval=_first(approval, settings.approval, default.approval),

@@ -135,6 +135,36 @@ async def add(
     call.show(answer, lambda: answer.sentence)
 
 
+@command(app, "explain")
+async def explain(
+    call: Call,
+    text: Annotated[str, typer.Argument(metavar="TEXT", help='Such as "set the table for two".')],
+    speaker: Annotated[
+        str | None,
+        typer.Option(
+            "--speaker", metavar="PERSON", help='Who says it, of the people in the world: "me".'
+        ),
+    ] = None,
+) -> None:
+    """Say what a task that goals can name would mean here, and by which method; do nothing.
+
+    Exit code 1 where it means nothing here, with every method and why it cannot be taken.
+    """
+    from cli.client.planner_requests import ask_about_tasks
+    from cli.errors import Refused
+    from cli.views.named_tasks import explanation
+    from keyexpr_schema.payloads.methods import TasksQuery
+
+    async with call.session() as session:
+        reply = await ask_about_tasks(session, TasksQuery(text=text, speaker=speaker))
+    if reply.understood is not None or call.json:
+        call.show(reply, lambda: explanation(reply))
+    elif reply.called:
+        call.warn(explanation(reply))
+    if reply.understood is None:
+        raise Refused(reply.reason or "it was not understood")
+
+
 def parse_args(written: list[str]) -> dict[str, str]:
     """`["place=kitchen"]` as `{"place": "kitchen"}`.
 

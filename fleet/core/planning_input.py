@@ -16,6 +16,7 @@ from fleet.core.model.preconditions import action_of
 from fleet.core.model.skills import SkillModel, Skills
 from fleet.core.model.world import Hopeless, WorldModel
 from fleet.core.plan_entry import PlanningJob
+from fleet.core.standing import standing_constraints
 from fleet.core.state import State
 from fleet.language import Vocabulary
 from keyexpr_schema.facts import SEARCHED, Literal
@@ -78,14 +79,15 @@ class PlanningInput(msgspec.Struct, frozen=True, kw_only=True, tag="plan"):
 
 
 class InterpretationInput(msgspec.Struct, frozen=True, kw_only=True, tag="interpret"):
-    """A goal's sentence for a language model, with the names and relations it can use."""
+    """A goal's sentence, which the grammar refuses, for a language model: with the reason, and with
+    the names and skills that other words for it can use."""
 
     time_s: float
     wall_time_s: float
     goal: str
     text: str
+    refusal: str
     vocabulary: Vocabulary
-    skills: dict[str, SkillModel]
 
 
 def planning_input(state: State, job: PlanningJob) -> PlanningInput:
@@ -93,6 +95,7 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
     world = state.world()
     goals = [state.goals[goal] for goal in job.goals if goal in state.goals]
     reached = [g.goal for g in goals if state.goal_states[g.goal].state is GoalState.REACHED]
+    always, never = standing_constraints(state)
     entry = state.plans.get(job.plan)
     records = entry.records if entry is not None else {}
     return PlanningInput(
@@ -112,8 +115,8 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
                 goal,
                 conditions=_wanted(state.goal_states[goal.goal], world),
                 # What must hold until it is reached need not any longer.
-                always=() if goal.goal in reached else goal.always,
-                never=() if goal.goal in reached else goal.never,
+                always=() if goal.goal in reached else (*goal.always, *always),
+                never=() if goal.goal in reached else (*goal.never, *never),
                 sometime_before=state.goal_states[goal.goal].still_in_order(goal),
             )
             for goal in goals
@@ -131,13 +134,14 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
 
 
 def interpretation_input(state: State, goal: str) -> InterpretationInput:
-    """A goal's sentence with what a language model needs to know to read it."""
+    """A goal's sentence with what a language model needs to know to say it otherwise."""
     words = state.vocabulary()
     return InterpretationInput(
         time_s=state.time_s,
         wall_time_s=state.wall_time_s,
         goal=goal,
         text=state.goals[goal].text,
+        refusal=state.goal_states[goal].refusal or "",
         vocabulary=changed(
             words,
             places=dict(words.places),
@@ -149,7 +153,6 @@ def interpretation_input(state: State, goal: str) -> InterpretationInput:
             believed=dict(words.believed),
             speaker=state.goals[goal].speaker,
         ),
-        skills=state.skills,
     )
 
 

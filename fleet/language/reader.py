@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections import deque
-from collections.abc import MutableMapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 
 from fleet.errors import NotUnderstood
+from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
-from fleet.language.grammar.chart import NotGrammatical, parsed
+from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
 from fleet.language.reading import Ambiguity, Reading, WantedGoal
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.clauses import Clauses
@@ -21,42 +21,26 @@ from fleet.language.resolve.mentions import WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
 from fleet.language.segments import Segment, Sentence, cut, sentences_of
-from fleet.language.tagging.tagger import Lexeme, Tagger
+from fleet.language.tagging.tagger import Lexeme, tagger_of
+from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
+from fleet.language.timing import timed
 from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.tokens import tokens_of
-from keyexpr_schema.facts import Literal
+from keyexpr_schema.facts import AT, Literal
 from keyexpr_schema.payloads.goals import Condition
 
 MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 80
+"""In one clause; of a long list one for each thing."""
 _CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
 _READINGS = 12
 """Readings of what was read so far that are followed up."""
-_KEPT: deque[tuple[Vocabulary, Tagger]] = deque(maxlen=4)
-
-
-def tagger_of(vocabulary: Vocabulary) -> Tagger:
-    """The tagger of a vocabulary: made once for the very same names, where these cannot change."""
-    for known, tagger in _KEPT:
-        if (
-            known.places is vocabulary.places
-            and known.objects is vocabulary.objects
-            and known.robots is vocabulary.robots
-            and known.skill_phrases is vocabulary.skill_phrases
-            and known.wordbook is vocabulary.wordbook
-        ):
-            return tagger
-    tagger = Tagger(vocabulary)
-    mappings = (vocabulary.places, vocabulary.objects, vocabulary.robots)
-    if not any(isinstance(names, MutableMapping) for names in mappings):
-        _KEPT.append((vocabulary, tagger))
-    return tagger
 
 
 class _State:
@@ -72,8 +56,11 @@ class _State:
 class Reader:
     """Reads one text."""
 
-    def __init__(self, text: str, vocabulary: Vocabulary, mode: str = "") -> None:
-        """`mode`: only a `goal` or a `fact` is understood; else anything.
+    def __init__(
+        self, text: str, vocabulary: Vocabulary, mode: str = "", within: tuple[str, ...] = ()
+    ) -> None:
+        """`mode`: only a `goal` or a `fact` is understood; else anything. `within`: the tasks by
+        whose methods the text is said.
 
         Raises:
             NotUnderstood: the text is empty, or too long.
@@ -92,10 +79,12 @@ class Reader:
             )
         if not any(token.word[0].isalnum() for token in self.tokens):
             raise NotUnderstood(f"the sentence is empty: say {what}")
-        self.text, self.vocabulary, self.mode = text, vocabulary, mode
+        self.text, self.vocabulary, self.mode, self.within = text, vocabulary, mode, within
         self.tagger = tagger_of(vocabulary)
         self.remarks: list[str] = []
-        self.why = Explanations(text, self.tokens, self.tagger, mode)
+        self.later: Sequence[Sentence] = ()
+        """The sentences after the one that is being read, but for remarks."""
+        self.why = Explanations(text, self.tokens, self.tagger, mode, vocabulary.tasks)
         self.line = " ".join(text.split())
 
     def read(self, now: datetime | None) -> list[tuple[int, str, Reading]]:
@@ -107,9 +96,12 @@ class Reader:
         draft = GoalDraft(self.vocabulary.is_at)
         states = [_State(Discourse(self.text, self.tokens, draft, self.vocabulary.is_person))]
         lexemes = self.tagger.tagged(self.tokens, self.text)
+        if self.mode != "fact":
+            lexemes = marked(lexemes, self.tokens, self.text, self.vocabulary, self.tagger)
         dangling = False
-        for words in sentences_of(lexemes):
-            sentence = cut(words)
+        sentences = [cut(words) for words in sentences_of(lexemes)]
+        for number, sentence in enumerate(sentences):
+            self.later = [s for s in sentences[number + 1 :] if not self._said_of_oneself(s)]
             self.why.check(sentence)
             timed = bool(sentence.times) or any(part.role for part in sentence.segments)
             for state in states:
@@ -117,7 +109,7 @@ class Reader:
                 said.elliptic, said.addressees, said.done, said.again = "", [], False, None
                 said.telegraphic = sentence.telegraphic
                 said.urgent = said.urgent or sentence.urgent
-                if timed or said.times or said.when:
+                if timed or said.times or said.when or said.only_if:
                     with suppress(NotUnderstood):  # the last sentence says it again
                         self._close(said, now)
                 said.times, said.time_words = list(sentence.times), sentence.time_words
@@ -133,15 +125,23 @@ class Reader:
 
     # --- one sentence after the other -------------------------------------------------------------
     def _sentence(self, sentence: Sentence, states: list[_State]) -> list[_State]:
-        for segment in sentence.segments:
+        for number, segment in enumerate(sentence.segments):
             if segment.joint == "then":
                 for state in states:
                     state.said.draft.next_stage()
-            states = self._segment(segment, states)
+            try:
+                states = self._segment(segment, states)
+            except NotUnderstood as problem:
+                left = sentence.segments[number:]
+                raise self.why.rather(problem, left, self.later) from None
         return states
 
     def _segment(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
-        if len(segment.words) > MOST_WORDS_TOGETHER:
+        if (call := called(segment.words, self.tagger)) and not (segment.role or segment.always):
+            return self._task(call, states)
+        segment = replace(segment, words=spoken_out(segment.words))
+        words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
+        if words > MOST_WORDS_TOGETHER:
             raise NotUnderstood(
                 f"{len(segment.words)} words are too many for one clause: say it in several"
             )
@@ -159,6 +159,10 @@ class Reader:
                 except NotUnderstood as problem:
                     problems.append((cost, problem))
                 else:
+                    if question is not None and state.question is not None:
+                        twice = f"{self.line!r} asks two things: ask one at a time"
+                        problems.append((cost, NotUnderstood(twice)))
+                        continue
                     found.append(
                         _State(said, state.cost + cost, question or state.question, state.asked)
                     )
@@ -167,25 +171,42 @@ class Reader:
             found = self._each(which, segment, states)
         if not found:
             strange = [w for w in segment.words if "UNK" in w.tags]
-            named = strange and strange[0].text in str(which) and _NAMING.search(str(which))
+            named = (
+                bool(strange)
+                and strange[0].text in str(which)
+                and _NAMING.search(str(which)) is not None
+                and not self.why.asks_for(segment)
+            )
             if not problems or (strange and not named):
                 raise self.why.ungrammatical(segment, 0)
             raise min(problems, key=lambda row: row[0])[1]
         found.sort(key=lambda state: state.cost)
         return found[:_READINGS]
 
+    def _task(self, call: TaskCall, states: Sequence[_State]) -> list[_State]:
+        found: list[_State] = []
+        for asked, reading in expanded(call, self.vocabulary, self.within, self._said_by_method):
+            for state in states:
+                said = state.said.copy()
+                take(said, call, reading, self.vocabulary.robots)
+                found.append(_State(said, state.cost, state.question, state.asked or asked))
+        return found[:_READINGS]
+
+    def _said_by_method(self, text: str, within: tuple[str, ...]) -> list[Row]:
+        return Reader(text, self.vocabulary, within=within).read(None)
+
     def _each(self, which: WhichOne, segment: Segment, states: Sequence[_State]) -> list[_State]:
         """The readings in which a noun phrase means one, then another of those that it can."""
-        if len(which.names) > _CHOICES or len(states) > _CHOICES:
+        if len(which.choices) > _CHOICES or len(states) > _CHOICES:
             return []
         found: list[_State] = []
-        for name in which.names:
+        for meant in which.choices:
             forked = []
             for state in states:
                 if which.key in state.said.chosen:
                     return []
                 said = state.said.copy()
-                said.chosen[which.key] = name
+                said.chosen[which.key] = meant
                 asked = state.asked or str(which)
                 forked.append(_State(said, state.cost, state.question, asked))
             with suppress(NotUnderstood):
@@ -219,7 +240,10 @@ class Reader:
                     if not isinstance(value, bool):
                         raise NotUnderstood(f'{said.clause!r}: say "if …" with what holds then')
                     value = not value
-                said.when.append(Condition(relation=relation, subject=subject, value=value))
+                if relation == AT:
+                    relation = self.vocabulary.relation_to(str(value))
+                rows = said.when if segment.role == "when" else said.only_if
+                rows.append(Condition(relation=relation, subject=subject, value=value))
             said.elliptic = ""
         return said, scene.question
 
@@ -251,9 +275,11 @@ class Reader:
         remark = words[:end]
         shown = self.why.quote(remark)
         special = reason_for([(word.word, word.text) for word in remark])
-        if special or any("NOUN" in word.tags for word in remark):
+        known = next((word.text for word in remark if "NOUN" in word.tags), None)
+        if special or known:
+            matters = f"{known!r} is spoken of in {shown!r}, which" if known else f"{shown!r}"
             raise NotUnderstood(
-                f"{shown!r} is no goal, and may matter: leave it out, or tell it as a fact"
+                f"{matters} is no goal, and may matter: leave it out, or tell it as a fact"
             )
         self.remarks.append(shown)
         return self._sentence(cut(words[end:]), states) if end < len(words) else states
@@ -281,7 +307,15 @@ class Reader:
             assert problem is not None
             raise problem
         rows = [(cost, asked, reading) for reading, (cost, asked) in found.items()]
-        return sorted(rows, key=lambda row: row[0])
+        best: dict[Reading, Row] = {}
+        for each in sorted(rows, key=lambda row: (row[0], not self._believed(row[2]))):
+            best.setdefault(replace(each[2], presumed=()), each)  # what is presumed asks nothing
+        return list(best.values())
+
+    def _believed(self, reading: Reading) -> bool:
+        """Whether all that it takes for granted is believed."""
+        is_at = self.vocabulary.is_at
+        return all(is_at(key.subject, str(value)) for key, value in reading.presumed)
 
     def _reading(self, state: _State, now: datetime | None, dangling: bool) -> Reading:
         said = state.said.copy()
@@ -293,7 +327,9 @@ class Reader:
             raise NotUnderstood(f"{self.line!r} ends before it says what to do: {EXAMPLE}")
         goals = tuple(replace(goal, priority=said.urgent) for goal in said.goals)
         presumed = tuple(dict.fromkeys(said.presumed))
-        return Reading(self.line, goals, facts, state.question, presumed, tuple(self.remarks))
+        remarks = (*self.remarks, *said.remarks)
+        methods = tuple(dict.fromkeys(said.methods))
+        return Reading(self.line, goals, facts, state.question, presumed, remarks, methods)
 
     def _close(self, said: Discourse, now: datetime | None) -> None:
         """End the goal that was being said: other times or conditions hold for what follows.
@@ -301,50 +337,31 @@ class Reader:
         Raises:
             NotUnderstood: it cannot be, or a time belongs to nothing.
         """
-        stages = said.draft.conditions(self.vocabulary.speaker)
-        wants = bool(stages or said.always or said.never)
+        wanted = [
+            (by, draft.conditions(self.vocabulary.speaker)) for by, draft in said.draft.of_each()
+        ]
+        wants = bool(any(stages for _, stages in wanted) or said.always or said.never)
         if wants:
-            goal = WantedGoal(
-                stages,
-                tuple(dict.fromkeys(said.always)),
-                tuple(dict.fromkeys(said.never)),
-                when=tuple(dict.fromkeys(said.when)),
-                by=tuple(dict.fromkeys(said.by)),
-            )
-            said.goals.append(self._timed(goal, said, now))
+            for number, (by, stages) in enumerate(wanted):
+                goal = WantedGoal(
+                    stages,
+                    () if number else tuple(dict.fromkeys(said.always)),
+                    () if number else tuple(dict.fromkeys(said.never)),
+                    when=tuple(dict.fromkeys(said.when)),
+                    by=by,
+                    only_if=tuple(dict.fromkeys(said.only_if)),
+                )
+                said.goals.append(timed(goal, said, now))
         elif said.times and self.mode == "fact":
             named = [(token.word, token.spoken) for token in self.tokens]
             reason = reason_for(named, "a fact")
             raise NotUnderstood(reason or f"{self.line!r} names a time, which a fact cannot")
-        elif said.times or said.when:
+        elif said.times or said.when or said.only_if:
             what = f"{said.time_words!r} names a time" if said.times else '"If" names a condition'
             raise NotUnderstood(f"{what}, but nothing is to be done then")
         said.draft = GoalDraft(self.vocabulary.is_at)
-        said.always, said.never, said.when, said.times, said.by = [], [], [], [], []
-
-    @staticmethod
-    def _timed(goal: WantedGoal, said: Discourse, now: datetime | None) -> WantedGoal:
-        every = next((time for time in said.times if time.kind == "every"), None)
-        for time in said.times:
-            if time is every:
-                at = next((t for t in said.times if t.kind == "start" and t.hour is not None), None)
-                if at is not None and time.every_s is None:
-                    time = replace(time, hour=at.hour, minute=at.minute)
-                goal = replace(goal, every=time.recurrence)
-                continue
-            if every is not None and time.kind == "start" and time.hour is not None:
-                continue
-            if time.after_s is None and now is None:
-                raise NotUnderstood("a time of day is named, and what time it is now is not known")
-            seconds = time.after_s if now is None or time.after_s is not None else time.seconds(now)
-            if time.until is not None and now is not None:
-                end = replace(time, hour=time.until[0], minute=time.until[1])
-                goal = replace(goal, due_s=end.seconds(now))
-            if time.kind == "due" or (time.hour is not None and not said.done):
-                goal = replace(goal, due_s=seconds)
-            else:
-                goal = replace(goal, not_before_s=seconds)
-        return goal
+        said.always, said.never, said.when, said.only_if = [], [], [], []
+        said.times = []
 
 
 def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Reading | Ambiguity:

@@ -126,7 +126,17 @@ async def value(session: Session, key: Key[Any, Any], address: Address, **fields
 async def ask_for_plan(
     session: Session, text: str = "Bring cup 1 to the hallway", by: str = "symbolic"
 ) -> None:
+    await want(session, text)
+    await have_planned(session, by)
+
+
+async def want(session: Session, text: str) -> None:
+    """Put the goal `g`."""
     await session.confirm(GOAL_SPEC, GoalAddress("g"), Goal(goal="g", text=text))
+
+
+async def have_planned(session: Session, by: str = "symbolic") -> None:
+    """Ask for the plan `p` once there is a goal that waits for one."""
     await value(session, GOAL_STATUS, GoalAddress("g"), state=GoalState.WAITING)
     request = PlanRequest(request="r", plan="p", planner=by)
     await session.confirm(PLAN_REQUEST, RequestAddress("r"), request)

@@ -23,6 +23,8 @@ from fleet.language.words.tokens import words_in
 
 _STATES = frozenset({"shall_be", "wanted", "belongs", "bare", "bare_state", "named", "needs"})
 """Kinds of clauses that say what shall be so, rather than what shall be done."""
+_GO_ON = frozenset({"bare", "bare_state", "whereto", "named"})
+"""Kinds of clauses that say more of what whoever was told to do something shall do."""
 _COMMANDS = _STATES | {"do", "told", "needs_doing"}
 _WISHES = frozenset(
     words_in(
@@ -45,10 +47,11 @@ class Clauses:
         commands = Commands(ground, wishes, looking, skilled, tidiness, questions)
         ellipsis = Continuations(ground, wishes, claims, commands)
         self.topic = ellipsis.topic
+        self.questions = questions
         self._by_kind: dict[str, Callable[[Clause], None]] = {
             name.removeprefix("on_"): getattr(part, name)
             for part in (claims, questions, shall, commands, ellipsis)
-            for name in dir(part)
+            for name in vars(type(part))
             if name.startswith("on_")
         }
 
@@ -60,6 +63,10 @@ class Clauses:
         """
         said = self.scene.said
         said.began, said.ended = clause.first, clause.last
+        if clause.kind not in _GO_ON:
+            said.draft.by = ()
+        if hasattr(self.questions, f"on_{clause.kind}"):
+            self.questions.check_mode()
         if self.scene.mode == "fact" and clause.kind in ("do", "told"):
             raise NotUnderstood(f"{said.line!r} is a goal and not a fact: {SAY_IT}")
         if self.scene.mode == "fact" and clause.kind in _WISHES:

@@ -22,7 +22,8 @@ class Wish:
     """What one clause wants. `subjects` is one, or with `open` those of whom any will do.
 
     `means`: somebody goes somewhere in order to do what the sentence says next.
-    `whereto`: it was fetched, and the sentence still has to say where to.
+    `whereto`: it was fetched, and the sentence still has to say where to. `by`: the robots that
+    shall do it (`None`: it is about where a robot itself is).
     """
 
     relation: str
@@ -33,6 +34,9 @@ class Wish:
     on_robot: bool = False
     means: bool = False
     whereto: bool = False
+    by: tuple[str, ...] | None = ()
+    shared: bool = False
+    """Whether what fulfils it may fulfil another one, too: pairs of "two of the three"."""
 
     def condition(self) -> Condition:
         """The condition that makes it true."""
@@ -53,6 +57,8 @@ class GoalDraft:
 
     is_at: Callable[[str, str], bool] = lambda name, where: False
     stages: list[list[Wish]] = field(default_factory=lambda: [[]])
+    by: tuple[str, ...] = ()
+    """The robots that are told to do what is wished for now."""
 
     @property
     def empty(self) -> bool:
@@ -61,7 +67,7 @@ class GoalDraft:
 
     def copy(self) -> GoalDraft:
         """The same, to go on from."""
-        return GoalDraft(self.is_at, [list(stage) for stage in self.stages])
+        return GoalDraft(self.is_at, [list(stage) for stage in self.stages], self.by)
 
     def next_stage(self) -> None:
         """What comes now is wanted after all that came."""
@@ -101,6 +107,8 @@ class GoalDraft:
                 on_robot,
                 means,
                 whereto,
+                None if mention.type == "robot" else self.by,
+                mention.least > 1,
             )
             for number, subjects in enumerate(each)
         )
@@ -115,6 +123,29 @@ class GoalDraft:
                 for wish in stage
             ]
         return meant
+
+    def of_each(self) -> list[tuple[tuple[str, ...], GoalDraft]]:
+        """The robots that are told to do something, and what each shall do.
+
+        Raises:
+            NotUnderstood: one shall do something after another has done something.
+        """
+        doers = dict.fromkeys(w.by for stage in self.stages for w in stage if w.by is not None)
+        if len(doers) < 2:
+            return [(next(iter(doers), ()), self)]
+        if sum(bool(stage) for stage in self.stages) > 1:
+            named = one_of(name for by in doers for name in by)
+            raise NotUnderstood(
+                f"it does not say of each step whether {named} shall do it: say it step by step"
+            )
+        first = next(iter(doers))
+        return [
+            (by, GoalDraft(self.is_at, [
+                [w for w in stage if (first if w.by is None else w.by) == by]
+                for stage in self.stages
+            ]))
+            for by in doers
+        ]  # fmt: skip
 
     def conditions(self, speaker: str | None = None) -> tuple[tuple[Condition, ...], ...]:
         """The stages, each free of contradictions and of what another wish implies.
@@ -276,7 +307,7 @@ def _check_open(kept: Sequence[Wish], fixed: dict[tuple[str, str], Wish]) -> Non
 
     Wishes are matched with subjects by augmenting paths (Kuhn 1955).
     """
-    at = [wish for wish in kept if wish.open and wish.relation in PLACED]
+    at = [wish for wish in kept if wish.open and wish.relation in PLACED and not wish.shared]
     for wish in at:
         for other in at:
             if wish.key == other.key and wish.value != other.value:

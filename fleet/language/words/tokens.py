@@ -40,6 +40,13 @@ _PART = re.compile(
 _BETWEEN_WORDS = re.compile(r"(?<=[^\W_])[-\u2010\u2011](?=[^\W_])")
 _QUOTES = frozenset("\"'`“”«»")
 _COMMAS = frozenset(":-\u2013\u2014")
+_APOSTROPHES_FORGOTTEN = {
+    word.replace("'", ""): word
+    for word in words_in(
+        "what's where's who's that's there's how's don't doesn't didn't isn't aren't wasn't can't "
+        "won't couldn't wouldn't shouldn't haven't hasn't i'm i've you're you've they're we've"
+    )
+}
 _ENDINGS = {"d": "would", "ll": "will", "m": "am", "re": "are", "ve": "have"}
 
 
@@ -94,6 +101,7 @@ def number_of(word: str) -> int | None:
 
 
 def _written_out(word: str) -> list[str]:
+    word = _APOSTROPHES_FORGOTTEN.get(word, word)
     if "'" not in word or len(word) == 1:
         return ["can", "not"] if word == "cannot" else [word]
     stem, _, ending = word.partition("'")

@@ -15,6 +15,7 @@ from fleet.errors import BadLanguageFile
 from fleet.language.words.morphology import gerund, participles, third_person
 from fleet.language.words.tokens import Phrase, tokens_of
 
+_CONTRACTED = frozenset({"that", "it", "there", "what", "who", "where", "somebody", "someone"})
 _SHIPPED = Path(__file__).parent.parent / "data"
 _GRAMMAR = frozenset(
     [
@@ -68,17 +69,27 @@ class VerbEntry:
         return " ".join((*self.head, *(word for chunk in self.behind for word in chunk)))
 
 
+def _contracted(phrase: Phrase) -> tuple[Phrase, ...]:
+    """The same also with `'s`: "when that is done", "when that's done"."""
+    for i in range(1, len(phrase)):
+        if phrase[i] in ("is", "has") and phrase[i - 1] in _CONTRACTED:
+            return phrase, (*phrase[:i], "'s", *phrase[i + 1 :])
+    return (phrase,)
+
+
 class Wordbook:
     """Words by tag, verbs by head, prepositions by role."""
 
     def __init__(self, words: Mapping[str, Iterable[str]], verbs: Mapping[str, Any]) -> None:
         found: dict[Phrase, set[str]] = defaultdict(set)
         self.remarks = tuple(map(phrase_of, words.get("REMARK", ())))
+        self.everyday = frozenset(words.get("EVERYDAY", ()))
         for tag, phrases in words.items():
-            if tag == "REMARK":
+            if tag in ("REMARK", "EVERYDAY"):
                 continue
             for text in phrases:
-                found[phrase_of(text)].add(tag)
+                for phrase in _contracted(phrase_of(text)):
+                    found[phrase].add(tag)
         self.roles: dict[Phrase, str] = {}
         for role, prepositions in verbs["prepositions"].items():
             for text in prepositions:
@@ -90,6 +101,8 @@ class Wordbook:
         self.rooms = tuple(tuple(map(phrase_of, group)) for group in verbs["rooms"])
         self.uses = frozenset(verbs["uses"])
         self.offering = frozenset(verbs["offering"])
+        self.collective = frozenset(verbs["collective"])
+        self.floors = frozenset(verbs["floors"])
         self.bins = tuple(map(phrase_of, verbs["bins"]))
         self.fetching = frozenset(verbs["fetching"])
         self.searched = frozenset(verbs["searched"])

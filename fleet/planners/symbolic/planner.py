@@ -46,7 +46,7 @@ from fleet.planners.symbolic.action_sequences import (
 )
 from fleet.planners.symbolic.candidates import Choice
 from fleet.planners.symbolic.choosing import choose
-from fleet.planners.symbolic.engine.finite_domain import Trajectory
+from fleet.planners.symbolic.engine.constraints import Trajectory
 from fleet.planners.symbolic.engine.instantiation import Facts
 from keyexpr_schema.facts import AT, HOLDING, FactKey
 from keyexpr_schema.payloads.goals import Condition, Precedence

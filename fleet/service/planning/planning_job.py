@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from dataclasses import replace as changed
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from msgspec.structs import replace
 
@@ -73,15 +73,15 @@ def run_planning_job(
 
 
 def run_interpretation(given: InterpretationInput, composition: Composition) -> GoalInterpreted:
-    """Have a language model read a goal's sentence; what it means, at the time of the input."""
-    read = composition.interpreter.interpret(given.text, given.vocabulary, given.skills)
-    meaning: dict[str, Any] = {"reason": read} if isinstance(read, str) else {"stages": read}
+    """Have a language model say a goal's sentence in other words, at the time of the input."""
+    said = composition.paraphraser.paraphrase(given.text, given.refusal, given.vocabulary)
     return GoalInterpreted(
         time_s=given.time_s,
         wall_time_s=given.wall_time_s,
         goal=given.goal,
         text=given.text,
-        **meaning,
+        paraphrase=None if isinstance(said, str) else said.text,
+        reason=said if isinstance(said, str) else None,
     )
 
 

@@ -1,0 +1,149 @@
+"""Tasks that a text calls by name: which method is taken, and what it means here.
+
+A method's sentences are read like any others; so whatever goes for goals goes for tasks.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Container, Mapping, Sequence
+
+from fleet.errors import NotUnderstood
+from fleet.language.methods.model import SKILL_NEED, Method, filled
+from fleet.language.reading import MethodUse, Reading, WantedGoal
+from fleet.language.resolve.discourse import Discourse
+from fleet.language.resolve.mentions import Mention
+from fleet.language.resolve.stages import Wish
+from fleet.language.tagging.task_phrases import TaskCall
+from fleet.language.vocabulary import Vocabulary
+
+MOST_DEEP = 5
+"""Tasks that may be named by each other's methods, one inside the other."""
+_KEYS = 10_000_000
+"""Wishes of tasks are counted from there, apart from what noun phrases mean."""
+_NEED = re.compile(r"(?:(\d+)\s+)?(.+)")
+
+Row = tuple[int, str, Reading]
+"""What a text can mean: its cost, the question that it is an answer to, the reading."""
+
+
+class CannotBeDone(NotUnderstood):
+    """No method of a task can be taken.
+
+    `said` called it; `passed_over` are its methods, and why they cannot be taken.
+    """
+
+    def __init__(
+        self, sentence: str, said: str, task: str, passed_over: Sequence[tuple[str, str]]
+    ) -> None:
+        super().__init__(sentence)
+        self.said, self.task, self.passed_over = said, task, tuple(passed_over)
+
+
+class EndlessTask(NotUnderstood):
+    """A task is a part of itself, or of too many others."""
+
+
+def expanded(
+    call: TaskCall,
+    vocabulary: Vocabulary,
+    within: tuple[str, ...],
+    read: Callable[[str, tuple[str, ...]], list[Row]],
+) -> list[tuple[str, Reading]]:
+    """What a task means here, by the first of its methods that can be taken: all readings that are
+    equally plain, and the question that tells them apart.
+
+    `read` reads a method's sentences, `within` are the tasks of which this one is a part.
+
+    Raises:
+        CannotBeDone: none can be taken; one sentence says why.
+        EndlessTask: it is a part of itself.
+    """
+    task, said = call.task, call.lexeme.text
+    if task.name in within or len(within) >= MOST_DEEP:
+        way = " → ".join((*within, task.name))
+        what = "is a part of itself" if task.name in within else "has tasks in tasks too deep"
+        raise EndlessTask(f"{said!r} {what}: {way}; say in {task.file} what it means")
+    given = dict(call.lexeme.given)
+    passed: list[tuple[str, str]] = []
+    for number, method in enumerate(task.methods, 1):
+        text = method.text(given)
+        try:
+            _check_needs(method, given, vocabulary)
+            rows = read(text, (*within, task.name))
+            for _, _, reading in rows:
+                _check(reading)
+        except EndlessTask:
+            raise
+        except NotUnderstood as problem:
+            passed.append((text, str(problem)))
+            continue
+        use = MethodUse(said, task.name, number, text, tuple(passed))
+        best = [(asked, _with(reading, use)) for cost, asked, reading in rows if cost == rows[0][0]]
+        return best if len(best) > 1 else [("", best[0][1])]
+    reasons = "; ".join(dict.fromkeys(why for _, why in passed))
+    sentence = f"{said!r} cannot be done here: {reasons}"
+    raise CannotBeDone(sentence, said, task.name, passed)
+
+
+def _with(reading: Reading, use: MethodUse) -> Reading:
+    return Reading(
+        reading.text,
+        reading.goals,
+        presumed=reading.presumed,
+        methods=(use, *reading.methods),
+    )
+
+
+def _check_needs(method: Method, given: Mapping[str, str], vocabulary: Vocabulary) -> None:
+    for need in method.needs:
+        text = filled(need, given)
+        if text.startswith(f"{SKILL_NEED} "):
+            skill = text.split()[1]
+            if not vocabulary.can(skill):
+                raise NotUnderstood(f"no skill {skill} is known")
+            continue
+        match = _NEED.fullmatch(text)
+        assert match is not None
+        least, found = int(match[1] or 1), len(vocabulary.of_type(match[2]))
+        if found < least:
+            what = f"there is no {match[2]}" if not found else f"there is {found} {match[2]}"
+            raise NotUnderstood(what + (f", and it takes {least}" if least > 1 else ""))
+
+
+def _check(reading: Reading) -> None:
+    """Whether it says no more than what shall be done."""
+    if reading.question is not None or reading.facts:
+        raise NotUnderstood(f"{reading.text!r} says more than what is to be done")
+    plain = tuple(
+        WantedGoal(g.stages, g.always, g.never, by=g.by, priority=g.priority) for g in reading.goals
+    )
+    if plain != reading.goals:
+        raise NotUnderstood(f"{reading.text!r} says when; say that along with the task instead")
+
+
+def take(said: Discourse, call: TaskCall, reading: Reading, robots: Container[str]) -> None:
+    """Take what a task means into what a text has said so far."""
+    stages, key = said.draft.stages, -_KEYS * (call.lexeme.first + 1)
+    begins = len(stages) - 1
+    for goal in reading.goals:
+        for number, stage in enumerate(goal.stages, begins):
+            if number == len(stages):
+                stages.append([])
+            for condition in stage:
+                named, key = condition.subjects, key - 1
+                stages[number].append(
+                    Wish(
+                        condition.relation,
+                        named,
+                        condition.value,
+                        key,
+                        open=len(named) > 1,
+                        by=None if named[0] in robots else call.by or goal.by,
+                    )
+                )
+        said.always.extend(goal.always)
+        said.never.extend(goal.never)
+    said.presumed.extend(reading.presumed)
+    said.methods.extend(reading.methods)
+    said.recent, said.done = list[Mention](), True

@@ -1,0 +1,43 @@
+"""The tasks that goals can call by name: those that are shipped, and those in a user's files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fleet.errors import BadTaskFile
+from fleet.language.methods.model import CompoundTask
+from fleet.language.methods.patterns import Row, rows_of
+from fleet.language.methods.task_file import tasks_from_data
+from keyexpr_schema.config_files import config_file, read_yaml
+
+
+def load_all_tasks(task_files: tuple[Path, ...] = ()) -> tuple[CompoundTask, ...]:
+    """The tasks in these files, and those of the household that they do not say anew.
+
+    What a user's own file calls by a phrase goes before what the household's does.
+
+    Raises:
+        BadTaskFile: a file cannot be read, or two of these files say the same.
+    """
+    own: dict[str, CompoundTask] = {}
+    said: dict[Row, str] = {}
+    for path in task_files:
+        for task in load_tasks(path):
+            if task.name in own:
+                raise BadTaskFile(f"{path}: task {task.name} is in {own[task.name].file} already")
+            own[task.name] = task
+            for row in {row for phrase in task.says for row in rows_of(phrase)}:
+                if (other := said.setdefault(row, task.name)) != task.name:
+                    words = " ".join(p if isinstance(p, str) else f"{{{p.name}}}" for p in row)
+                    raise BadTaskFile(f"{path}: task {task.name}: {words!r} calls {other} already")
+    shipped = load_tasks(config_file("tasks", "household"))
+    return (*own.values(), *(task for task in shipped if task.name not in own))
+
+
+def load_tasks(path: Path) -> tuple[CompoundTask, ...]:
+    """The tasks in a YAML file.
+
+    Raises:
+        BadTaskFile: it cannot be read, or what is in it is not right.
+    """
+    return tasks_from_data(read_yaml(path, BadTaskFile), str(path))

@@ -307,7 +307,15 @@ class Reader:
             assert problem is not None
             raise problem
         rows = [(cost, asked, reading) for reading, (cost, asked) in found.items()]
-        return sorted(rows, key=lambda row: row[0])
+        best: dict[Reading, Row] = {}
+        for each in sorted(rows, key=lambda row: (row[0], not self._believed(row[2]))):
+            best.setdefault(replace(each[2], presumed=()), each)  # what is presumed asks nothing
+        return list(best.values())
+
+    def _believed(self, reading: Reading) -> bool:
+        """Whether all that it takes for granted is believed."""
+        is_at = self.vocabulary.is_at
+        return all(is_at(key.subject, str(value)) for key, value in reading.presumed)
 
     def _reading(self, state: _State, now: datetime | None, dangling: bool) -> Reading:
         said = state.said.copy()

@@ -92,7 +92,7 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             if "THEN" in word.tags and "NOUN" not in word.tags:
                 segments += _segment(begun, joint, role)
                 joint, begun = "then", []
-            elif word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest):
+            elif word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest, begun):
                 segments += _segment(begun, joint, role)
                 joint, begun = "and", []
             elif "WITHOUT" in word.tags and begun:
@@ -184,8 +184,9 @@ def _clausal(words: Sequence[Lexeme]) -> bool:
     return any(w.tags & _CLAUSAL and not w.tags & {"NOUN"} for w in words)
 
 
-def _opens(rest: Sequence[Lexeme]) -> bool:
-    """Whether what follows begins a clause, and cannot go on with a list."""
+def _opens(rest: Sequence[Lexeme], before: Sequence[Lexeme]) -> bool:
+    """Whether what follows begins a clause, and cannot go on with a list; none goes on with what
+    calls a task."""
     rest = list(rest[:2])
     if rest and rest[0].tags & {"AND", "COMMA"}:
         rest = rest[1:]
@@ -196,7 +197,7 @@ def _opens(rest: Sequence[Lexeme]) -> bool:
     tags = rest[0].tags
     if tags & _OPENING:
         return True
-    return "VERB" in tags and not tags & {"NOUN", "ADJ", "ORD"}
+    return "VERB" in tags and ("TASK" in before[-1].tags or not tags & {"NOUN", "ADJ", "ORD"})
 
 
 def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:

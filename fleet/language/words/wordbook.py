@@ -97,6 +97,8 @@ class Wordbook:
         self.rooms = tuple(tuple(map(phrase_of, group)) for group in verbs["rooms"])
         self.uses = frozenset(verbs["uses"])
         self.offering = frozenset(verbs["offering"])
+        self.collective = frozenset(verbs["collective"])
+        self.floors = frozenset(verbs["floors"])
         self.bins = tuple(map(phrase_of, verbs["bins"]))
         self.fetching = frozenset(verbs["fetching"])
         self.searched = frozenset(verbs["searched"])

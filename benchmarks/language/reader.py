@@ -11,7 +11,9 @@ from benchmarks.language.worlds import NOW, World, load_language_world
 from fleet.core.model.skills import SkillModel, phrases_of, state_words_of
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Reading, Vocabulary, WantedGoal, read
+from fleet.language.methods.model import CompoundTask
 from fleet.service.skill_models import load_skills
+from fleet.service.task_files import load_all_tasks
 from keyexpr_schema.config_files import config_file
 from keyexpr_schema.facts import Literal
 from keyexpr_schema.payloads.goals import Condition
@@ -78,7 +80,13 @@ def vocabulary_of(name: str) -> Vocabulary:
         speaker=world.speaker,
         believed=world.facts,
         state_words=state_words_of(skills),
+        tasks=_tasks(),
     )
+
+
+@cache
+def _tasks() -> tuple[CompoundTask, ...]:
+    return load_all_tasks()
 
 
 def skills_of(world: World) -> dict[str, SkillModel]:
@@ -105,7 +113,7 @@ def _goal(goal: WantedGoal) -> WantedMeaning:
         stages=tuple(map(_rows, goal.stages)),
         always=_rows(goal.always),
         never=_rows(goal.never),
-        when=_rows(goal.when),
+        when=_rows((*goal.when, *goal.only_if)),
         priority=goal.priority,
         due_s=goal.due_s,
         not_before_s=goal.not_before_s,

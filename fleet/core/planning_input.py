@@ -8,15 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace as changed
+from datetime import datetime
 from typing import Any
 
 import msgspec
 from msgspec.structs import replace
 
 from fleet.core.model.preconditions import action_of
+from fleet.core.model.recurrence import said_at
 from fleet.core.model.skills import SkillModel, Skills
 from fleet.core.model.world import Hopeless, WorldModel
 from fleet.core.plan_entry import PlanningJob
+from fleet.core.standing import standing_constraints
 from fleet.core.state import State
 from fleet.language import Vocabulary
 from keyexpr_schema.facts import SEARCHED, Literal
@@ -91,6 +94,8 @@ class InterpretationInput(WorldInput, frozen=True, kw_only=True, tag="interpret"
     text: str
     refusal: str
     vocabulary: Vocabulary
+    now: datetime | None = None
+    """What clocks showed when it was said."""
 
 
 def planning_input(state: State, job: PlanningJob) -> PlanningInput:
@@ -98,6 +103,7 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
     world = state.world()
     goals = [state.goals[goal] for goal in job.goals if goal in state.goals]
     reached = [g.goal for g in goals if state.goal_states[g.goal].state is GoalState.REACHED]
+    always, never = standing_constraints(state)
     entry = state.plans.get(job.plan)
     records = entry.records if entry is not None else {}
     return PlanningInput(
@@ -109,8 +115,8 @@ def planning_input(state: State, job: PlanningJob) -> PlanningInput:
                 goal,
                 conditions=_wanted(state.goal_states[goal.goal], world),
                 # What must hold until it is reached need not any longer.
-                always=() if goal.goal in reached else goal.always,
-                never=() if goal.goal in reached else goal.never,
+                always=() if goal.goal in reached else (*goal.always, *always),
+                never=() if goal.goal in reached else (*goal.never, *never),
                 sometime_before=state.goal_states[goal.goal].still_in_order(goal),
             )
             for goal in goals
@@ -151,6 +157,7 @@ def interpretation_input(state: State, goal: str) -> InterpretationInput:
         goal=goal,
         text=state.goals[goal].text,
         refusal=state.goal_states[goal].refusal or "",
+        now=said_at(state.goals[goal]),
         vocabulary=changed(
             words,
             places=dict(words.places),

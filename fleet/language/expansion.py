@@ -81,10 +81,8 @@ def expanded(
         use = MethodUse(said, task.name, number, text, tuple(passed))
         best = [(asked, _with(reading, use)) for cost, asked, reading in rows if cost == rows[0][0]]
         return best if len(best) > 1 else [("", best[0][1])]
-    reasons = [why for _, why in passed]
-    if reasons[1:]:
-        reasons = [f"({number}) {why}" for number, why in enumerate(reasons, 1)]
-    sentence = f"{said!r} cannot be done here: {'; '.join(reasons)}"
+    reasons = "; ".join(dict.fromkeys(why for _, why in passed))
+    sentence = f"{said!r} cannot be done here: {reasons}"
     raise CannotBeDone(sentence, said, task.name, passed)
 
 

@@ -11,8 +11,8 @@ from datetime import datetime
 from fleet.errors import NotUnderstood
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
-from fleet.language.grammar.chart import NotGrammatical, parsed
-from fleet.language.reading import Ambiguity, Reading, WantedGoal
+from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
+from fleet.language.reading import Reading, WantedGoal
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
@@ -28,13 +28,14 @@ from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.tokens import tokens_of
-from keyexpr_schema.facts import Literal
+from keyexpr_schema.facts import AT, Literal
 from keyexpr_schema.payloads.goals import Condition
 
 MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 80
-_CHOICES = 12
+"""In one clause; of a long list one for each thing."""
+CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
@@ -108,7 +109,7 @@ class Reader:
                 said.elliptic, said.addressees, said.done, said.again = "", [], False, None
                 said.telegraphic = sentence.telegraphic
                 said.urgent = said.urgent or sentence.urgent
-                if timed or said.times or said.when:
+                if timed or said.times or said.when or said.only_if:
                     with suppress(NotUnderstood):  # the last sentence says it again
                         self._close(said, now)
                 said.times, said.time_words = list(sentence.times), sentence.time_words
@@ -139,7 +140,8 @@ class Reader:
         if (call := called(segment.words, self.tagger)) and not (segment.role or segment.always):
             return self._task(call, states)
         segment = replace(segment, words=spoken_out(segment.words))
-        if len(segment.words) > MOST_WORDS_TOGETHER:
+        words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
+        if words > MOST_WORDS_TOGETHER:
             raise NotUnderstood(
                 f"{len(segment.words)} words are too many for one clause: say it in several"
             )
@@ -157,6 +159,10 @@ class Reader:
                 except NotUnderstood as problem:
                     problems.append((cost, problem))
                 else:
+                    if question is not None and state.question is not None:
+                        twice = f"{self.line!r} asks two things: ask one at a time"
+                        problems.append((cost, NotUnderstood(twice)))
+                        continue
                     found.append(
                         _State(said, state.cost + cost, question or state.question, state.asked)
                     )
@@ -191,16 +197,16 @@ class Reader:
 
     def _each(self, which: WhichOne, segment: Segment, states: Sequence[_State]) -> list[_State]:
         """The readings in which a noun phrase means one, then another of those that it can."""
-        if len(which.names) > _CHOICES or len(states) > _CHOICES:
+        if len(which.choices) > CHOICES or len(states) > CHOICES:
             return []
         found: list[_State] = []
-        for name in which.names:
+        for meant in which.choices:
             forked = []
             for state in states:
                 if which.key in state.said.chosen:
                     return []
                 said = state.said.copy()
-                said.chosen[which.key] = name
+                said.chosen[which.key] = meant
                 asked = state.asked or str(which)
                 forked.append(_State(said, state.cost, state.question, asked))
             with suppress(NotUnderstood):
@@ -234,7 +240,10 @@ class Reader:
                     if not isinstance(value, bool):
                         raise NotUnderstood(f'{said.clause!r}: say "if …" with what holds then')
                     value = not value
-                said.when.append(Condition(relation=relation, subject=subject, value=value))
+                if relation == AT:
+                    relation = self.vocabulary.relation_to(str(value))
+                rows = said.when if segment.role == "when" else said.only_if
+                rows.append(Condition(relation=relation, subject=subject, value=value))
             said.elliptic = ""
         return said, scene.question
 
@@ -298,7 +307,15 @@ class Reader:
             assert problem is not None
             raise problem
         rows = [(cost, asked, reading) for reading, (cost, asked) in found.items()]
-        return sorted(rows, key=lambda row: row[0])
+        best: dict[Reading, Row] = {}
+        for each in sorted(rows, key=lambda row: (row[0], not self._believed(row[2]))):
+            best.setdefault(replace(each[2], presumed=()), each)  # what is presumed asks nothing
+        return list(best.values())
+
+    def _believed(self, reading: Reading) -> bool:
+        """Whether all that it takes for granted is believed."""
+        is_at = self.vocabulary.is_at
+        return all(is_at(key.subject, str(value)) for key, value in reading.presumed)
 
     def _reading(self, state: _State, now: datetime | None, dangling: bool) -> Reading:
         said = state.said.copy()
@@ -310,7 +327,8 @@ class Reader:
             raise NotUnderstood(f"{self.line!r} ends before it says what to do: {EXAMPLE}")
         goals = tuple(replace(goal, priority=said.urgent) for goal in said.goals)
         presumed = tuple(dict.fromkeys(said.presumed))
-        remarks, methods = tuple(self.remarks), tuple(dict.fromkeys(said.methods))
+        remarks = (*self.remarks, *said.remarks)
+        methods = tuple(dict.fromkeys(said.methods))
         return Reading(self.line, goals, facts, state.question, presumed, remarks, methods)
 
     def _close(self, said: Discourse, now: datetime | None) -> None:
@@ -331,61 +349,16 @@ class Reader:
                     () if number else tuple(dict.fromkeys(said.never)),
                     when=tuple(dict.fromkeys(said.when)),
                     by=by,
+                    only_if=tuple(dict.fromkeys(said.only_if)),
                 )
                 said.goals.append(timed(goal, said, now))
         elif said.times and self.mode == "fact":
             named = [(token.word, token.spoken) for token in self.tokens]
             reason = reason_for(named, "a fact")
             raise NotUnderstood(reason or f"{self.line!r} names a time, which a fact cannot")
-        elif said.times or said.when:
+        elif said.times or said.when or said.only_if:
             what = f"{said.time_words!r} names a time" if said.times else '"If" names a condition'
             raise NotUnderstood(f"{what}, but nothing is to be done then")
         said.draft = GoalDraft(self.vocabulary.is_at)
-        said.always, said.never, said.when, said.times = [], [], [], []
-
-
-def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Reading | Ambiguity:
-    """What a text asks for, says, or asks; of several meanings the plainest.
-
-    `now` is what the clock says, with its zone, for times of day.
-
-    Raises:
-        NotUnderstood: it means nothing here; one sentence says why.
-    """
-    return _one(Reader(text, vocabulary).read(now))
-
-
-def _one(readings: Sequence[tuple[int, str, Reading]]) -> Reading | Ambiguity:
-    least, asked = readings[0][:2]
-    best = [reading for cost, _, reading in readings if cost == least]
-    if len(best) == 1:
-        return best[0]
-    candidates = tuple((each.understood_as, each) for each in best[:_CHOICES])
-    return Ambiguity(best[0].text, candidates, asked)
-
-
-def read_goal(text: str, vocabulary: Vocabulary) -> Reading:
-    """What a text asks for, where it asks for one goal that is to be reached once.
-
-    Raises:
-        NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
-    """
-    reading = _one(Reader(text, vocabulary, "goal").read(None))
-    if isinstance(reading, Ambiguity):
-        raise NotUnderstood(reading.sentence)
-    if reading.facts or any(goal != WantedGoal(goal.stages, priority=goal.priority)
-                            for goal in reading.goals):  # fmt: skip
-        raise NotUnderstood(f"{reading.text!r} says more than what shall be reached: leave it out")
-    return reading
-
-
-def statement_facts(text: str, vocabulary: Vocabulary) -> tuple[Literal, ...]:
-    """The facts in a statement, where the value `None` is *unknown*.
-
-    Raises:
-        NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
-    """
-    reading = _one(Reader(text, vocabulary, "fact").read(None))
-    if isinstance(reading, Ambiguity):
-        raise NotUnderstood(reading.sentence)
-    return reading.facts
+        said.always, said.never, said.when, said.only_if = [], [], [], []
+        said.times = []

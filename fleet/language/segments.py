@@ -11,15 +11,17 @@ from fleet.language.words.times import TimePhrase
 _OPENING = frozenset({"KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID"})
 _ASKED = frozenset({"WHERE", "HOWMANY", "WHICH", "WHAT", "WHO"})
 _CLAUSAL = _OPENING | {"VERB", "FIN", "GER", "BE", "MODAL", "HAVE", "PREP", "CAUSE", "BELONG"}
-_CONDITIONS = {"IF": "when", "WHEN": "when", "UNLESS": "unless"}
+_WISHED = frozenset({"should", "must", "ought", "has", "have", "needs", "need"})
+_CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless"}
 
 
 @dataclass(frozen=True)
 class Segment:
     """Words that are parsed together.
 
-    `joint` is what stands before them: "", "and" or "then". `role`: `when` or `unless` for a
-    condition, else "". `dangling`: an "and" or "then" that nothing follows stands behind them.
+    `joint` is what stands before them: "", "and" or "then". `role`: `if`, `when` or `unless`
+    for a condition, else "". `dangling`: an "and" or "then" that nothing follows stands behind
+    them.
     """
 
     words: tuple[Lexeme, ...]
@@ -79,7 +81,7 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             urgent = urgent or -1
         elif "POLITE" not in word.tags or word.tags & {"NOUN"}:
             kept.append(word)
-    kept = _asked(kept)
+    kept = _asked(_thought(_without_fillers(kept)))
     while kept and (kept[0].words == ("but",) or "COMMA" in kept[0].tags):
         kept.pop(0)  # "no rush, but …"
     segments: list[Segment] = []
@@ -90,7 +92,7 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             if "THEN" in word.tags and "NOUN" not in word.tags:
                 segments += _segment(begun, joint, role)
                 joint, begun = "then", []
-            elif word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest):
+            elif word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest, begun):
                 segments += _segment(begun, joint, role)
                 joint, begun = "and", []
             elif "WITHOUT" in word.tags and begun:
@@ -115,6 +117,30 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
     return Sentence(
         tuple(words), tuple(segments), tuple(times), urgent, dangling, named, telegraphic
     )
+
+
+def _without_fillers(words: Sequence[Lexeme]) -> list[Lexeme]:
+    """Without "go" before another verb ("go wash it"), and "either" before "or"."""
+    kept = []
+    for i, word in enumerate(words):
+        following = words[i + 1].tags if i + 1 < len(words) else frozenset()
+        goes = word.words in (("go",), ("come",)) and "VERB" in following
+        if goes and not following & {"NOUN", "PREP", "PARTICLE"}:
+            continue
+        if "EITHER" in word.tags and any("OR" in later.tags for later in words[i + 1 :]):
+            continue
+        kept.append(word)
+    return kept
+
+
+def _thought(words: list[Lexeme]) -> list[Lexeme]:
+    """Without "I think" before what should be; before what is so, it is a guess."""
+    if words and "THINK" in words[0].tags:
+        wished = any(w.tags & {"MODAL"} and w.words[0] in _WISHED for w in words)
+        return words[1:] if wished else [
+            replace(words[0], words=words[0].words[1:2], tags=frozenset({"UNK"})), *words[1:]
+        ]  # fmt: skip
+    return words
 
 
 def _asked(words: list[Lexeme]) -> list[Lexeme]:
@@ -158,8 +184,9 @@ def _clausal(words: Sequence[Lexeme]) -> bool:
     return any(w.tags & _CLAUSAL and not w.tags & {"NOUN"} for w in words)
 
 
-def _opens(rest: Sequence[Lexeme]) -> bool:
-    """Whether what follows begins a clause, and cannot go on with a list."""
+def _opens(rest: Sequence[Lexeme], before: Sequence[Lexeme]) -> bool:
+    """Whether what follows begins a clause, and cannot go on with a list; none goes on with what
+    calls a task."""
     rest = list(rest[:2])
     if rest and rest[0].tags & {"AND", "COMMA"}:
         rest = rest[1:]
@@ -170,19 +197,21 @@ def _opens(rest: Sequence[Lexeme]) -> bool:
     tags = rest[0].tags
     if tags & _OPENING:
         return True
-    return "VERB" in tags and not tags & {"NOUN", "ADJ", "ORD"}
+    return "VERB" in tags and ("TASK" in before[-1].tags or not tags & {"NOUN", "ADJ", "ORD"})
 
 
 def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
     """With "A before B" and "after B, A" as "A then B", where a clause follows those words."""
     for i, word in enumerate(words):
-        tag = next((tag for tag in ("BEFORE", "AFTER") if tag in word.tags), None)
+        if word.words == ("but",) and (sooner := _sooner(words[i + 1 :])):
+            return [*sooner, replace(word, tags=frozenset({"THEN"})), *_commas(words[:i])]
+        tag = next((tag for tag in ("BEFORE", "AFTER", "WHEN") if tag in word.tags), None)
         rest = list(words[i + 1 :])
-        if tag is None or not rest or not _happens(rest):
+        if tag is None or not rest or not _happens(rest, by_you=tag == "WHEN"):
             continue
         then = replace(word, tags=frozenset({"THEN"}))
         if i:
-            first = _commas(words[:i])
+            first, rest = _commas(words[:i]), _deed(rest)
             return [*first, then, *rest] if tag == "BEFORE" else [*rest, then, *first]
         ends = [j for j, w in enumerate(rest) if "COMMA" in w.tags]
         verbs = [
@@ -192,14 +221,39 @@ def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
         ]
         if not ends and (not verbs or "PEOPLE" in rest[0].tags):
             return list(words)
-        inner = rest[: ends[0]] if ends else rest[: verbs[0]]
+        inner = _deed(rest[: ends[0]] if ends else rest[: verbs[0]])
         outer = rest[ends[0] + 1 :] if ends else rest[verbs[0] :]
         return [*outer, then, *inner] if tag == "BEFORE" else [*inner, then, *outer]
     return list(words)
 
 
-def _happens(words: Sequence[Lexeme]) -> bool:
-    """Whether what follows "before" is something that somebody does."""
+def _sooner(words: Sequence[Lexeme]) -> list[Lexeme]:
+    """What is to be done first: "but close the door first", "but first close the door"."""
+    begins = [i for i in (0, len(words) - 1) if words and words[i].words == ("1st",)]
+    kept = [word for i, word in enumerate(words) if i not in begins]
+    return kept if begins and kept and kept[0].tags & {"VERB"} else []
+
+
+def _deed(words: Sequence[Lexeme]) -> list[Lexeme]:
+    """What is to be done, of "you have washed the pan"."""
+    left = list(words)
+    if not left or "PEOPLE" not in left[0].tags:
+        return left
+    left = left[1:] if len(left) > 1 and left[1].tags & {"HAVE"} else left
+    if left[0].tags & {"HAVE"} and len(left) > 1 and "PART" in left[1].tags:
+        return [replace(left[1], tags=left[1].tags | {"VERB"}), *left[2:]]
+    return list(words)
+
+
+def _happens(words: Sequence[Lexeme], by_you: bool = False) -> bool:
+    """Whether what follows "before" is something that somebody does.
+
+    `by_you`: only what whoever is spoken to does; else it is what must be so before it is begun.
+    """
+    if by_you:
+        return len(words) > 2 and words[0].words == ("you",) and bool(
+            words[1].tags & {"HAVE", "VERB"}
+        )  # fmt: skip
     if "PEOPLE" in words[0].tags:
         return len(words) > 1 and bool(words[1].tags & {"VERB", "HAVE"})
     return "GER" in words[0].tags
@@ -207,6 +261,8 @@ def _happens(words: Sequence[Lexeme]) -> bool:
 
 def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
     """A sentence with "if", "when" or "unless" cut into condition and the rest."""
+    if any(set(_CONDITIONS) & word.tags for word in words):
+        words = [word for word in words if "ONLY" not in word.tags]
     for i, word in enumerate(words):
         role = next((_CONDITIONS[tag] for tag in sorted(word.tags) if tag in _CONDITIONS), None)
         if role is None:
@@ -225,7 +281,7 @@ def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
     if words and words[0].words == ("should",):  # "should the door be open, close it"
         end = next((j for j, word in enumerate(words) if "COMMA" in word.tags), None)
         if end is not None:
-            return [("when", list(words[:end])), ("", list(words[end + 1 :]))]
+            return [("if", list(words[:end])), ("", list(words[end + 1 :]))]
     return [("", list(words))]
 
 

@@ -97,6 +97,7 @@ class PlannerService:
             session, archive, self._outbox, retention or Retention(), lambda: self._core.state
         )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
+        self._timers = Timers()
         self._held: list[Effect] | None = []
         """Effects held back until everything stored is known; afterwards `None`."""
 
@@ -245,6 +246,8 @@ class PlannerService:
         if change.key is SIM_CLOCK:
             if change.value is not None:
                 self._clock.ticked(change.value.time_s)
+                if self._timers.rings(self.state, change.value.time_s):
+                    self._inbox.put_nowait(events.TimerFired(**self._at()))
         elif change.key is PLANNER_STATUS:
             self._charge.status_changed(change.value)
         elif (event := event_of(change, self._at())) is not None:
@@ -266,15 +269,14 @@ class PlannerService:
 
     async def _take_events(self) -> None:
         """Take events one after the other; wake up when a timer of the state runs out."""
-        timers = Timers()
         while True:
-            timer_s = timers.next(self.state)
+            timer_s = self._timers.next(self.state)
             try:
                 async with asyncio.timeout(None if timer_s is None else timer_s - time.monotonic()):
                     event = await self._inbox.get()
             except TimeoutError:
                 event = events.TimerFired(**self._at())
-                timers.fired(time.monotonic())
+                self._timers.fired(time.monotonic())
             self._apply(event)
 
     def _apply(self, event: Event) -> None:

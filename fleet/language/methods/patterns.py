@@ -13,7 +13,8 @@ ARTICLES = frozenset({"the", "a", "an", "some"})
 """Words that may be said or left out between others of a phrase."""
 MOST = 64
 """Rows that one phrase may stand for."""
-_PART = re.compile(r"\s*(\[|\]|\||\{[^{}]*\}|[^\s\[\]{}|]+)")
+_PART = re.compile(r"\s*([][()|]|\{[^{}]*\}|[^][(){}|\s]+)")
+_CLOSES = {"[": "]", "(": ")"}
 
 
 class Slot(NamedTuple):
@@ -33,7 +34,7 @@ class BadPhrase(Exception):
 def rows_of(phrase: str) -> tuple[Row, ...]:
     """All that a phrase stands for: `[…]` may be left out, `a|b` is one of them.
 
-    Inside brackets `|` stands between rows of words, outside between single words.
+    Inside of brackets, `(…)` or `[…]`, `|` stands between rows of words, else between words.
 
     Raises:
         BadPhrase: brackets do not match, it begins with no word, or it stands for too much.
@@ -41,7 +42,7 @@ def rows_of(phrase: str) -> tuple[Row, ...]:
     parts = _PART.findall(phrase)
     found, rest = _sequence(parts, 0, inside=False)
     if rest < len(parts):
-        raise BadPhrase("has a ']' that closes nothing")
+        raise BadPhrase(f"has a {parts[rest]!r} that closes nothing")
     rows = tuple(dict.fromkeys(tuple(p for p in row if p not in ARTICLES) for row in found))
     if any(not row or isinstance(row[0], Slot) for row in rows):
         raise BadPhrase("must begin with a word, such as a verb")
@@ -57,25 +58,25 @@ def slots_of(phrase: str) -> dict[str, str]:
 
 
 def _sequence(parts: list[str], at: int, *, inside: bool) -> tuple[list[Row], int]:
-    """The rows of a sequence, and where it ends: at the `]` that closes it, or at the end."""
+    """The rows of a sequence, and where it ends: at what closes it, or at the end."""
     ended: list[Row] = []
     rows: list[Row] = [()]
-    while at < len(parts) and parts[at] != "]":
+    while at < len(parts) and parts[at] not in "])":
         part = parts[at]
         if part == "|" and inside:
             ended, rows, at = [*ended, *rows], [()], at + 1
             continue
         if part == "|":
             raise BadPhrase("has a '|' with nothing on one side")
-        if part == "[":
+        if part in _CLOSES:
             choices, at = _sequence(parts, at + 1, inside=True)
-            if at >= len(parts):
-                raise BadPhrase("has a '[' that is never closed")
-            choices, at = [(), *choices], at + 1
+            if parts[at : at + 1] != [_CLOSES[part]]:
+                raise BadPhrase(f"has a {part!r} that is never closed")
+            choices, at = [*([()] if part == "[" else []), *choices], at + 1
         else:
             choices, at = [_atom(part)], at + 1
             while not inside and parts[at : at + 1] == ["|"]:
-                if at + 1 >= len(parts) or parts[at + 1] in "[]|":
+                if at + 1 >= len(parts) or parts[at + 1] in "[]()|":
                     raise BadPhrase("has a '|' with nothing on one side")
                 choices.append(_atom(parts[at + 1]))
                 at += 2

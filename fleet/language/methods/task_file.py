@@ -173,4 +173,10 @@ def _method(
                 raise BadTaskFile(f"{where}: {text!r} names {{{name}}}, {more}")
         if "{" in SLOT.sub("", text) or "}" in SLOT.sub("", text):
             raise BadTaskFile(f"{where}: {text!r} has a brace that stands for no parameter")
+    spoken_of = {name for row in rows for text in row for name, _ in SLOT.findall(text)}
+    if unsaid := [name for name in types if name not in spoken_of]:
+        raise BadTaskFile(
+            f"{where}: what it means says nothing of {{{unsaid[0]}}}, which its phrases name: no "
+            "meaning is dropped"
+        )
     return Method(do=tuple(rows), needs=needs)

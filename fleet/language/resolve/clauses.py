@@ -51,7 +51,7 @@ class Clauses:
         self._by_kind: dict[str, Callable[[Clause], None]] = {
             name.removeprefix("on_"): getattr(part, name)
             for part in (claims, questions, shall, commands, ellipsis)
-            for name in dir(part)
+            for name in vars(type(part))
             if name.startswith("on_")
         }
 

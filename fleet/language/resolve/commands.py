@@ -8,6 +8,7 @@ from dataclasses import replace
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.frames import Frame, framed, frames_of, no_use
+from fleet.language.resolve.going import Going
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.looking import ROBOTS_TELL, Looking
 from fleet.language.resolve.mentions import NounPhrase, Subject
@@ -18,11 +19,7 @@ from fleet.language.resolve.stages import GoalDraft
 from fleet.language.resolve.tidiness import Tidiness
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.skill_words import SkillFrame
-from fleet.language.tree.nodes import (
-    Clause,
-    Nouns,
-    Particle,
-)
+from fleet.language.tree.nodes import Clause, Nouns, Particle, Place, Quantity
 from keyexpr_schema.facts import AT, HELD, LOCATED
 from keyexpr_schema.payloads.goals import Condition
 
@@ -45,6 +42,7 @@ class Commands:
         self.skilled = skilled
         self.tidiness = tidiness
         self.questions = questions
+        self.going = Going(ground, wishes)
         self._clause: Clause | None = None
 
     def on_do(self, clause: Clause) -> None:
@@ -86,16 +84,20 @@ class Commands:
 
     def _verb(self, clause: Clause, who: Sequence[Subject] | None) -> None:
         assert clause.verb is not None
+        if who is None:
+            clause, who = self._with_robot(clause)
+        verb = clause.verb
+        assert verb is not None
         self._clause = clause
         problems: list[NotUnderstood] = []
         frames = frames_of(
-            self.scene.tagger, clause.verb, clause.arguments, ("VERB", "FIN", "GER", "PART")
+            self.scene.tagger, verb, clause.arguments, ("VERB", "FIN", "GER", "PART")
         )
         if not frames:
             behind = [word.lexeme.last for word in clause.arguments if isinstance(word, Particle)]
-            end = min([*behind[:1], clause.verb.last + 1, clause.last])
-            said = self.scene.said.quote(clause.verb.first, end)
-            raise no_use(self.scene.tagger, clause.verb, said)
+            end = min([*behind[:1], verb.last + 1, clause.last])
+            said = self.scene.said.quote(verb.first, end)
+            raise no_use(self.scene.tagger, verb, said)
         for frame, phrases in frames:
             before = self.scene.said
             self.scene.said = before.copy()
@@ -113,7 +115,21 @@ class Commands:
             except NotUnderstood as problem:
                 self.scene.said = before
                 problems.append(problem)
+                if self.skilled.fits(frame, phrases):
+                    break
         raise problems[0]
+
+    def _with_robot(self, clause: Clause) -> tuple[Clause, Sequence[Subject] | None]:
+        """The clause without "with the forklift", and who that is."""
+        for place in clause.arguments:
+            if not isinstance(place, Place) or place.role != "with" or place.nouns is None:
+                continue
+            robots = self.nouns.can_be(place.nouns, ("robot",))
+            if robots and not self.nouns.can_be(place.nouns, ("object",)):
+                rest = tuple(a for a in clause.arguments if a is not place)
+                who = self.nouns.subjects(place.nouns, ("robot",), "a robot")
+                return replace(clause, arguments=rest), who
+        return clause, None
 
     def _for_me(self, frame: Frame, skills: Sequence[SkillFrame]) -> Frame:
         """The frame without "for me" and "me", where that says no more than who asks."""
@@ -137,13 +153,13 @@ class Commands:
             self.scene.said.again = self._clause
         self.scene.said.elliptic = "move" if senses & {"move", "go", "give"} else ""
         if "go" in senses and not frame.themes and ("move" not in senses or _whereto(frame)):
-            return self.wishes.go(frame, who)
+            return self.going.go(frame, who)
         if "patrol" in senses and any(not self.who.any_robot(s) for s in who or ()):
             self.who.check_robots(who or ())
             return self.looking.patrol(frame, who or ())
         self._check_who(who)
         if "bin" in senses:
-            return self.wishes.throw_away(frame)
+            return self.tidiness.throw_away(frame)
         if "clear" in senses and "tidy" not in senses:
             return self.tidiness.clear(frame)
         if "move" in senses and (frame.themes or "tidy" not in senses):
@@ -181,10 +197,22 @@ class Commands:
         assert clause.subject is not None and clause.verb is not None
         self._verb(replace(clause, arguments=(clause.subject, *clause.arguments)), None)
 
+    def on_none_there(self, clause: Clause) -> None:
+        """`no forklift in the packing area`."""
+        assert clause.subject is not None
+        where, home = self.wishes.whereto(framed(clause.arguments))
+        if where.target is None or home:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say where: name a place")
+        self.scene.said.never.extend(
+            Condition(relation=where.relation, subject=name, value=where.target)
+            for s in self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+            for name in (s.names if isinstance(s, NounPhrase) else s.subjects)
+        )
+
     def on_not_allowed(self, clause: Clause) -> None:
         """`Scout isn't allowed in the office`."""
         assert clause.subject is not None
-        who = self.nouns.subjects(clause.subject, ("robot",), "a robot")
+        who = self._all_of(clause.subject)
         names = [n for s in who for n in self.who.resolve(s).subjects]
         places = self._entered(framed(clause.arguments))
         self.scene.said.never.extend(
@@ -196,8 +224,17 @@ class Commands:
         assert clause.verb is not None
         who = None
         if clause.subject is not None:
-            who = self.nouns.subjects(clause.subject, ("robot",), "a robot")
+            who = self._all_of(clause.subject)
         self._never(clause, who)
+
+    def _all_of(self, nouns: Nouns) -> list[Subject]:
+        """The robots that must not: "robots" are all of them."""
+        return [
+            replace(s, quantity=Quantity.ALL)
+            if isinstance(s, NounPhrase) and s.plural and s.quantity is Quantity.BARE
+            else s
+            for s in self.nouns.subjects(nouns, ("robot",), "a robot")
+        ]
 
     def _never(self, clause: Clause, who: Sequence[Subject] | None) -> None:
         assert clause.verb is not None

@@ -9,7 +9,7 @@ from fleet.language.resolve.claims import Claims
 from fleet.language.resolve.commands import Commands
 from fleet.language.resolve.frames import EXAMPLE, framed
 from fleet.language.resolve.ground import Ground
-from fleet.language.resolve.mentions import Subject
+from fleet.language.resolve.mentions import NounPhrase, Subject
 from fleet.language.resolve.places import WHERE, Where
 from fleet.language.resolve.scene import PLACES, THINGS
 from fleet.language.resolve.wishes import Wishes
@@ -17,6 +17,7 @@ from fleet.language.tree.nodes import (
     Clause,
     Nouns,
     Place,
+    Quantity,
 )
 
 
@@ -112,6 +113,10 @@ class Continuations:
         noun = self.nouns.subject(clause.subject.items[0], ("object",), "an object")
         will_do = self.who.resolve(self.who.movable(noun)).subjects
         asked = [m for m in self.scene.said.recent if m.open and set(m.subjects) & set(will_do)]
+        speaker = self.scene.vocabulary.speaker
+        anything = isinstance(noun, NounPhrase) and noun.quantity is Quantity.ANY
+        if not asked and anything and not clause.arguments and speaker and not self.scene.mode:
+            return self._to_person(clause.subject, speaker)  # "some fruit would be nice"
         if len(asked) != 1:
             raise NotUnderstood(
                 f"{self.scene.said.clause!r}: nothing was asked for before that it could do for"
@@ -121,3 +126,4 @@ class Continuations:
         if clause.arguments:
             where, home = self.wishes.whereto(framed(clause.arguments))
             self.wishes.to_target([meant], where, home)
+        return None

@@ -32,6 +32,8 @@ class Frame:
     themes: tuple[Nouns, ...]
     places: tuple[Place, ...]
     particles: tuple[Particle, ...] = ()
+    apart: bool = False
+    """Whether a particle stands behind the thing: "put the cups away"."""
 
     @property
     def home(self) -> bool:
@@ -56,12 +58,14 @@ def framed(
             raise NotUnderstood("'except' leaves something out, and it is not said of what")
         last = replace(themes[-1].items[-1], but=left_out.nouns)
         themes[-1] = replace(themes[-1], items=(*themes[-1].items[:-1], last))
+    kinds = [type(a) for a in arguments if isinstance(a, Nouns | Particle)]
     return Frame(
         verb,
         senses,
         tuple(themes),
         tuple(a for a in arguments if isinstance(a, Place)),
         tuple(a for a in arguments if isinstance(a, Particle)),
+        kinds[:1] == [Nouns] and Particle in kinds,
     )
 
 
@@ -103,7 +107,7 @@ def _fitted(
             places.remove(at)
             themes = (at.nouns,)
         break
-    return Frame(verb, senses, themes, tuple(places), tuple(left))
+    return Frame(verb, senses, themes, tuple(places), tuple(left), frame.apart)
 
 
 def no_use(tagger: Tagger, verb: Lexeme, said: str) -> Misused:

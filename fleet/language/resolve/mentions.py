@@ -15,11 +15,20 @@ _MOST = 6
 
 
 class WhichOne(NotUnderstood):
-    """A noun phrase could be one of several; `key` is the token at which it begins."""
+    """A noun phrase could be one of several; `key` is the token at which it begins.
 
-    def __init__(self, sentence: str, key: int, names: tuple[str, ...]) -> None:
+    `choices` are those who can be meant by it: one, or several together.
+    """
+
+    def __init__(
+        self,
+        sentence: str,
+        key: int,
+        names: tuple[str, ...],
+        choices: tuple[tuple[str, ...], ...] = (),
+    ) -> None:
         super().__init__(sentence)
-        self.key, self.names = key, names
+        self.key, self.choices = key, choices or tuple((name,) for name in names)
 
 
 @dataclass(frozen=True)

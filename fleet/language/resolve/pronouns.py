@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
@@ -54,6 +54,25 @@ class Pronouns:
         movable = thing.is_a(Feature.MOVABLE) and thing.object not in meant[0].subjects
         return thing.object if just and movable else None
 
+    def that_can(self, noun: Noun, able: Collection[str]) -> Mention | None:
+        """Whom "it" means, of those that something can be done to; `None`: of none of them.
+
+        Raises:
+            WhichOne: what was spoken of and what it was put in or on could both be meant.
+        """
+        said = self.scene.said
+        if noun.words != ("it",) or noun.first in said.chosen or any(m.open for m in said.recent):
+            return None
+        names = [m.subjects[0] for m in said.recent if len(m.subjects) == 1]
+        just = [wish.value for wish in said.draft.stages[-1][-1:]]
+        names += [said.carrier] if said.carrier is not None and said.carrier in just else []
+        fit = tuple(dict.fromkeys(name for name in names if name in able))
+        if len(fit) > 1:
+            text = said.quote(noun.first, noun.last)
+            sentence = f"{text!r} could be {one_of(fit)}: name what you mean"
+            raise WhichOne(sentence, noun.first, fit)
+        return Mention(fit, "object", noun.first) if fit else None
+
     def pronoun(self, noun: Noun, types: Sequence[EntityType]) -> Mention:
         """Whom a pronoun means.
 
@@ -65,9 +84,9 @@ class Pronouns:
         if word in PERSONAL and said.person is not None:
             return Mention((said.person,), "object", noun.first)
         if (chosen := said.chosen.get(noun.first)) is not None:
-            types_of = [m.type for m in said.recent if chosen in m.subjects]
+            types_of = [m.type for m in said.recent if set(chosen) & set(m.subjects)]
             of_type: EntityType = types_of[0] if types_of else "object"
-            return Mention((chosen,), of_type, noun.first)
+            return Mention(chosen, of_type, noun.first)
         if "object" not in types and "place" in types and word == "it" and said.last_place:
             return Mention((said.last_place,), "place", noun.first)
         plural = word in _PLURAL or len(noun.words) > 1

@@ -184,7 +184,7 @@ class Questions:
         names = [name for subject in found for name in self.who.resolve(subject).subjects]
         if len(names) != 1:
             raise NotUnderstood(f"{self.scene.said.clause!r}: ask of one at a time")
-        relation = self.wishes.relation_of(names[0])
+        relation = self.scene.vocabulary.relation_to(names[0])
         self.asks(
             Question("which", (), (Condition(relation=relation, subject="?", value=names[0]),))
         )
@@ -233,12 +233,16 @@ class Questions:
         plain = replaced(clause, subject=held, arguments=(), predicate=None)
         if any(noun.quantity is Quantity.ANY for noun in held.items):
             names, own = self._asked_of(held)
-            has = Condition(relation=self.wishes.relation_of(holders[0]), subject="?",
+            has = Condition(relation=self.scene.vocabulary.relation_to(holders[0]), subject="?",
                             value=holders[0])  # fmt: skip
             return self.asks(Question("whether", names, (has, *own)))
         assert plain.subject is not None
         rows = tuple(
-            Condition(relation=self.wishes.relation_of(holders[0]), subject=name, value=holders[0])
+            Condition(
+                relation=self.scene.vocabulary.relation_to(holders[0]),
+                subject=name,
+                value=holders[0],
+            )
             for subject in self.nouns.subjects(held, THINGS, "an object")
             for name in self.who.resolve(subject).subjects
         )

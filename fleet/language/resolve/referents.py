@@ -18,7 +18,6 @@ from keyexpr_schema.facts import (
     FactKey,
     Literal,
 )
-from keyexpr_schema.payloads.world import Feature
 
 
 class Referents:
@@ -86,8 +85,7 @@ class Referents:
         """
         if isinstance(subject, Mention) or subject.type != "object":
             return subject
-        things = self.scene.vocabulary.objects.values()
-        return self.fit(subject, {o.object for o in things if o.is_a(Feature.MOVABLE)}, "move")
+        return self.fit(subject, self.scene.vocabulary.movable, "move")
 
     def fit(self, subject: Subject, able: Collection[str], verb: str) -> Subject:
         """The same, without those that the verb cannot be done to where the words leave that open.

@@ -66,8 +66,18 @@ class Skilled:
             raise NotUnderstood(
                 f"{self.scene.said.clause!r} ends where an object is missing; known are {known}"
             )
-        things = self.nouns.subjects(themes[0], ("object",), "an object")
+        able = {
+            o.object
+            for o in self.scene.vocabulary.objects.values()
+            if any(p.fits(o) for p in phrases)
+        }
+        it = self.nouns.pronouns.that_can(themes[0].items[0], able)
+        things = [it] if it else self.nouns.subjects(themes[0], ("object",), "an object")
         where = None
+        places = tuple(
+            replace(p, role="in") if p.special in ("there", "here") and not p.preposition else p
+            for p in places
+        )
         if places:
             if stray := [p for p in places if p.role not in WHERE or p.role == "to"]:
                 text = self.scene.said.quote(stray[0].first, stray[0].last)
@@ -77,11 +87,6 @@ class Skilled:
             raise NotUnderstood(
                 f"{sorted(frame.particle_words)[0]!r} is not understood after {frame.verb!r}"
             )
-        able = {
-            o.object
-            for o in self.scene.vocabulary.objects.values()
-            if any(p.fits(o) for p in phrases)
-        }
         carrier = self.scene.said.carrier
         things = [
             Mention((carrier,), "object", thing.key)
@@ -99,6 +104,20 @@ class Skilled:
             fitting = next((p for p in phrases if all(map(p.fits, meant))), phrase)
             self.wish([mention], fitting.wants)
         return None
+
+    def fits(self, frame: Frame, frames: Sequence[SkillFrame]) -> bool:
+        """Whether the skill can be done to what is named, so that the verb means nothing else."""
+        if len(frame.themes) != 1 or not self.nouns.can_be(frame.themes[0], ("object",)):
+            return False
+        able = {
+            o.object
+            for o in self.scene.vocabulary.objects.values()
+            if any(f.phrase.fits(o) for f in frames if f.phrase.type not in ("place", "robot"))
+        }
+        subjects = self.nouns.subjects(frame.themes[0], ("object",), "an object")
+        return any(
+            set(s.names if isinstance(s, NounPhrase) else s.subjects) & able for s in subjects
+        )
 
     def _done_by(self, frame: Frame, phrase: SkillPhrase, who: Sequence[Subject] | None) -> None:
         """`dock`: a robot does it with itself; any that can, where nobody is named."""

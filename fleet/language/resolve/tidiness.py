@@ -10,10 +10,12 @@ from fleet.language.refusals import one_of
 from fleet.language.resolve.frames import HOME_HINT, Frame
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention, NounPhrase
+from fleet.language.resolve.scene import THINGS
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import (
     Nouns,
 )
+from keyexpr_schema.facts import IN
 from keyexpr_schema.payloads.world import Feature
 
 
@@ -51,6 +53,26 @@ class Tidiness:
         if not names:
             raise NotUnderstood(f"nothing has a home: {HOME_HINT}")
         return self._to_their_homes(names, homes)
+
+    def throw_away(self, frame: Frame) -> None:
+        """`throw away the newspaper`: into the one bin there is."""
+        if len(frame.themes) != 1:
+            raise NotUnderstood(f"{self.scene.said.clause!r} does not say what to throw away")
+        bins = {
+            e.id
+            for words in self.scene.tagger.book.bins
+            for e in self.scene.lexicon.meant(words)
+            if Feature.CONTAINS in self.scene.vocabulary.good_for.get(e.id, ())
+        }
+        if not bins:
+            raise NotUnderstood(f"{self.scene.said.clause!r}: no bin is known to throw it into")
+        where, _ = self.wishes.whereto(frame, fetching=True)
+        if where.target is None and len(bins) != 1:
+            raise NotUnderstood(f"it could be {one_of(sorted(bins))}: say which bin")
+        target = where.target or min(bins)
+        moved = self.nouns.subjects(frame.themes[0], THINGS, "an object")
+        where = replace(where, target=target, target_type="object", relation=IN)
+        return self.wishes.to_target(moved, where, False)
 
     def _about_things(self, theme: Nouns) -> bool:
         return self.nouns.can_be(theme, ("object",))

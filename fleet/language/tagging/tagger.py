@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import MutableMapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from fleet.language.tagging.lexicon import ENTITY_TYPES, Entity, Lexicon, lexicon_of
+from fleet.language.tagging.lexicon import ENTITY_TYPES, Entity, Lexicon
 from fleet.language.tagging.skill_words import SkillWords
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.times import TimePhrase, time_at
@@ -46,7 +47,7 @@ class Tagger:
 
     def __init__(self, vocabulary: Vocabulary) -> None:
         self.book = vocabulary.wordbook
-        self.lexicon: Lexicon = lexicon_of(vocabulary)
+        self.lexicon = Lexicon(vocabulary)
         self.verbs = SkillWords(vocabulary)
         self.phrases: dict[Phrase, frozenset[str]] = dict(self.book.phrases)
         more: dict[Phrase, set[str]] = {}
@@ -163,22 +164,26 @@ class Tagger:
         return at, frozenset()
 
 
-_KEPT: deque[tuple[Vocabulary, Tagger]] = deque(maxlen=4)
+_KEPT: deque[tuple[tuple[Any, ...], Tagger]] = deque(maxlen=4)
+"""Taggers that were made, by the names that they were made from."""
 
 
 def tagger_of(vocabulary: Vocabulary) -> Tagger:
-    """The tagger of a vocabulary: made once for the very same names, where these cannot change."""
+    """The tagger of a vocabulary: made once for the same names.
+
+    Mappings that cannot change are the same only if they are the very same, which costs nothing.
+    """
+    mappings = (vocabulary.places, vocabulary.objects, vocabulary.robots)
+    names = (
+        vocabulary.wordbook,
+        *(tuple(m.items()) if isinstance(m, MutableMapping) else m for m in mappings),
+        vocabulary.skill_phrases,
+        vocabulary.state_words,
+    )
     for known, tagger in _KEPT:
-        if (
-            known.places is vocabulary.places
-            and known.objects is vocabulary.objects
-            and known.robots is vocabulary.robots
-            and known.skill_phrases is vocabulary.skill_phrases
-            and known.wordbook is vocabulary.wordbook
-        ):
+        pairs = zip(known, names, strict=True)
+        if all(one is other or (isinstance(one, tuple) and one == other) for one, other in pairs):
             return tagger
     tagger = Tagger(vocabulary)
-    mappings = (vocabulary.places, vocabulary.objects, vocabulary.robots)
-    if not any(isinstance(names, MutableMapping) for names in mappings):
-        _KEPT.append((vocabulary, tagger))
+    _KEPT.append((names, tagger))
     return tagger

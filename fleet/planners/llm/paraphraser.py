@@ -10,7 +10,7 @@ from typing import NamedTuple
 import msgspec
 
 from fleet.core.model.world import WorldModel
-from fleet.core.understanding import one_goal
+from fleet.core.understanding import wanted_goals
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Reading, Vocabulary, read
 from fleet.language.methods.model import CompoundTask
@@ -69,7 +69,7 @@ class LlmParaphraser:
         now: datetime | None = None,
         *,
         world: WorldModel | None = None,
-        check: Callable[[Reading], object] = one_goal,
+        check: Callable[[Reading], object] = wanted_goals,
         budget: Budget | None = None,
     ) -> Paraphrase | str:
         """The sentence in others that are read, as a goal, or a sentence that says why not.

@@ -19,7 +19,7 @@ ODD = CompoundTask(
     says=("make tea", 'brew "tea: hot" [for {n: number}]'),
     methods=(
         Method(do=(("bring {n} cups to the hall",), ("open # it", "shut it")), needs=("{n} cup",)),
-        Method(do=(("find a cup",),)),
+        Method(do=(("find {n} cups",),)),
     ),
     about="what it's about: tea",
     defaults={"n": "2"},
@@ -37,8 +37,10 @@ def test_tasks_are_added_behind_those_of_a_file(tmp_path: Path) -> None:
     add_task(path, entry_of(ODD))
     text = f"# my tasks\n{path.read_text()}  # the end\n\n\n"
     path.write_text(text)
-    add_task(path, entry_of(replace(ODD, name="make_coffee", says=("make coffee",), defaults={},
-                                    methods=ODD.methods[1:])))  # fmt: skip
+    coffee = CompoundTask(
+        name="make_coffee", says=("make coffee",), methods=(Method(do=(("find a cup",),)),)
+    )
+    add_task(path, entry_of(coffee))
     assert [task.name for task in load_tasks(path)] == ["make_tea", "make_coffee"]
     assert path.read_text().startswith(text.rstrip())
     assert [each.name for each in path.parent.iterdir()] == ["mine.yaml"]

@@ -137,9 +137,16 @@ class Reader:
         return states
 
     def _segment(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
-        if (call := called(segment.words, self.tagger)) and not (segment.role or segment.always):
-            return self._task(call, states)
+        call = called(segment.words, self.tagger)
         segment = replace(segment, words=spoken_out(segment.words))
+        if call is not None and not (segment.role or segment.always):
+            if call.task.yields:
+                with suppress(NotUnderstood):
+                    return self._clauses(segment, states)
+            return self._task(call, states)
+        return self._clauses(segment, states)
+
+    def _clauses(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
         words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
         if words > MOST_WORDS_TOGETHER:
             raise NotUnderstood(

@@ -12,7 +12,7 @@ from fleet.errors import NotUnderstood
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
-from fleet.language.reading import Ambiguity, Reading, WantedGoal
+from fleet.language.reading import Reading, WantedGoal
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
@@ -35,7 +35,7 @@ MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 80
 """In one clause; of a long list one for each thing."""
-_CHOICES = 12
+CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
@@ -204,7 +204,7 @@ class Reader:
 
     def _each(self, which: WhichOne, segment: Segment, states: Sequence[_State]) -> list[_State]:
         """The readings in which a noun phrase means one, then another of those that it can."""
-        if len(which.choices) > _CHOICES or len(states) > _CHOICES:
+        if len(which.choices) > CHOICES or len(states) > CHOICES:
             return []
         found: list[_State] = []
         for meant in which.choices:
@@ -314,7 +314,15 @@ class Reader:
             assert problem is not None
             raise problem
         rows = [(cost, asked, reading) for reading, (cost, asked) in found.items()]
-        return sorted(rows, key=lambda row: row[0])
+        best: dict[Reading, Row] = {}
+        for each in sorted(rows, key=lambda row: (row[0], not self._believed(row[2]))):
+            best.setdefault(replace(each[2], presumed=()), each)  # what is presumed asks nothing
+        return list(best.values())
+
+    def _believed(self, reading: Reading) -> bool:
+        """Whether all that it takes for granted is believed."""
+        is_at = self.vocabulary.is_at
+        return all(is_at(key.subject, str(value)) for key, value in reading.presumed)
 
     def _reading(self, state: _State, now: datetime | None, dangling: bool) -> Reading:
         said = state.said.copy()
@@ -361,50 +369,3 @@ class Reader:
         said.draft = GoalDraft(self.vocabulary.is_at)
         said.always, said.never, said.when, said.only_if = [], [], [], []
         said.times = []
-
-
-def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Reading | Ambiguity:
-    """What a text asks for, says, or asks; of several meanings the plainest.
-
-    `now` is what the clock says, with its zone, for times of day.
-
-    Raises:
-        NotUnderstood: it means nothing here; one sentence says why.
-    """
-    return _one(Reader(text, vocabulary).read(now))
-
-
-def _one(readings: Sequence[tuple[int, str, Reading]]) -> Reading | Ambiguity:
-    least, asked = readings[0][:2]
-    best = [reading for cost, _, reading in readings if cost == least]
-    if len(best) == 1:
-        return best[0]
-    candidates = tuple((each.understood_as, each) for each in best[:_CHOICES])
-    return Ambiguity(best[0].text, candidates, asked)
-
-
-def read_goal(text: str, vocabulary: Vocabulary) -> Reading:
-    """What a text asks for, where it asks for one goal that is to be reached once.
-
-    Raises:
-        NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
-    """
-    reading = _one(Reader(text, vocabulary, "goal").read(None))
-    if isinstance(reading, Ambiguity):
-        raise NotUnderstood(reading.sentence)
-    if reading.facts or any(goal != WantedGoal(goal.stages, priority=goal.priority)
-                            for goal in reading.goals):  # fmt: skip
-        raise NotUnderstood(f"{reading.text!r} says more than what shall be reached: leave it out")
-    return reading
-
-
-def statement_facts(text: str, vocabulary: Vocabulary) -> tuple[Literal, ...]:
-    """The facts in a statement, where the value `None` is *unknown*.
-
-    Raises:
-        NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
-    """
-    reading = _one(Reader(text, vocabulary, "fact").read(None))
-    if isinstance(reading, Ambiguity):
-        raise NotUnderstood(reading.sentence)
-    return reading.facts

@@ -19,7 +19,7 @@ from fleet.language.resolve.stages import GoalDraft
 from fleet.language.resolve.tidiness import Tidiness
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.skill_words import SkillFrame
-from fleet.language.tree.nodes import Clause, Nouns, Particle, Quantity
+from fleet.language.tree.nodes import Clause, Nouns, Particle, Place, Quantity
 from keyexpr_schema.facts import AT, HELD, LOCATED
 from keyexpr_schema.payloads.goals import Condition
 
@@ -84,16 +84,20 @@ class Commands:
 
     def _verb(self, clause: Clause, who: Sequence[Subject] | None) -> None:
         assert clause.verb is not None
+        if who is None:
+            clause, who = self._with_robot(clause)
+        verb = clause.verb
+        assert verb is not None
         self._clause = clause
         problems: list[NotUnderstood] = []
         frames = frames_of(
-            self.scene.tagger, clause.verb, clause.arguments, ("VERB", "FIN", "GER", "PART")
+            self.scene.tagger, verb, clause.arguments, ("VERB", "FIN", "GER", "PART")
         )
         if not frames:
             behind = [word.lexeme.last for word in clause.arguments if isinstance(word, Particle)]
-            end = min([*behind[:1], clause.verb.last + 1, clause.last])
-            said = self.scene.said.quote(clause.verb.first, end)
-            raise no_use(self.scene.tagger, clause.verb, said)
+            end = min([*behind[:1], verb.last + 1, clause.last])
+            said = self.scene.said.quote(verb.first, end)
+            raise no_use(self.scene.tagger, verb, said)
         for frame, phrases in frames:
             before = self.scene.said
             self.scene.said = before.copy()
@@ -114,6 +118,18 @@ class Commands:
                 if self.skilled.fits(frame, phrases):
                     break
         raise problems[0]
+
+    def _with_robot(self, clause: Clause) -> tuple[Clause, Sequence[Subject] | None]:
+        """The clause without "with the forklift", and who that is."""
+        for place in clause.arguments:
+            if not isinstance(place, Place) or place.role != "with" or place.nouns is None:
+                continue
+            robots = self.nouns.can_be(place.nouns, ("robot",))
+            if robots and not self.nouns.can_be(place.nouns, ("object",)):
+                rest = tuple(a for a in clause.arguments if a is not place)
+                who = self.nouns.subjects(place.nouns, ("robot",), "a robot")
+                return replace(clause, arguments=rest), who
+        return clause, None
 
     def _for_me(self, frame: Frame, skills: Sequence[SkillFrame]) -> Frame:
         """The frame without "for me" and "me", where that says no more than who asks."""

@@ -19,6 +19,7 @@ from fleet.language.tree.nodes import (
 )
 from fleet.language.words.tokens import ORDINALS, Token, words_of
 
+_ALL_OF_IT = (Quantity.THE, Quantity.ALL, Quantity.BARE)
 _SINGULAR = ("ss", "us", "is")
 
 
@@ -91,7 +92,18 @@ class NounResolver:
         if chosen is not None and set(chosen) <= set(made.names):
             several = Quantity.ALL if len(chosen) > 1 else made.quantity
             return replace(made.among(chosen), quantity=several, exact=True, source=None)
-        return self._salient(self._spoken_briefly(noun, made))
+        return self._where_sent(self._salient(self._spoken_briefly(noun, made)))
+
+    def _where_sent(self, made: NounPhrase) -> NounPhrase:
+        """Of several, those where somebody was just sent: "go to room 102, turn the light off"."""
+        if made.quantity is not Quantity.THE or made.plural or made.source is not None:
+            return made
+        last = self.scene.said.draft.stages[-1][-1:]
+        if made.ordinal is not None or len(made.names) < 2 or not (last and last[0].means):
+            return made
+        place, is_at = str(last[0].value), self.scene.vocabulary.is_at
+        there = made.among([name for name in made.names if is_at(name, place)])
+        return there if there.found else made
 
     def _spoken_briefly(self, noun: Noun, made: NounPhrase) -> NounPhrase:
         """Bare plurals of a sentence without articles are all of them: "lights off"."""
@@ -102,7 +114,10 @@ class NounResolver:
 
     def _salient(self, made: NounPhrase) -> NounPhrase:
         """Of several, the one that was spoken of: "the plate" after "plate 2"."""
-        if made.quantity is not Quantity.THE or made.plural or made.source is not None:
+        definite = made.quantity is Quantity.THE or (
+            made.quantity is Quantity.BARE and self.scene.said.telegraphic and not self.scene.mode
+        )
+        if not definite or made.plural or made.source is not None:
             return made
         if made.ordinal is not None or made.count is not None or len(made.names) < 2:
             return made
@@ -113,6 +128,10 @@ class NounResolver:
 
     def _described_by_words(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
         text = self.scene.said.quote(noun.first, noun.last)
+        if noun.floor:  # it can be cleaned; what lies on it is in the place, and nowhere in it
+            if "place" not in types or {"robot", "object"} & set(types):
+                raise self.unknown(noun, types, what)
+            types = ("place",)
         made = NounPhrase((), text, noun.first, noun.quantity, count=noun.count)
         made = self._headed(noun, made, types, what)
         made = self._owned(noun, made)
@@ -163,6 +182,7 @@ class NounResolver:
         named = self._named(head, noun.head[0].text, types)
         if named and not noun.numbers:
             self._remember_kind(named[0])
+            self._remember_owner(named, head)
             return replace(made, found=named, exact=True)
         return self._described(noun, made, types, what)
 
@@ -184,11 +204,13 @@ class NounResolver:
         self, noun: Noun, made: NounPhrase, types: Sequence[EntityType], what: str
     ) -> NounPhrase:
         words = noun.head[0].words
+        collective = self.scene.tagger.book.collective
         tokens = _tokens(words)
         end, found = self.scene.lexicon.described(tokens, 0, types)
         # "The kitchen" is the place of that name, and no table that is called by it, too.
         named_end, named = self.scene.lexicon.exact(tokens, 0, ENTITY_TYPES)
         other = named and named_end == len(words) and all(e.type == "place" for e in named)
+        other = other and self.scene.lexicon.kind(tokens, 0, len(words), types) is None
         if end != len(words) or not found or (other and "place" not in types):
             raise self.unknown(noun, types, what)
         plural, generic = False, False
@@ -196,6 +218,7 @@ class NounResolver:
         if kind is not None and (of_kind := tuple(e for e in found if e in kind[1])):
             plural, found = kind[0], of_kind
             plural = plural or (words[-1].endswith("s") and not words[-1].endswith(_SINGULAR))
+            plural = plural or (words[-1] in collective and noun.quantity in _ALL_OF_IT)
             category = any(words[0] in (c, f"{c}s") for cs in CATEGORIES.values() for c in cs)
             generic = len(words) == 1 and len(found) == len(kind[1]) and category
         if noun.of:
@@ -204,6 +227,8 @@ class NounResolver:
         if noun.ordinals or noun.numbers or said_plainly:  # the first cup is no mug
             closest = tuple(e for e in found if self.scene.lexicon.is_kin(words, e))
             found = closest or found
+        if noun.form == "one":  # "the red one", of the kind that was spoken of
+            found = tuple(e for e in found if e in self.kind) or found
         self._remember_kind(found[0])
         if noun.form == "one":
             return replace(made, found=found, plural=noun.head[-1].spoken == "ones")
@@ -260,6 +285,7 @@ class NounResolver:
             owner = self.scene.vocabulary.speaker
         elif noun.determiner in ("his", "her", "their"):
             owner = said.person
+            made = self._place_of(owner, made) if owner is not None else made
         things = self.scene.vocabulary.objects
         owned = [
             n for n in made.names if n in things and things[n].properties.get("owner") == owner
@@ -269,6 +295,17 @@ class NounResolver:
         if noun.whose is not None:
             raise NotUnderstood(f"{made.text!r}: nothing of that kind is known to be {owner}'s")
         return made
+
+    def _place_of(self, owner: str, made: NounPhrase) -> NounPhrase:
+        """`her office`, of a place that is called "Carla's office"."""
+        names = [words_of(self.scene.vocabulary.objects[owner].label), words_of(owner)]
+        called = [
+            e.stands_for
+            for e in made.found
+            if e.type == "place"
+            and any(name[: len(own) + 1] == (*own, "'s") for name in e.names for own in names)
+        ]
+        return made.among(called) if called else made
 
     def _useful(self, made: NounPhrase, verb: str) -> NounPhrase:
         known = {use for e in self.scene.lexicon.entities if e.type == "object" for use in e.uses}
@@ -343,6 +380,13 @@ class NounResolver:
     def _remember_kind(self, entity: Entity) -> None:
         if entity.type in ("object", "robot"):
             self.scene.said.kind_of = entity
+
+    def _remember_owner(self, named: Sequence[Entity], words: tuple[str, ...]) -> None:
+        """Of "Mr Jones's lunch", Mr Jones is whom "him" means."""
+        thing = self.scene.vocabulary.objects.get(named[0].id)
+        owner = thing.properties.get("owner") if thing is not None and "'s" in words else None
+        if len(named) == 1 and isinstance(owner, str):
+            self.scene.said.spoken_of((owner,))
 
     def unknown(self, noun: Noun, types: Sequence[EntityType], what: str) -> NotUnderstood:
         """The phrase names nothing known of these types."""

@@ -59,6 +59,8 @@ class Where:
     each: tuple[str, ...] = ()
     text: str = ""
     relation: str = AT
+    guessed: str | None = None
+    """The source, where no word says that it is one: "the book on the sofa on the shelf"."""
 
 
 class PlaceResolver:
@@ -83,7 +85,7 @@ class PlaceResolver:
             shown = [(word, word) for word in place.preposition.split()]
             raise NotUnderstood(reason_for(shown) or f"{text!r} is not understood")
         if place.special == "there":
-            return Locative(place.role, self._there(place, text))
+            return Locative(place.role, self._there(place, text), words)
         if place.special == "here":
             return Locative(place.role, self._here(text))
         if place.special in ("anywhere", "house", "home") or place.nouns is None:
@@ -139,7 +141,21 @@ class PlaceResolver:
             return
         raise NotUnderstood(f"{thing.text!r}: nothing can be put on or in {one_of(thing.names)}")
 
+    def _in_there(self, place: Place, text: str) -> NounPhrase | None:
+        """`put it in there`: into what was named last that others can be in."""
+        wanted = Feature.SUPPORTS if place.preposition in ("on", "onto") else Feature.CONTAINS
+        for names in reversed(self.scene.said.named):
+            if len(names) == 1 and names[0] in self.scene.vocabulary.places:
+                return None
+            if len(names) == 1 and wanted in self.scene.vocabulary.good_for.get(names[0], ()):
+                entities = self.scene.lexicon.entities
+                found = tuple(e for e in entities if e.id == names[0] and e.type == "surface")
+                return NounPhrase(found, text, place.first, exact=True)
+        return None
+
     def _there(self, place: Place, text: str) -> NounPhrase:
+        if place.preposition and (inside := self._in_there(place, text)) is not None:
+            return inside
         if self.scene.said.last_place is None:
             raise NotUnderstood('"there" refers to no place before it: name the place')
         entities = self.scene.lexicon.entities
@@ -191,6 +207,7 @@ class PlaceResolver:
         Raises:
             NotUnderstood: a phrase could be several places, or the phrases do not go together.
         """
+        shifted = False
         targets = [p for p in locatives if p.role == "to"]
         inside = [p for p in locatives if p.role == "in"]
         sources = [p for p in locatives if p.role == "from"]
@@ -201,10 +218,11 @@ class PlaceResolver:
         elif fetching:
             sources = [p for p in locatives if p.role in ("in", "from")]
         else:
-            targets = inside
+            targets, guessed = inside, len(inside)
             while len(targets) > 1 and not self._shared(targets):
                 sources = [targets[0], *sources]
                 targets = targets[1:]
+            shifted = len(targets) < guessed
         source, _ = self._one(sources) if sources else (None, "place")
         if len(targets) == 1 and targets[0].noun.quantity is Quantity.ALL:
             each = targets[0].noun.resolve()
@@ -224,6 +242,7 @@ class PlaceResolver:
             _surface(sources, source),
             _surface(targets, target),
             relation=self._relation(targets, target) if target is not None else AT,
+            guessed=source if shifted else None,
         )
 
     def _relation(self, locatives: Sequence[Locative], target: str) -> str:

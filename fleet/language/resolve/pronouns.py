@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import one_of
@@ -53,6 +53,25 @@ class Pronouns:
         just = [wish for wish in placed if wish.value == carrier]
         movable = thing.is_a(Feature.MOVABLE) and thing.object not in meant[0].subjects
         return thing.object if just and movable else None
+
+    def that_can(self, noun: Noun, able: Collection[str]) -> Mention | None:
+        """Whom "it" means, of those that something can be done to; `None`: of none of them.
+
+        Raises:
+            WhichOne: what was spoken of and what it was put in or on could both be meant.
+        """
+        said = self.scene.said
+        if noun.words != ("it",) or noun.first in said.chosen or any(m.open for m in said.recent):
+            return None
+        names = [m.subjects[0] for m in said.recent if len(m.subjects) == 1]
+        just = [wish.value for wish in said.draft.stages[-1][-1:]]
+        names += [said.carrier] if said.carrier is not None and said.carrier in just else []
+        fit = tuple(dict.fromkeys(name for name in names if name in able))
+        if len(fit) > 1:
+            text = said.quote(noun.first, noun.last)
+            sentence = f"{text!r} could be {one_of(fit)}: name what you mean"
+            raise WhichOne(sentence, noun.first, fit)
+        return Mention(fit, "object", noun.first) if fit else None
 
     def pronoun(self, noun: Noun, types: Sequence[EntityType]) -> Mention:
         """Whom a pronoun means.

@@ -13,7 +13,7 @@ from fleet.language.resolve.looking import Looking
 from fleet.language.resolve.mentions import Mention
 from fleet.language.resolve.scene import PLACES, THINGS
 from fleet.language.resolve.skilled import Skilled
-from fleet.language.resolve.stages import GoalDraft
+from fleet.language.resolve.stages import PLACED, GoalDraft
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tagging.tagger import Lexeme
@@ -277,7 +277,14 @@ class Shall:
         return self.claims.placed(clause.subject, clause.arguments)
 
     def on_kept(self, clause: Clause) -> None:
-        self.scene.said.always.extend(self._aside(clause.subject, clause.predicate))
+        kept = self._aside(clause.subject, clause.predicate)
+        is_at = self.scene.vocabulary.is_at
+        leaves = any(word.words == ("leave",) for word in clause.words)
+        for each in kept:
+            there = any(is_at(name, str(each.value)) for name in each.subjects)
+            if leaves and each.relation in PLACED and not there:
+                raise NotUnderstood(f"{self.scene.said.clause!r}: it is not there yet")
+        self.scene.said.always.extend(kept)
 
     def on_never_be(self, clause: Clause) -> None:
         self.scene.said.never.extend(self._aside(clause.subject, clause.predicate))

@@ -35,6 +35,8 @@ class Wish:
     means: bool = False
     whereto: bool = False
     by: tuple[str, ...] | None = ()
+    shared: bool = False
+    """Whether what fulfils it may fulfil another one, too: pairs of "two of the three"."""
 
     def condition(self) -> Condition:
         """The condition that makes it true."""
@@ -106,6 +108,7 @@ class GoalDraft:
                 means,
                 whereto,
                 None if mention.type == "robot" else self.by,
+                mention.least > 1,
             )
             for number, subjects in enumerate(each)
         )
@@ -304,7 +307,7 @@ def _check_open(kept: Sequence[Wish], fixed: dict[tuple[str, str], Wish]) -> Non
 
     Wishes are matched with subjects by augmenting paths (Kuhn 1955).
     """
-    at = [wish for wish in kept if wish.open and wish.relation in PLACED]
+    at = [wish for wish in kept if wish.open and wish.relation in PLACED and not wish.shared]
     for wish in at:
         for other in at:
             if wish.key == other.key and wish.value != other.value:

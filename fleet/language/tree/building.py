@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from fleet.language.tagging.tagger import Lexeme, Tagger
@@ -47,12 +48,25 @@ class Builder:
         return children
 
     def make_args(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        children = self._receiver_somewhere(children)
         nouns = [i for i, child in enumerate(children) if isinstance(child, Nouns)]
         if len(nouns) > 2 or (len(nouns) == 2 and nouns[1] != nouns[0] + 1):
             return None
         if len(nouns) == 2 and not self._receives(children[nouns[0]]):
             return None
         return _Arguments(children)
+
+    def _receiver_somewhere(self, children: tuple[Any, ...]) -> tuple[Any, ...]:
+        """With "the patient in room 102" as one, where what they are to have follows."""
+        if len(children) < 3 or not isinstance(children[0], Nouns):
+            return children
+        first, place, nouns = children[:3]
+        if not isinstance(place, Place) or not isinstance(nouns, Nouns) or place.special:
+            return children
+        if place.role != "in" or not self._receives(first):
+            return children
+        where = replace(first.items[0], places=(place,))
+        return (replace(first, items=(where,)), *children[2:])
 
     def _receives(self, nouns: Nouns) -> bool:
         """Whether something can be given to them: "give the robot the cup"."""

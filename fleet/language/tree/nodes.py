@@ -67,6 +67,8 @@ class Noun:
     whose: Noun | None = None
     """Whose it is: "Anna's mug"."""
     determiner: str = ""
+    floor: bool = False
+    """Whether it is the floor of a place."""
 
 
 @_hashed_once

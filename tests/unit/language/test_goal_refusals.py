@@ -192,7 +192,7 @@ from tests.support.language_house import WORDS
         ("bring a book to a room", "'a room' could be hallway, kitchen or living_room: say which"),
         (
             "bring the book to the kitchen with the hsr",
-            "'with' says how or by whom it is to be done;",
+            "hsr cannot be told to do it",
         ),
         ("put the book down", "'put the book down' does not say where to"),
         ("send the robot to the kitchen", "'the robot' could be hsr or locobot: say which robot"),

@@ -192,11 +192,11 @@ class Reader:
 
     def _task(self, call: TaskCall, states: Sequence[_State]) -> list[_State]:
         found: list[_State] = []
-        for asked, reading in expanded(call, self.vocabulary, self.within, self._said_by_method):
+        for meant in expanded(call, self.vocabulary, self.within, self._said_by_method):
             for state in states:
                 said = state.said.copy()
-                take(said, call, reading, self.vocabulary.robots)
-                found.append(_State(said, state.cost, state.question, state.asked or asked))
+                take(said, call, meant, self.vocabulary.robots)
+                found.append(_State(said, state.cost, state.question, state.asked or meant.asked))
         return found[:_READINGS]
 
     def _said_by_method(self, text: str, within: tuple[str, ...]) -> list[Row]:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from msgspec.structs import replace
-
 from fleet.errors import BadTaskFile
 from fleet.language.methods.model import CompoundTask
 from fleet.language.methods.patterns import Row, rows_of
@@ -16,8 +14,7 @@ from keyexpr_schema.config_files import config_file, read_yaml
 def load_all_tasks(task_files: tuple[Path, ...] = ()) -> tuple[CompoundTask, ...]:
     """The tasks in these files, and those of the household that they do not say anew.
 
-    What a user's own file calls by a phrase goes before anything else that the words could mean; a
-    task of the household goes behind that.
+    What a user's own file calls by a phrase goes before what the household's does.
 
     Raises:
         BadTaskFile: a file cannot be read, or two of these files say the same.
@@ -34,8 +31,7 @@ def load_all_tasks(task_files: tuple[Path, ...] = ()) -> tuple[CompoundTask, ...
                     words = " ".join(p if isinstance(p, str) else f"{{{p.name}}}" for p in row)
                     raise BadTaskFile(f"{path}: task {task.name}: {words!r} calls {other} already")
     shipped = load_tasks(config_file("tasks", "household"))
-    rest = (replace(task, yields=True) for task in shipped if task.name not in own)
-    return (*own.values(), *rest)
+    return (*own.values(), *(task for task in shipped if task.name not in own))
 
 
 def load_tasks(path: Path) -> tuple[CompoundTask, ...]:

@@ -14,9 +14,15 @@ from fleet.language.methods.patterns import rows_of
 from fleet.service.task_files import load_all_tasks
 
 SHIPPED = load_all_tasks()
+TAKEN_OVER = {
+    "serve_somebody_drinks": "one drink, where the grammar takes all that there are",
+    "do_the_laundry": "what is dirty, where the grammar takes any one piece for `laundry`",
+    "take_out_the_rubbish": "emptied, where the grammar has somebody hold the bin",
+}
+"""Tasks whose phrases the grammar reads otherwise in some world, and why they go before it."""
 
 
-def said(words: Vocabulary) -> list[str]:
+def said(words: Vocabulary) -> list[tuple[str, str]]:
     """Phrases of every task, with names of this world."""
     names = {
         "number": "two",
@@ -24,7 +30,7 @@ def said(words: Vocabulary) -> list[str]:
         "person": next(o.label for o in words.objects.values() if words.is_person(o.object)),
     }
     return [
-        " ".join(part if isinstance(part, str) else names[part.type] for part in row)
+        (task.name, " ".join(p if isinstance(p, str) else names[p.type] for p in row))
         for task in SHIPPED
         for phrase in task.says
         for row in rows_of(phrase)[:1]
@@ -43,10 +49,10 @@ def test_a_shipped_task_takes_no_sentence_over_that_means_something(world: str) 
     words = vocabulary_of(world)
     without = replace(words, tasks=())
     called = 0
-    for text in said(words):
+    for task, text in said(words):
         alone, found = meant(text, without), meant(text, words)
         called += isinstance(found, Reading) and bool(found.methods)
-        assert alone is None or found == alone, text
+        assert alone is None or found == alone or task in TAKEN_OVER, text
     assert called
 
 

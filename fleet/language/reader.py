@@ -23,7 +23,7 @@ from fleet.language.resolve.stages import GoalDraft
 from fleet.language.segments import Segment, Sentence, cut, sentences_of
 from fleet.language.tagging.tagger import Lexeme, tagger_of
 from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
-from fleet.language.timing import timed
+from fleet.language.timing import end_goal
 from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
@@ -99,7 +99,8 @@ class Reader:
         if self.mode != "fact":
             lexemes = marked(lexemes, self.tokens, self.text, self.vocabulary, self.tagger)
         dangling = False
-        sentences = [cut(words) for words in sentences_of(lexemes)]
+        parts = (part for whole in sentences_of(lexemes) for part in parted(whole))
+        sentences = [cut(words) for words in parts]
         for number, sentence in enumerate(sentences):
             self.later = [s for s in sentences[number + 1 :] if not self._said_of_oneself(s)]
             self.why.check(sentence)
@@ -111,7 +112,7 @@ class Reader:
                 said.urgent = said.urgent or sentence.urgent
                 if timed or said.times or said.when or said.only_if:
                     with suppress(NotUnderstood):  # the last sentence says it again
-                        self._close(said, now)
+                        end_goal(said, self.vocabulary, now, self.mode)
                 said.times, said.time_words = list(sentence.times), sentence.time_words
             dangling = sentence.dangling
             if self._said_of_oneself(sentence):
@@ -319,7 +320,7 @@ class Reader:
 
     def _reading(self, state: _State, now: datetime | None, dangling: bool) -> Reading:
         said = state.said.copy()
-        self._close(said, now)
+        end_goal(said, self.vocabulary, now, self.mode)
         facts = tuple(Literal(key, value) for key, value in said.facts.items())
         if dangling or not (said.goals or facts or state.question):
             if self.mode == "fact":
@@ -330,38 +331,6 @@ class Reader:
         remarks = (*self.remarks, *said.remarks)
         methods = tuple(dict.fromkeys(said.methods))
         return Reading(self.line, goals, facts, state.question, presumed, remarks, methods)
-
-    def _close(self, said: Discourse, now: datetime | None) -> None:
-        """End the goal that was being said: other times or conditions hold for what follows.
-
-        Raises:
-            NotUnderstood: it cannot be, or a time belongs to nothing.
-        """
-        wanted = [
-            (by, draft.conditions(self.vocabulary.speaker)) for by, draft in said.draft.of_each()
-        ]
-        wants = bool(any(stages for _, stages in wanted) or said.always or said.never)
-        if wants:
-            for number, (by, stages) in enumerate(wanted):
-                goal = WantedGoal(
-                    stages,
-                    () if number else tuple(dict.fromkeys(said.always)),
-                    () if number else tuple(dict.fromkeys(said.never)),
-                    when=tuple(dict.fromkeys(said.when)),
-                    by=by,
-                    only_if=tuple(dict.fromkeys(said.only_if)),
-                )
-                said.goals.append(timed(goal, said, now))
-        elif said.times and self.mode == "fact":
-            named = [(token.word, token.spoken) for token in self.tokens]
-            reason = reason_for(named, "a fact")
-            raise NotUnderstood(reason or f"{self.line!r} names a time, which a fact cannot")
-        elif said.times or said.when or said.only_if:
-            what = f"{said.time_words!r} names a time" if said.times else '"If" names a condition'
-            raise NotUnderstood(f"{what}, but nothing is to be done then")
-        said.draft = GoalDraft(self.vocabulary.is_at)
-        said.always, said.never, said.when, said.only_if = [], [], [], []
-        said.times = []
 
 
 def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Reading | Ambiguity:

@@ -49,8 +49,8 @@ class Pronouns:
         thing = self.scene.vocabulary.objects.get(carrier or "")
         if thing is None or len(meant) != 1 or len(meant[0].subjects) != 1:
             return None
-        placed = self.scene.said.draft.stages[-1][-1:]
-        just = [wish for wish in placed if wish.value == carrier]
+        last = self.scene.said.draft.last
+        just = last is not None and last.value == carrier
         movable = thing.is_a(Feature.MOVABLE) and thing.object not in meant[0].subjects
         return thing.object if just and movable else None
 
@@ -64,8 +64,9 @@ class Pronouns:
         if noun.words != ("it",) or noun.first in said.chosen or any(m.open for m in said.recent):
             return None
         names = [m.subjects[0] for m in said.recent if len(m.subjects) == 1]
-        just = [wish.value for wish in said.draft.stages[-1][-1:]]
-        names += [said.carrier] if said.carrier is not None and said.carrier in just else []
+        last = said.draft.last
+        if said.carrier is not None and last is not None and last.value == said.carrier:
+            names.append(said.carrier)
         fit = tuple(dict.fromkeys(name for name in names if name in able))
         if len(fit) > 1:
             text = said.quote(noun.first, noun.last)

@@ -78,6 +78,10 @@ async def add(
         list[str] | None,
         typer.Option("--if", metavar="CONDITION", help="Only if it holds then; repeatable."),
     ] = None,
+    by: Annotated[
+        list[str] | None,
+        typer.Option("--by", metavar="ROBOT", help="Who alone shall do it; repeatable."),
+    ] = None,
     plan: Annotated[
         bool, typer.Option("--plan", help="Have it planned and carried out at once.")
     ] = False,
@@ -115,6 +119,7 @@ async def add(
             every,
             tuple(parse_condition(row) for row in when or ()),
             tuple(parse_condition(row) for row in only_if or ()),
+            tuple(by or ()),
         )
         spec = await put_goal(
             session, text, name, priority, within_s, speaker, kept, avoided, in_order, later

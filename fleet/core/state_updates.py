@@ -165,6 +165,7 @@ def without_goal(state: State, plan: Plan, goal: str) -> Plan:
         always=tuple(dict.fromkeys((*(row for spec in specs for row in spec.always), *always))),
         never=tuple(dict.fromkeys((*(row for spec in specs for row in spec.never), *never))),
         sometime_before=tuple(dict.fromkeys(row for spec in specs for row in spec.sometime_before)),
+        by={spec.goal: spec.by for spec in specs if spec.by},
     )
 
 

@@ -116,11 +116,10 @@ def _check(state: State, goal: Goal, means: GoalStatus) -> None:
                 "when it is begun"
             )
         recurrence_of(goal)
-    if goal.by:
-        raise NotUnderstood(
-            f"{goal.text!r} says that {' and '.join(goal.by)} shall do it; who does what is found "
-            "by the allocator, so leave it out"
-        )
+    for robot in goal.by:
+        if robot not in state.robots:
+            known = ", ".join(sorted(state.robots)) or "none"
+            raise NotUnderstood(f"{robot!r}, who shall do it, is no robot; known are {known}")
 
 
 def _in_other_words(
@@ -188,12 +187,19 @@ def wanted_goals(reading: Reading) -> tuple[WantedGoal, ...]:
 
 
 def _in_force(goal: Goal, wanted: WantedGoal, said_s: float) -> Goal:
-    """What was put at `said_s`, with what its sentence adds."""
+    """What was put at `said_s`, with what its sentence adds.
+
+    Raises:
+        NotUnderstood: the two contradict each other.
+    """
     due_s, not_before_s = goal.due_s, goal.not_before_s
     if due_s is None and wanted.due_s is not None:
         due_s = said_s + wanted.due_s
     if not_before_s is None and wanted.not_before_s is not None:
         not_before_s = said_s + wanted.not_before_s
+    if goal.by and wanted.by and set(goal.by) != set(wanted.by):
+        said = f"{' and '.join(wanted.by)} shall do it, and not {' and '.join(goal.by)}"
+        raise NotUnderstood(f"{goal.text!r} says that {said}, as was asked for: say one of both")
     every = goal.every or wanted.every
     return replace(
         goal,

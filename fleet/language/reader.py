@@ -12,7 +12,7 @@ from fleet.errors import NotUnderstood
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
-from fleet.language.reading import Ambiguity, Reading, WantedGoal
+from fleet.language.reading import Reading
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
@@ -20,7 +20,7 @@ from fleet.language.resolve.frames import EXAMPLE, SAY_IT
 from fleet.language.resolve.mentions import WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.segments import Segment, Sentence, cut, sentences_of
+from fleet.language.segments import Segment, Sentence, cut, parted, sentences_of
 from fleet.language.tagging.tagger import Lexeme, tagger_of
 from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
 from fleet.language.timing import end_goal
@@ -35,7 +35,7 @@ MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 80
 """In one clause; of a long list one for each thing."""
-_CHOICES = 12
+CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
@@ -105,14 +105,12 @@ class Reader:
             self.later = [s for s in sentences[number + 1 :] if not self._said_of_oneself(s)]
             self.why.check(sentence)
             timed = bool(sentence.times) or any(part.role for part in sentence.segments)
+            states = self._with_goals_ended(states, timed, now)
             for state in states:
                 said = state.said
                 said.elliptic, said.addressees, said.done, said.again = "", [], False, None
                 said.telegraphic = sentence.telegraphic
                 said.urgent = said.urgent or sentence.urgent
-                if timed or said.times or said.when or said.only_if:
-                    with suppress(NotUnderstood):  # the last sentence says it again
-                        end_goal(said, self.vocabulary, now, self.mode)
                 said.times, said.time_words = list(sentence.times), sentence.time_words
             dangling = sentence.dangling
             if self._said_of_oneself(sentence):
@@ -123,6 +121,24 @@ class Reader:
             else:
                 states = self._sentence(sentence, states)
         return self._ended(states, now, dangling)
+
+    def _with_goals_ended(
+        self, states: Sequence[_State], timed: bool, now: datetime | None
+    ) -> list[_State]:
+        """Those readings whose goals could end, where the next sentence has times of its own."""
+        kept, problem = [], None
+        for state in states:
+            said = state.said
+            try:
+                if timed or said.times or said.when or said.only_if:
+                    end_goal(said, self.vocabulary, now, self.mode)
+            except NotUnderstood as error:
+                problem = problem or error
+            else:
+                kept.append(state)
+        if not kept and problem is not None:
+            raise problem
+        return kept
 
     # --- one sentence after the other -------------------------------------------------------------
     def _sentence(self, sentence: Sentence, states: list[_State]) -> list[_State]:
@@ -198,7 +214,7 @@ class Reader:
 
     def _each(self, which: WhichOne, segment: Segment, states: Sequence[_State]) -> list[_State]:
         """The readings in which a noun phrase means one, then another of those that it can."""
-        if len(which.choices) > _CHOICES or len(states) > _CHOICES:
+        if len(which.choices) > CHOICES or len(states) > CHOICES:
             return []
         found: list[_State] = []
         for meant in which.choices:
@@ -331,50 +347,3 @@ class Reader:
         remarks = (*self.remarks, *said.remarks)
         methods = tuple(dict.fromkeys(said.methods))
         return Reading(self.line, goals, facts, state.question, presumed, remarks, methods)
-
-
-def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Reading | Ambiguity:
-    """What a text asks for, says, or asks; of several meanings the plainest.
-
-    `now` is what the clock says, with its zone, for times of day.
-
-    Raises:
-        NotUnderstood: it means nothing here; one sentence says why.
-    """
-    return _one(Reader(text, vocabulary).read(now))
-
-
-def _one(readings: Sequence[tuple[int, str, Reading]]) -> Reading | Ambiguity:
-    least, asked = readings[0][:2]
-    best = [reading for cost, _, reading in readings if cost == least]
-    if len(best) == 1:
-        return best[0]
-    candidates = tuple((each.understood_as, each) for each in best[:_CHOICES])
-    return Ambiguity(best[0].text, candidates, asked)
-
-
-def read_goal(text: str, vocabulary: Vocabulary) -> Reading:
-    """What a text asks for, where it asks for one goal that is to be reached once.
-
-    Raises:
-        NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
-    """
-    reading = _one(Reader(text, vocabulary, "goal").read(None))
-    if isinstance(reading, Ambiguity):
-        raise NotUnderstood(reading.sentence)
-    if reading.facts or any(goal != WantedGoal(goal.stages, priority=goal.priority)
-                            for goal in reading.goals):  # fmt: skip
-        raise NotUnderstood(f"{reading.text!r} says more than what shall be reached: leave it out")
-    return reading
-
-
-def statement_facts(text: str, vocabulary: Vocabulary) -> tuple[Literal, ...]:
-    """The facts in a statement, where the value `None` is *unknown*.
-
-    Raises:
-        NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
-    """
-    reading = _one(Reader(text, vocabulary, "fact").read(None))
-    if isinstance(reading, Ambiguity):
-        raise NotUnderstood(reading.sentence)
-    return reading.facts

@@ -84,7 +84,7 @@ def _of_its_own(words: Sequence[Lexeme]) -> bool:
     """Whether it has a time, or a condition, and more than that."""
     timed = any("TIME" in word.tags for word in words)
     given = any(set(_CONDITIONS) & word.tags and "NOUN" not in word.tags for word in words)
-    return (timed or given) and _clausal([w for w in words if "TIME" not in w.tags])
+    return (timed or given) and any(w.tags & _CLAUSAL for w in words if "TIME" not in w.tags)
 
 
 def _opens_after_time(words: Sequence[Lexeme]) -> bool:

@@ -54,6 +54,11 @@ class Pronouns:
         movable = thing.is_a(Feature.MOVABLE) and thing.object not in meant[0].subjects
         return thing.object if just and movable else None
 
+    def _pair(self, mention: Mention) -> bool:
+        """Whether it is one thing that is called by a plural: "the curtains … them"."""
+        thing = self.scene.vocabulary.objects.get(mention.subjects[0])
+        return mention.single and thing is not None and thing.label.casefold().endswith("s")
+
     def that_can(self, noun: Noun, able: Collection[str]) -> Mention | None:
         """Whom "it" means, of those that something can be done to; `None`: of none of them.
 
@@ -91,7 +96,9 @@ class Pronouns:
         if "object" not in types and "place" in types and word == "it" and said.last_place:
             return Mention((said.last_place,), "place", noun.first)
         plural = word in _PLURAL or len(noun.words) > 1
-        meant = [m for m in self.scene.said.recent if m.single != plural or m.each]
+        meant = [
+            m for m in said.recent if m.single != plural or m.each or (plural and self._pair(m))
+        ]
         count = 2 if word == "both" else int(word) if word.isdecimal() else None
         if word == "it" and (vessel := self._vessel(meant)) is not None:
             text = self.scene.said.quote(noun.first, noun.last)

@@ -75,7 +75,12 @@ def problem_text(world: WorldModel, goals: Iterable[Goal], keep: Iterable[Condit
         if not (variable.relation == AT and variable.subject in world.robots)
     ]
     wanted = [
-        {"goal": goal.goal, "text": goal.text, "conditions": [str(c) for c in goal.conditions]}
+        {
+            "goal": goal.goal,
+            "text": goal.text,
+            "conditions": [str(c) for c in goal.conditions],
+            **({"only_by": list(goal.by)} if goal.by else {}),
+        }
         for goal in goals
     ]
     return fenced(

@@ -308,6 +308,7 @@ class _Run:
             sometime_before=_both(
                 plan.sometime_before, (row for g in goals for row in g.sometime_before)
             ),
+            by={**plan.by, **{g.goal: g.by for g in goals if g.by}},
         )
 
 

@@ -90,7 +90,7 @@ def test_the_planner_is_told_its_ways_in_the_file(tmp_path: Path) -> None:
     assert load_settings(None, None, False, {}, tmp_path).planner == PlannerSettings()
     (tmp_path / "robotctl.yaml").write_text(
         "planner: {approval: true, lost_after_s: 5, planning_limit_s: 7.5, "
-        "llm_config: llm.yaml, skills: [a.yaml, /b.yaml]}"
+        "llm_config: llm.yaml, skills: [a.yaml, /b.yaml], words: own.yaml}"
     )
     assert load_settings(None, None, False, {}, tmp_path).planner == PlannerSettings(
         approval=True,
@@ -99,6 +99,7 @@ def test_the_planner_is_told_its_ways_in_the_file(tmp_path: Path) -> None:
         planning_limit_s=7.5,
         llm_config=tmp_path / "llm.yaml",
         skills=(tmp_path / "a.yaml", Path("/b.yaml")),
+        words=(tmp_path / "own.yaml",),
     )
 
 

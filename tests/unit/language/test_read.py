@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from datetime import UTC, datetime
-from pathlib import Path
 
 import pytest
 
-from fleet.errors import BadLanguageFile, NotUnderstood
+from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, read, read_goal
-from fleet.language.words.wordbook import read_language
 from tests.support.language_flat import FURNISHED
 from tests.support.language_flat_said import SPOKEN, told
 
@@ -174,30 +171,3 @@ def test_a_goal_that_is_reached_once_has_none_of_that(text: str) -> None:
 def test_what_is_too_long_is_refused_at_once(text: str) -> None:
     with pytest.raises(NotUnderstood, match=r"at most|too many"):
         read(text, SPOKEN)
-
-
-def test_words_can_be_added(tmp_path: Path) -> None:
-    own = tmp_path / "own.yaml"
-    own.write_text("verbs: {move: [schlep]}\nPOLITE: [prithee]\n", encoding="utf-8")
-    words = replace(SPOKEN, language=read_language(own))
-    assert told(read("Prithee schlep the fork to the kitchen", words)) == "at(fork) = kitchen"
-    with pytest.raises(NotUnderstood, match="'Prithee schlep' is not understood"):
-        read("Prithee schlep the fork to the kitchen", SPOKEN)
-
-
-@pytest.mark.parametrize(
-    ("written", "says"),
-    [
-        ("[", "cannot be read"),
-        ("- a", "there must be a mapping"),
-        ("NOSUCH: [a]", "there is no 'NOSUCH'"),
-        ("POLITE: please", "must be a list of phrases"),
-    ],
-)
-def test_a_file_of_words_that_is_wrong_is_refused(tmp_path: Path, written: str, says: str) -> None:
-    own = tmp_path / "own.yaml"
-    own.write_text(written, encoding="utf-8")
-    with pytest.raises(BadLanguageFile) as refused:
-        read_language(own)
-    assert says in str(refused.value)
-    assert "\n" not in str(refused.value)

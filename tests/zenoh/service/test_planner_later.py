@@ -107,3 +107,16 @@ async def test_a_text_can_be_several_goals(
         assert (await _an_order(session)).robot == "hsr"
         second = await value(session, GOAL_STATUS, GoalAddress("g.2"), state=GoalState.PENDING)
         assert second.part_of == "g"
+
+
+async def test_who_cannot_do_it_is_said(
+    router: RouterProcess, robotctl: Robotctl, tmp_path: Path
+) -> None:
+    async with person(router.endpoint) as session, planner(router.endpoint, tmp_path / "d"):
+        await _put(robotctl, "Bring cup 1 to the hallway", "--by", "hsr", "--plan")
+        assert (await _an_order(session)).robot == "hsr"
+        refused = await robotctl.soon(
+            *("goal", "add", "Bring cup 1 to the kitchen", "--by", "marvin")
+        )
+        assert refused.code == 1
+        assert "'marvin', who shall do it, is no robot; known are hsr" in refused.err

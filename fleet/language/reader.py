@@ -137,9 +137,16 @@ class Reader:
         return states
 
     def _segment(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
-        if (call := called(segment.words, self.tagger)) and not (segment.role or segment.always):
-            return self._task(call, states)
+        call = called(segment.words, self.tagger)
         segment = replace(segment, words=spoken_out(segment.words))
+        if call is not None and not (segment.role or segment.always):
+            if call.task.yields:
+                with suppress(NotUnderstood):
+                    return self._clauses(segment, states)
+            return self._task(call, states)
+        return self._clauses(segment, states)
+
+    def _clauses(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
         words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
         if words > MOST_WORDS_TOGETHER:
             raise NotUnderstood(
@@ -185,11 +192,11 @@ class Reader:
 
     def _task(self, call: TaskCall, states: Sequence[_State]) -> list[_State]:
         found: list[_State] = []
-        for asked, reading in expanded(call, self.vocabulary, self.within, self._said_by_method):
+        for meant in expanded(call, self.vocabulary, self.within, self._said_by_method):
             for state in states:
                 said = state.said.copy()
-                take(said, call, reading, self.vocabulary.robots)
-                found.append(_State(said, state.cost, state.question, state.asked or asked))
+                take(said, call, meant, self.vocabulary.robots)
+                found.append(_State(said, state.cost, state.question, state.asked or meant.asked))
         return found[:_READINGS]
 
     def _said_by_method(self, text: str, within: tuple[str, ...]) -> list[Row]:

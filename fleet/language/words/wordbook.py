@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 from fleet.language.words.morphology import gerund, participles, third_person
-from fleet.language.words.own_words import OwnWords, shipped_verbs, shipped_words
+from fleet.language.words.own_words import SYNONYMS, OwnWords, shipped_verbs, shipped_words
 from fleet.language.words.tokens import Phrase, tokens_of
 
 _CONTRACTED = frozenset({"that", "it", "there", "what", "who", "where", "somebody", "someone"})
@@ -102,8 +102,8 @@ class Wordbook:
         self.bins = tuple(map(phrase_of, verbs["bins"]))
         self.fetching = frozenset(verbs["fetching"])
         self.searched = frozenset(verbs["searched"])
-        self.same_verbs = {verb: tuple(same) for verb, same in verbs["same_verbs"].items()}
-        self.states = {verb: tuple(same) for verb, same in verbs["states"].items()}
+        self.same_verbs: Mapping[str, Sequence[str]] = verbs.get(SYNONYMS, {})
+        """Other ways to ask for a skill than its file has, by its verb."""
         senses: dict[Phrase, set[str]] = defaultdict(set)
         for sense, texts in verbs["verbs"].items():
             for text in texts:
@@ -146,7 +146,8 @@ def wordbook_of(own: tuple[OwnWords, ...]) -> Wordbook:
             into[tag] = [*into[tag], *phrases]
         for name, groups in more.groups.items():
             for key, phrases in groups.items():
-                verbs[name] = verbs[name] | {key: [*verbs[name].get(key, ()), *phrases]}
+                known = verbs.get(name, {})
+                verbs[name] = known | {key: [*known.get(key, ()), *phrases]}
         verbs["rooms"] = [*verbs["rooms"], *more.rooms]
     book = Wordbook(words, verbs)
     _KEPT.append((own, book))

@@ -163,6 +163,9 @@ class GoalStatus(Payload, frozen=True, kw_only=True):
     """Why the grammar does not take the sentence, where a language model was asked about it."""
     paraphrase: str | None = None
     """What the language model says in its place, in sentences that the grammar reads."""
+    teaches: str | None = None
+    """A task that the language model proposes, as a task file has it [YAML]: with it the grammar
+    reads the sentence so by itself. That it can be done was seen by planning."""
     given_s: float | None = None
     given_wall_s: float | None = None
     time_s: float = 0.0

@@ -112,7 +112,7 @@ def goal_interpreted(state: State, event: events.GoalInterpreted) -> State:
     if status is None:
         return state
     if event.paraphrase is not None and goal is not None:
-        said = replace(status, paraphrase=event.paraphrase)
+        said = replace(status, paraphrase=event.paraphrase, teaches=event.teaches)
         goal = state.goal_specs.get(goal.goal, goal)
         return _take_goal(state, goal, understood(state, goal, said))
     if not event.stages:

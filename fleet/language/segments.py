@@ -278,11 +278,32 @@ def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
             if rest and "THEN" in rest[0].tags:
                 rest = rest[1:]
             return [(role, list(words[1:end])), ("", rest)]
+        if (end := _command_after(words)) is not None:
+            return [(role, list(words[1:end])), ("", list(words[end:]))]
     if words and words[0].words == ("should",):  # "should the door be open, close it"
         end = next((j for j, word in enumerate(words) if "COMMA" in word.tags), None)
         if end is not None:
             return [("if", list(words[:end])), ("", list(words[end + 1 :]))]
     return [("", list(words))]
+
+
+def _command_after(words: Sequence[Lexeme]) -> int | None:
+    """Where what is to be done begins behind a condition that no comma ends: "if you find it bring
+    it here"."""
+    for i in range(3, len(words) - 1):
+        before = words[i - 1].tags
+        if (
+            "VERB" in words[i].tags
+            and "NOUN" not in words[i].tags
+            and "NOUN" in before | _of(before)
+        ):
+            return i
+    return None
+
+
+def _of(tags: frozenset[str]) -> frozenset[str]:
+    """A pronoun or a number stands for a noun, or ends it: "it", "cup 2"."""
+    return frozenset({"NOUN"}) if tags & {"PRON", "NUM"} else frozenset()
 
 
 def _segment(words: Sequence[Lexeme], joint: str, role: str) -> list[Segment]:

@@ -28,7 +28,7 @@ from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.tokens import tokens_of
-from keyexpr_schema.facts import AT, Literal
+from keyexpr_schema.facts import AT, LOCATED, Literal
 from keyexpr_schema.payloads.goals import Condition
 
 MOST_CHARACTERS = 8_000
@@ -154,9 +154,16 @@ class Reader:
         return states
 
     def _segment(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
-        if (call := called(segment.words, self.tagger)) and not (segment.role or segment.always):
-            return self._task(call, states)
+        call = called(segment.words, self.tagger)
         segment = replace(segment, words=spoken_out(segment.words))
+        if call is not None and not (segment.role or segment.always):
+            if call.task.yields:
+                with suppress(NotUnderstood):
+                    return self._clauses(segment, states)
+            return self._task(call, states)
+        return self._clauses(segment, states)
+
+    def _clauses(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
         words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
         if words > MOST_WORDS_TOGETHER:
             raise NotUnderstood(
@@ -202,11 +209,11 @@ class Reader:
 
     def _task(self, call: TaskCall, states: Sequence[_State]) -> list[_State]:
         found: list[_State] = []
-        for asked, reading in expanded(call, self.vocabulary, self.within, self._said_by_method):
+        for meant in expanded(call, self.vocabulary, self.within, self._said_by_method):
             for state in states:
                 said = state.said.copy()
-                take(said, call, reading, self.vocabulary.robots)
-                found.append(_State(said, state.cost, state.question, state.asked or asked))
+                take(said, call, meant, self.vocabulary.robots)
+                found.append(_State(said, state.cost, state.question, state.asked or meant.asked))
         return found[:_READINGS]
 
     def _said_by_method(self, text: str, within: tuple[str, ...]) -> list[Row]:
@@ -233,7 +240,37 @@ class Reader:
     def _resolved(
         self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment
     ) -> tuple[Discourse, Question | None]:
-        mode = "fact" if segment.role else self.mode
+        if not segment.role:
+            return self._understood(clauses, said, segment, self.mode)
+        try:
+            return self._understood(clauses, said.copy(), segment, "fact")
+        except NotUnderstood:
+            if (found := self._found(clauses, said, segment)) is None:
+                raise
+            return found, None
+
+    def _found(
+        self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment
+    ) -> Discourse | None:
+        """Under a condition that something is found, and none other that somebody does."""
+        draft, said.draft = said.draft, GoalDraft(self.vocabulary.is_at)
+        with suppress(NotUnderstood):
+            said, question = self._understood(clauses, said, replace(segment, role=""), "goal")
+            each = list(said.draft.of_each())
+            found = [row for stage in said.draft.conditions() for row in stage]
+            looked_for = bool(found) and all(row.relation == LOCATED for row in found)
+            if looked_for and question is None and not any(by for by, _ in each):
+                rows = said.when if segment.role == "when" else said.only_if
+                wanted = segment.role != "unless"
+                rows.extend(Condition(relation=LOCATED, subject=row.subject, any_of=row.any_of,
+                                      value=wanted) for row in found)  # fmt: skip
+                said.draft = draft
+                return said
+        return None
+
+    def _understood(
+        self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment, mode: str
+    ) -> tuple[Discourse, Question | None]:
         before = dict(said.facts)
         draft = said.draft
         if segment.always:

@@ -12,6 +12,8 @@ _OPENING = frozenset({"KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID"})
 _ASKED = frozenset({"WHERE", "HOWMANY", "WHICH", "WHAT", "WHO"})
 _CLAUSAL = _OPENING | {"VERB", "FIN", "GER", "BE", "MODAL", "HAVE", "PREP", "CAUSE", "BELONG"}
 _WISHED = frozenset({"should", "must", "ought", "has", "have", "needs", "need"})
+_ENDS = frozenset({"NOUN", "PRON", "NUM", "ADJ", "PART", "HERE", "HOME", "ANYWHERE", "THERE"})
+"""What a condition can end with, where no comma ends it."""
 _CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless"}
 
 
@@ -310,15 +312,6 @@ def _happens(words: Sequence[Lexeme], by_you: bool = False) -> bool:
     return "GER" in words[0].tags
 
 
-def _main_verb(words: Sequence[Lexeme]) -> int | None:
-    """Where the command begins behind a condition that no comma ends."""
-    for i in range(3, len(words)):
-        before = words[i - 1].tags
-        if "VERB" in words[i].tags and not words[i].tags & {"NOUN", "ADJ", "PART", "BE", "HAVE"}:
-            return None if before & {"TO", "MODAL", "PEOPLE", "I", "NOT"} else i
-    return None
-
-
 def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
     """A sentence with "if", "when" or "unless" cut into condition and the rest."""
     if any(set(_CONDITIONS) & word.tags for word in words):
@@ -338,13 +331,23 @@ def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
             if rest and "THEN" in rest[0].tags:
                 rest = rest[1:]
             return [(role, list(words[1:end])), ("", rest)]
-        if (verb := _main_verb(words)) is not None:
-            return [(role, list(words[1:verb])), ("", list(words[verb:]))]
+        if (end := _command_after(words)) is not None:
+            return [(role, list(words[1:end])), ("", list(words[end:]))]
     if words and words[0].words == ("should",):  # "should the door be open, close it"
         end = next((j for j, word in enumerate(words) if "COMMA" in word.tags), None)
         if end is not None:
             return [("if", list(words[:end])), ("", list(words[end + 1 :]))]
     return [("", list(words))]
+
+
+def _command_after(words: Sequence[Lexeme]) -> int | None:
+    """Where what is to be done begins behind a condition that no comma ends: "if you find it bring
+    it here"."""
+    for i in range(3, len(words) - 1):
+        before = words[i - 1].tags
+        if "VERB" in words[i].tags and "NOUN" not in words[i].tags and before & _ENDS:
+            return i
+    return None
 
 
 def _segment(words: Sequence[Lexeme], joint: str, role: str) -> list[Segment]:

@@ -182,6 +182,9 @@ def _asked_back(status: GoalStatus) -> str:
     if status.paraphrase is not None and not status.candidates[1:]:
         typer.echo(f"  a language model says it as “{status.paraphrase}”", err=True)
         typer.echo(f"  understood as {status.candidates[0]}", err=True)
+        if status.teaches is not None:
+            typer.echo("  as a task, to be kept with `robotctl task keep`:", err=True)
+            typer.echo(status.teaches.rstrip(), err=True)
         return "1" if typer.confirm("Is that meant", err=True) else ""
     for number, words in enumerate(status.candidates, 1):
         typer.echo(f"  {number}  {words}", err=True)

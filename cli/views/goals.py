@@ -95,6 +95,9 @@ def goal_page(row: GoalRow) -> Group:
     if status.paraphrase is not None:
         lines.append(Text(f"said as     “{status.paraphrase}” by a language model, as the grammar"))
         lines.append(Text(f"            refuses it: {status.refusal}"))
+    if status.teaches is not None:
+        lines.append(Text(f"teaches     (`robotctl task keep {row.goal} FILE`)"))
+        lines.append(Text(status.teaches.rstrip()))
     lines += [
         Text(f"{'can mean' if number == 1 else '':<12}{number}  {words}")
         for number, words in enumerate(status.candidates, 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import datetime
 
 from msgspec.structs import replace
 
@@ -13,11 +14,12 @@ from fleet.core.model.derived import holds
 from fleet.core.model.recurrence import recurrence_of, said_at
 from fleet.core.state import State
 from fleet.errors import NotUnderstood
-from fleet.language import Ambiguity, Reading, WantedGoal, read
+from fleet.language import Ambiguity, Reading, Vocabulary, WantedGoal, read
 from keyexpr_schema.facts import LOCATED, NOTHING, Value
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 
 NO_READING = Reading("")
+_Words = tuple[Vocabulary, datetime | None]
 
 
 @dataclass(frozen=True)
@@ -53,9 +55,13 @@ def understood(
     if known is not None and known.state is GoalState.STANDING:  # under an earlier planner
         status = replace(status, next_s=known.next_s, runs=known.runs)
     try:
-        found = _reading(state, goal, goal.text)
+        words = _words_of(state, goal)
     except NotUnderstood as error:
-        return _in_other_words(state, goal, status, str(error), asked or known)
+        return Understood(_rejected(status, str(error)), goal)
+    try:
+        found = _reading(goal, goal.text, words)
+    except NotUnderstood as error:
+        return _in_other_words(state, goal, words, status, str(error), asked or known)
     try:
         return _taken(state, goal, status, found)
     except NotUnderstood as error:
@@ -123,7 +129,12 @@ def _check(state: State, goal: Goal, means: GoalStatus) -> None:
 
 
 def _in_other_words(
-    state: State, goal: Goal, status: GoalStatus, refusal: str, asked: GoalStatus | None
+    state: State,
+    goal: Goal,
+    known_words: _Words,
+    status: GoalStatus,
+    refusal: str,
+    asked: GoalStatus | None,
 ) -> Understood:
     """What becomes of a goal that the grammar refuses: what a language model has made of it is read
     by the same grammar, and a person says whether it is meant."""
@@ -133,10 +144,10 @@ def _in_other_words(
         if asked.refusal != refusal:  # there are other names now
             return Understood(_rejected(status, refusal), goal, unread=True)
         return Understood(_rejected(replace(status, refusal=refusal), asked.reason or ""), goal)
-    status = replace(status, refusal=refusal, paraphrase=words)
+    status = replace(status, refusal=refusal, paraphrase=words, teaches=asked.teaches)
     said = f"a language model says {goal.text!r} as {words!r}"
     try:
-        read = _taken(state, goal, status, _reading(state, goal, words))
+        read = _taken(state, goal, status, _reading(goal, words, known_words))
     except NotUnderstood as error:
         return Understood(_rejected(status, f"{refusal}; {said}: {error}"), goal)
     if read.status.candidates:
@@ -158,10 +169,20 @@ def _rejected(status: GoalStatus, reason: str) -> GoalStatus:
     return replace(status, state=GoalState.REJECTED, reason=reason)
 
 
-def _reading(state: State, goal: Goal, text: str) -> Reading | Ambiguity:
+def _words_of(state: State, goal: Goal) -> _Words:
+    """The names that whoever says a goal can use, and what clocks show.
+
+    Raises:
+        NotUnderstood: nobody knows who says it, or when.
+    """
+    words = state.vocabulary()
+    return (words, None) if goal.conditions else (words.spoken_by(goal.speaker), said_at(goal))
+
+
+def _reading(goal: Goal, text: str, words: _Words) -> Reading | Ambiguity:
     if goal.conditions:
         return Reading(goal.text, (WantedGoal((goal.conditions,)),))
-    found = read(text, state.vocabulary().spoken_by(goal.speaker), said_at(goal))
+    found = read(text, *words)
     if isinstance(found, Ambiguity) and goal.meant is not None:
         return dict(found.candidates).get(goal.meant, found)
     return found

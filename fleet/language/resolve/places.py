@@ -14,18 +14,8 @@ from fleet.language.resolve.referents import Referents
 from fleet.language.resolve.relations import SPATIAL, Relations
 from fleet.language.resolve.scene import PLACES, SPOTS, THINGS, Scene
 from fleet.language.tagging.lexicon import EntityType
-from fleet.language.tree.nodes import (
-    Noun,
-    Nouns,
-    Place,
-    Quantity,
-)
-from keyexpr_schema.facts import (
-    AT,
-    IN,
-    ON,
-    FactKey,
-)
+from fleet.language.tree.nodes import Noun, Nouns, Place, Quantity
+from keyexpr_schema.facts import AT, IN, ON, FactKey
 from keyexpr_schema.payloads.world import Feature
 
 _ON = frozenset({"on", "onto", "top"})
@@ -87,6 +77,8 @@ class PlaceResolver:
             raise self.relations.unknown(place)
         if place.special == "there":
             return Locative(place.role, self._there(place, text), words)
+        if place.special == "where" and place.nouns is not None:
+            return Locative("to", self._where_is(place.nouns, text))
         if place.special == "here":
             return Locative(place.role, self._here(text))
         if place.special in ("anywhere", "house", "home") or place.nouns is None:
@@ -163,6 +155,22 @@ class PlaceResolver:
         found = [e for e in entities if e.id == self.scene.said.last_place and e.type != "object"]
         found = [e for e in found if e.type == "place"] or found
         return NounPhrase(tuple(found), text, place.first, exact=True)
+
+    def _where_is(self, nouns: Nouns, text: str) -> NounPhrase:
+        """`where the shirt is`: what that is believed to be on or in, or its place."""
+        if len(nouns.items) != 1:
+            raise NotUnderstood(f"{text!r} does not say one place: name it")
+        mention = self.who.resolve(self.nouns.subject(nouns.items[0], THINGS, "an object"))
+        name, vocabulary = mention.subjects[0], self.scene.vocabulary
+        where = vocabulary.rests.get(name) or vocabulary.place_of(name)
+        found = tuple(
+            e
+            for e in self.scene.lexicon.entities
+            if e.id == where and e.type in ("place", "surface")
+        )
+        if mention.open or len(mention.subjects) != 1 or not found:
+            raise NotUnderstood(f"{text!r}: it is not known where that is: name the place")
+        return NounPhrase(found, text, nouns.items[0].first, exact=True)
 
     def _here(self, text: str) -> NounPhrase:
         speaker = self.scene.vocabulary.speaker
@@ -308,6 +316,7 @@ class PlaceResolver:
             inside = [p for p in relative.places if p.role not in SPATIAL]
             if relative.negated and inside:
                 gone = self.where([self.locative(p) for p in inside]).target or ""
+                self.scene.said.last_place = gone or self.scene.said.last_place
                 return made.among(
                     [n for n in made.names if not self.scene.vocabulary.is_at(n, gone)]
                 )

@@ -65,6 +65,20 @@ class GoalDraft:
         """Whether the stage that is being filled has nothing yet."""
         return not self.stages[-1]
 
+    @property
+    def last(self) -> Wish | None:
+        """What was wished for last."""
+        return next((stage[-1] for stage in reversed(self.stages) if stage), None)
+
+    def sent_to(self) -> str | None:
+        """Where somebody was sent last, if nothing has been taken anywhere else since."""
+        for wish in (wish for stage in reversed(self.stages) for wish in reversed(stage)):
+            if wish.means:
+                return str(wish.value)
+            if wish.relation in PLACED:
+                return None
+        return None
+
     def copy(self) -> GoalDraft:
         """The same, to go on from."""
         return GoalDraft(self.is_at, [list(stage) for stage in self.stages], self.by)

@@ -188,7 +188,7 @@ class Wishes:
         if frame.verb.split()[0] not in self.scene.tagger.book.offering:
             raise NotUnderstood(f"{self.scene.said.clause!r} names two things side by side")
         subject = self.nouns.subject(frame.themes[0].items[0], THINGS, "a robot")
-        mention = subject if isinstance(subject, Mention) else subject.resolve()
+        mention = self.who.resolve(subject)
         name = mention.subjects[0]
         self.scene.said.spoken_of(mention.subjects)
         if mention.open or len(mention.subjects) != 1:
@@ -296,7 +296,7 @@ class Wishes:
         """Wish that these are at the target, or at home."""
         if where.each:
             return self._to_each(moved, where)
-        for subject in moved if not home else ():
+        for subject in moved if not home and where.source is None else ():
             self._not_too_many(subject)
         self.scene.said.moved = list(moved)
         able = [self.who.drivers(self.who.movable(subject)) for subject in moved]

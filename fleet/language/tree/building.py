@@ -130,6 +130,10 @@ class Builder:
     def make_anywhere_place(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         return self._special(children, start, end, "anywhere")
 
+    def make_where_is(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        first, last = self.nouns.span(start, end)
+        return Place("to", "where", children[1], first, last, "where")
+
     def make_home_place(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         return self._special(children, start, end, "home")
 

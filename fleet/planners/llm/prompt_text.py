@@ -126,6 +126,7 @@ def frames_text(vocabulary: Vocabulary) -> str:
         f"- {'; '.join((phrase.verb, *phrase.says))} ({phrase.type})"
         for phrase in vocabulary.skill_phrases
     ]
+    rows += [f"- {'; '.join(task.says)}: a task of its own" for task in vocabulary.tasks]
     words = dict.fromkeys(each.word for each in vocabulary.state_words)
     rows += [f"- something should be: {', '.join(words)}"] if words else []
     return "\n".join(rows) or "- nothing"

@@ -129,7 +129,7 @@ def test_the_first_method_is_taken_for_which_all_is_there_and_why_is_kept() -> N
     assert other.number == 2
     assert other.said == "set the table for two"
     assert other.text == "put 2 plates on the dining table."
-    why = "there is 1 fork, and it takes 2"
+    why = "it takes 2 fork, and there is only 1"
     assert other.passed_over == (("put 2 forks on the dining table.", why),)
 
 
@@ -145,7 +145,7 @@ def test_where_no_method_can_be_taken_all_reasons_are_said() -> None:
     with pytest.raises(CannotBeDone) as refused:
         read("set the table for nine", HOUSE, NOW)
     said = str(refused.value)
-    assert said.startswith("'set the table for nine' cannot be done here: there is 1 fork")
+    assert said.startswith("'set the table for nine' cannot be done here: it takes 9 fork")
     assert "'9 plates': there are only 3" in said
     assert [text for text, _ in refused.value.passed_over] == [
         "put 9 forks on the dining table.",

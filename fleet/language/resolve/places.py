@@ -198,6 +198,10 @@ class PlaceResolver:
             if not owner.found:
                 raise NotUnderstood("no robot with a basket is known")
             return owner
+        word = self.scene.said.tokens[noun.last - 1].word
+        called = self.scene.tagger.entities((word,)) if word != "basket" else ()
+        if any(e.type == "object" for e in called):
+            raise NotUnderstood(f"{text!r} is a thing of its own")
         found = tuple(
             e for e in self.scene.lexicon.entities if e.type == "robot" and e.id in owners
         )

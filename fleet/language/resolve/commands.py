@@ -23,6 +23,9 @@ from fleet.language.tree.nodes import Clause, Nouns, Particle, Place, Quantity
 from keyexpr_schema.facts import AT, HELD, LOCATED
 from keyexpr_schema.payloads.goals import Condition
 
+_FETCHED = frozenset({"get", "fetch", "retrieve"})
+"""After these, "next to the lamp" says which one, not where it shall be."""
+
 
 class Commands:
     """Turns clauses with a verb into wishes."""
@@ -113,6 +116,9 @@ class Commands:
             self.scene.said = before.copy()
             try:
                 frame = self._for_me(frame, phrases)
+                fetched = frame.verb in _FETCHED or len(frame.themes) > 1
+                wishes = "move" in frame.senses and not phrases and not fetched
+                frame = self.places.relations.attached(frame, wishes)
                 if phrases:
                     if phrases[0].phrase.type != "robot":
                         self._check_who(who)

@@ -79,6 +79,8 @@ class Shall:
             )
         who = self.nouns.subjects(subject, THINGS, "an object or a robot")
         frame = framed(predicate.arguments if predicate is not None else arguments)
+        if self.wishes.beside(who, frame):
+            return None
         where, home = self.wishes.whereto(frame, each=True)
         return self.wishes.to_target(who, where, home)
 

@@ -104,7 +104,7 @@ def _meaning(reading: Reading) -> Meaning:
         facts=_facts(reading.facts),
         question=None
         if question is None
-        else Asked(question.of, frozenset(question.subjects), _rows(question.holds)),
+        else Asked(question.of, frozenset(question.subjects), _rows(question.holds)).canonical(),
     )
 
 

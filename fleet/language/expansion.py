@@ -142,8 +142,10 @@ def _check_needs(method: Method, given: Mapping[str, str], vocabulary: Vocabular
         assert match is not None
         least, found = int(match[1] or 1), len(vocabulary.of_type(match[2]))
         if found < least:
-            what = f"there is no {match[2]}" if not found else f"there is {found} {match[2]}"
-            raise NotUnderstood(what + (f", and it takes {least}" if least > 1 else ""))
+            only = f", and there {'is' if found == 1 else 'are'} only {found}" if found else ""
+            raise NotUnderstood(
+                f"there is no {match[2]}" if least == 1 else f"it takes {least} {match[2]}{only}"
+            )
 
 
 def _check(reading: Reading) -> None:

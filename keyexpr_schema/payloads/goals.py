@@ -65,9 +65,10 @@ class Goal(Payload, frozen=True, kw_only=True):
     Until it is reached `always` must hold all the time, of `never` nothing may, and of each
     `sometime_before` one condition only after the other held, from when it is planned on.
 
-    It is not begun before `not_before_s` on the fleet's clock [s], and then not until `when` holds;
-    if `only_if` does not hold then, it is over. With `every`, a line of cron or an ISO 8601 period,
-    it makes a goal at each of those times. `by` are the robots that shall do it, and no others.
+    It is not begun before `not_before_s` on the fleet's clock [s], then not before the goals
+    `after` have ended, and then not until `when` holds; if `only_if` does not hold then, it is
+    over. With `every`, a line of cron or an ISO 8601 period, it makes a goal at each of those
+    times. `by` are the robots that shall do it, and no others.
     """
 
     goal: Id
@@ -89,6 +90,7 @@ class Goal(Payload, frozen=True, kw_only=True):
     not_before_s: float | None = None
     every: str | None = None
     by: tuple[Id, ...] = ()
+    after: tuple[Id, ...] = ()
     said_at: str | None = None
     """What clocks showed there when it was said, in ISO 8601 with the offset from UTC: for times of
     day. It is the moment of `said_s`."""

@@ -18,8 +18,8 @@ from fleet.core.effects import PLANNER_SOURCE
 from fleet.core.model.recurrence import when_shown
 from fleet.core.state import State
 from fleet.core.state_updates import set_goal
-from keyexpr_schema.facts import SEARCHED
-from keyexpr_schema.payloads.goals import GoalState, GoalStatus
+from keyexpr_schema.facts import LOCATED, SEARCHED
+from keyexpr_schema.payloads.goals import ENDED_GOALS, Condition, Goal, GoalState, GoalStatus
 
 AT_ONCE = -1
 """In `State.waiting_for_robots`: planned without being asked for, whatever the team is."""
@@ -32,9 +32,11 @@ def activate(state: State, goal: str, *, unasked: bool = False) -> State:
     if spec.not_before_s is not None and state.time_s < spec.not_before_s:
         reason = f"it is begun at {when_shown(spec, spec.not_before_s)}"
         return _pending(state, status, reason, spec.not_before_s)
+    if before := [name for name in spec.after if not _has_ended(state, name)]:
+        return _pending(state, status, f"it waits until {' and '.join(before)} has ended")
     if waits := [row for row in spec.when if not believed(state, row)]:
         return _pending(state, status, f"it waits until {' and '.join(map(str, waits))}")
-    found = {row: believed(state, row) for row in spec.only_if}
+    found = {row: _asked(state, row, spec, status) for row in spec.only_if}
     if against := next((row for row, holds in found.items() if holds is False), None):
         reason = f"it is not needed, since {against} does not hold"
         return set_goal(state, _moved(status, GoalState.NOT_NEEDED, reason))
@@ -49,6 +51,21 @@ def activate(state: State, goal: str, *, unasked: bool = False) -> State:
         at_once = begun.waiting_for_robots.set(goal, AT_ONCE)
         begun = replace(begun, waiting_for_robots=at_once)
     return begin_stage(begun, goal)
+
+
+def _asked(state: State, row: Condition, spec: Goal, status: GoalStatus) -> bool | None:
+    """Whether what a goal is wanted under holds. What nobody has looked for is not known; to bring
+    something "if you find it" includes looking for it."""
+    holds = believed(state, row)
+    if row.relation != LOCATED or spec.after or holds is not False:
+        return holds
+    about = {subject for stage in status.stages for c in stage for subject in c.subjects}
+    return True if about.issuperset(row.subjects) else None
+
+
+def _has_ended(state: State, goal: str) -> bool:
+    status = state.goal_states.get(goal)
+    return status is None or status.state in ENDED_GOALS
 
 
 def begin_stage(state: State, goal: str) -> State:

@@ -73,6 +73,9 @@ def look_again(state: State, goal: str) -> State:
         return _run(state, spec, state.goal_states[goal])
     if is_maintained(spec):
         return _maintain(state, spec, state.goal_states[goal])
+    for part in state.goal_states[goal].parts:
+        if state.goals[part].after:
+            state = look_again(state, part)
     return state
 
 

@@ -183,8 +183,13 @@ def _take_goal(state: State, goal: Goal, read: Understood) -> State:
         state = replace(state, interpreting=interpreting)
         return touch(state, Touch(Part.INTERPRETING, goal.goal))
     state = _without_reading(state, goal.goal)
+    about: dict[str, set[str]] = {}
     for part, means in read.parts:
-        state = with_part(state, goal.goal, part, means)
+        asked = {name for row in (*part.when, *part.only_if) for name in row.subjects}
+        before = tuple(name for name, subjects in about.items() if subjects & asked)
+        state = with_part(state, goal.goal, replace(part, after=before), means)
+        name = state.goal_states[goal.goal].parts[-1]
+        about[name] = {each for stage in means.stages for row in stage for each in row.subjects}
         state = begin(state, state.goal_states[goal.goal].parts[-1])
     return begin(state, goal.goal) if status.state is not GoalState.REJECTED else state
 

@@ -11,6 +11,7 @@ from fleet.core import events
 from fleet.core.indexes.touches import Part, Touch
 from fleet.core.plan_entry import PlanEntry, PlanningJob
 from fleet.core.replan_reasons import GoalsAdded, ReplanAsked, TaskAdded
+from fleet.core.sentences import program_for
 from fleet.core.state import State
 from fleet.core.state_updates import (
     active_plan_of,
@@ -23,10 +24,9 @@ from fleet.core.state_updates import (
     touch,
 )
 from fleet.errors import NotUnderstood
-from fleet.language import read_goal
 from keyexpr_schema.payloads.goals import ENDED_GOALS, GoalState
 from keyexpr_schema.payloads.plans import Plan, PlanState
-from keyexpr_schema.payloads.programs import DO, Program
+from keyexpr_schema.payloads.programs import DO
 from keyexpr_schema.payloads.requests import Control, ControlRequest, PlanRequest, ReplanRequest
 
 _NUMBERED = re.compile("plan-([1-9][0-9]{0,14})")
@@ -311,7 +311,7 @@ def _sentence(state: State, ask: ControlRequest) -> TaskAdded | str:
     if robot is not None and robot not in state.robots:
         return f"there is no robot {robot}; known are {', '.join(sorted(state.robots)) or 'none'}"
     try:
-        stages = read_goal(text, state.vocabulary().spoken_by(speaker)).stages
+        program, robot = program_for(text, state.vocabulary().spoken_by(speaker), robot)
     except NotUnderstood as error:
         return f"{text!r}: {error}"
     return TaskAdded(
@@ -320,7 +320,7 @@ def _sentence(state: State, ask: ControlRequest) -> TaskAdded | str:
         args={"text": text},
         after=ask.after,
         robot=robot,
-        program=Program(text=text, stages=stages),
+        program=program,
     )
 
 

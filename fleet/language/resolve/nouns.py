@@ -10,6 +10,7 @@ from fleet.language.refusals import listed, nearest, one_of, suggestion
 from fleet.language.resolve.mentions import NounPhrase, Subject
 from fleet.language.resolve.pronouns import PERSONAL, Pronouns, either
 from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.salience import Salience
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import CATEGORIES, ENTITY_TYPES, Entity, EntityType
 from fleet.language.tree.nodes import (
@@ -30,6 +31,7 @@ class NounResolver:
         self.scene = scene
         self.who = who
         self.pronouns = Pronouns(scene)
+        self.salience = Salience(scene)
         self.located: Callable[[Noun, NounPhrase], NounPhrase] = lambda noun, made: made
 
     def subjects(self, nouns: Nouns, types: Sequence[EntityType], what: str) -> list[Subject]:
@@ -92,39 +94,7 @@ class NounResolver:
         if chosen is not None and set(chosen) <= set(made.names):
             several = Quantity.ALL if len(chosen) > 1 else made.quantity
             return replace(made.among(chosen), quantity=several, exact=True, source=None)
-        return self._where_sent(self._salient(self._spoken_briefly(noun, made)))
-
-    def _where_sent(self, made: NounPhrase) -> NounPhrase:
-        """Of several, those where somebody was just sent: "go to room 102, turn the light off"."""
-        if made.quantity is not Quantity.THE or made.plural or made.source is not None:
-            return made
-        last = self.scene.said.draft.stages[-1][-1:]
-        if made.ordinal is not None or len(made.names) < 2 or not (last and last[0].means):
-            return made
-        place, is_at = str(last[0].value), self.scene.vocabulary.is_at
-        there = made.among([name for name in made.names if is_at(name, place)])
-        return there if there.found else made
-
-    def _spoken_briefly(self, noun: Noun, made: NounPhrase) -> NounPhrase:
-        """Bare plurals of a sentence without articles are all of them: "lights off"."""
-        bare = made.plural and made.quantity is Quantity.BARE and made.count is None
-        if bare and self.scene.said.telegraphic and self.scene.mode == "":
-            return replace(made, quantity=Quantity.ALL)
-        return made
-
-    def _salient(self, made: NounPhrase) -> NounPhrase:
-        """Of several, the one that was spoken of: "the plate" after "plate 2"."""
-        definite = made.quantity is Quantity.THE or (
-            made.quantity is Quantity.BARE and self.scene.said.telegraphic and not self.scene.mode
-        )
-        if not definite or made.plural or made.source is not None:
-            return made
-        if made.ordinal is not None or made.count is not None or len(made.names) < 2:
-            return made
-        named = {subjects for subjects in self.scene.said.named if set(subjects) & set(made.names)}
-        if any(len(subjects) > 1 for subjects in named):
-            return made
-        return made.among([name for (name,) in named]) if named else made
+        return self.salience.meant(made)
 
     def _described_by_words(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
         text = self.scene.said.quote(noun.first, noun.last)
@@ -263,15 +233,8 @@ class NounResolver:
         narrowed = noun.relatives or noun.places or noun.but or noun.use
         if "EVERYTHING" not in tags or narrowed or noun.first in self.scene.said.chosen:
             return made
-        listed_ = self.listed()
+        listed_ = self.salience.listed()
         return replace(made.among(listed_), generic=False, exact=True) if listed_ else made
-
-    def listed(self) -> tuple[str, ...]:
-        """Things that the text has named, one after the other: "everything" may be those."""
-        names = {n for m in self.scene.said.mentioned if m.type == "object" for n in m.subjects}
-        things = tuple(n for n in self.scene.vocabulary.objects if n in names)
-        several = len(things) > 1 and not any(m.open for m in self.scene.said.mentioned)
-        return things if several else ()
 
     def _owned(self, noun: Noun, made: NounPhrase) -> NounPhrase:
         """Those of an owner: of "Anna's mug" only those; of "my mug" those, if there are any."""

@@ -129,7 +129,7 @@ def test_the_first_method_is_taken_for_which_all_is_there_and_why_is_kept() -> N
     assert other.number == 2
     assert other.said == "set the table for two"
     assert other.text == "put 2 plates on the dining table."
-    why = "there is 1 fork, and it takes 2"
+    why = "it takes 2 fork, and there is only 1"
     assert other.passed_over == (("put 2 forks on the dining table.", why),)
 
 
@@ -145,7 +145,7 @@ def test_where_no_method_can_be_taken_all_reasons_are_said() -> None:
     with pytest.raises(CannotBeDone) as refused:
         read("set the table for nine", HOUSE, NOW)
     said = str(refused.value)
-    assert said.startswith("'set the table for nine' cannot be done here: there is 1 fork")
+    assert said.startswith("'set the table for nine' cannot be done here: it takes 9 fork")
     assert "'9 plates': there are only 3" in said
     assert [text for text, _ in refused.value.passed_over] == [
         "put 9 forks on the dining table.",
@@ -170,6 +170,8 @@ def test_what_a_method_leaves_open_is_asked() -> None:
         ("do tell", "says more than what is to be done"),
         ("do nothing", "'do nothing' cannot be done here: 'the unicorn'"),
         ("air the garage", "'air the garage' cannot be done here: "),
+        ("air the ballroom", "'air the ballroom' cannot be done here: "),
+        ("offer Zorg a drink", "cannot be done here: 'Zorg' is not understood"),
     ],
 )
 def test_what_a_method_must_not_say_is_refused_with_the_tasks_phrase(text: str, words: str) -> None:

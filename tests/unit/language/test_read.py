@@ -50,6 +50,7 @@ NOW = datetime(2026, 3, 4, 9, 30, tzinfo=UTC)
         ("If the fridge is open, close it", "is_open(fridge) = false, if is_open(fridge) = true"),
         ("Close the fridge if it is open", "is_open(fridge) = false, if is_open(fridge) = true"),
         ("Should the lamp be on, switch it off", "is_on(lamp) = false, if is_on(lamp) = true"),
+        ("Close the fridge if you find it", "is_open(fridge) = false, if located(fridge) = true"),
         ("Unless the lamp is on, switch it on", "is_on(lamp) = true, if is_on(lamp) = false"),
         ("Switch on the lamp at 5 pm", "is_on(lamp) = true, in 27000 s | not_before_s 27000"),
         ("Switch on the lamp in ten minutes", "is_on(lamp) = true, in 600 s | not_before_s 600"),

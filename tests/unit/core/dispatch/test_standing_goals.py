@@ -287,3 +287,38 @@ def test_what_is_kept_stands_beside_what_is_done_once() -> None:
     assert model.goal_state("g.1") is GoalState.REACHED
     assert model.goal_state("g.2") is GoalState.STANDING
     assert model.goal_states["g"].parts == ("g.2",)
+
+
+FIND = "Look for cup 1. If you find it, bring it to the hallway"
+
+
+@pytest.mark.parametrize(
+    ("found", "second", "whole"),
+    [
+        ("living_room", GoalState.REACHED, GoalState.REACHED),
+        (None, GoalState.NOT_NEEDED, GoalState.FAILED),
+    ],
+)
+def test_what_is_done_if_something_is_found_waits_for_the_search(
+    found: str | None, second: GoalState, whole: GoalState
+) -> None:
+    model = fleet()
+    model.learn("cup_1", "at", None)
+    put(model, FIND)
+    assert model.goal_states["g.2"].reason == "it waits until g.1 has ended"
+    model.receive(events.PlanRequested, request=PlanRequest(request="r", goals=("g",)))
+    assert {order.skill for order in model.orders()} <= {"navigate", "search"}
+    if found is not None:
+        model.learn("cup_1", "at", found)
+    model.finish()
+    assert model.goal_state("g.2") is second
+    assert model.goal_state("g") is whole
+
+
+def test_bringing_something_if_it_is_found_includes_looking_for_it() -> None:
+    model = fleet()
+    model.learn("cup_1", "at", None)
+    put(model, "Look for cup 1 and bring it to the hallway if you find it")
+    assert model.goal_state("g") is GoalState.WAITING
+    put(model, "Bring cup 2 to the hallway if you find cup 1", name="h")
+    assert model.goal_state("h") is GoalState.PENDING

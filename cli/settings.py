@@ -38,6 +38,7 @@ class PlannerSettings:
     llm_config: Path | None = None
     skills: tuple[Path, ...] = ()
     tasks: tuple[Path, ...] = ()
+    words: tuple[Path, ...] = ()
 
 
 _PLANNER_FIELDS = tuple(field.name for field in fields(PlannerSettings))
@@ -197,4 +198,5 @@ def _planner(section: object, path: Path) -> PlannerSettings:
         llm_config=None if llm is None else path.parent / Path(llm).expanduser(),
         skills=files("skills"),
         tasks=files("tasks"),
+        words=files("words"),
     )

@@ -94,7 +94,7 @@ class MeaningEntry(GoalEntry, frozen=True, kw_only=True):
                 question.of,
                 frozenset(filter(None, question.subjects.split("|"))),
                 conditions(question.holds),
-            ),
+            ).canonical(),
         )
 
 

@@ -60,7 +60,7 @@ class ModelReader:
         budget = self.model.budget()
         began_s = time.perf_counter()
         said = LlmParaphraser(self.model).paraphrase(
-            text, refusal, vocabulary_of(world), NOW, _anything, budget
+            text, refusal, vocabulary_of(world), NOW, check=_anything, budget=budget
         )
         took_s = time.perf_counter() - began_s
         making = budget.making("paraphraser")

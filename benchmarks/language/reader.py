@@ -104,7 +104,7 @@ def _meaning(reading: Reading) -> Meaning:
         facts=_facts(reading.facts),
         question=None
         if question is None
-        else Asked(question.of, frozenset(question.subjects), _rows(question.holds)),
+        else Asked(question.of, frozenset(question.subjects), _rows(question.holds)).canonical(),
     )
 
 
@@ -113,7 +113,7 @@ def _goal(goal: WantedGoal) -> WantedMeaning:
         stages=tuple(map(_rows, goal.stages)),
         always=_rows(goal.always),
         never=_rows(goal.never),
-        when=_rows(goal.when),
+        when=_rows((*goal.when, *goal.only_if)),
         priority=goal.priority,
         due_s=goal.due_s,
         not_before_s=goal.not_before_s,

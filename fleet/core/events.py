@@ -236,6 +236,8 @@ class GoalInterpreted(Event, frozen=True, kw_only=True):
     """The sentence; the goal may have another one by now."""
     paraphrase: str | None = None
     """The same in sentences that the grammar reads."""
+    teaches: str | None = None
+    """The entry of a task file by which the grammar would read it [YAML]."""
     stages: tuple[tuple[Condition, ...], ...] = ()
     """What it means, as models of earlier versions have said."""
     reason: str | None = None

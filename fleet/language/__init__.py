@@ -6,9 +6,9 @@ sentence that says which words those are and what is known. `docs/language.md` h
 """
 
 from fleet.language.configuration import Confirm, LanguageConfig, load_language_config
-from fleet.language.reader import read, read_goal, statement_facts
 from fleet.language.reading import Ambiguity, Reading, WantedGoal
 from fleet.language.resolve.scene import Question
+from fleet.language.texts import read, read_goal, statement_facts
 from fleet.language.vocabulary import SkillPhrase, Vocabulary
 
 __all__ = [

@@ -12,7 +12,7 @@ from fleet.errors import NotUnderstood
 from fleet.language.expansion import Row, expanded, take
 from fleet.language.explaining import Explanations
 from fleet.language.grammar.chart import NotGrammatical, inside_lists, parsed
-from fleet.language.reading import Ambiguity, Reading, WantedGoal
+from fleet.language.reading import Reading
 from fleet.language.refusals import reason_for
 from fleet.language.resolve.clauses import Clauses
 from fleet.language.resolve.discourse import Discourse
@@ -20,22 +20,22 @@ from fleet.language.resolve.frames import EXAMPLE, SAY_IT
 from fleet.language.resolve.mentions import WhichOne
 from fleet.language.resolve.scene import Question, Scene
 from fleet.language.resolve.stages import GoalDraft
-from fleet.language.segments import Segment, Sentence, cut, sentences_of
+from fleet.language.segments import Segment, Sentence, cut, parted, sentences_of
 from fleet.language.tagging.tagger import Lexeme, tagger_of
 from fleet.language.tagging.task_phrases import TaskCall, called, marked, spoken_out
-from fleet.language.timing import timed
+from fleet.language.timing import end_goal
 from fleet.language.tree.building import Builder
 from fleet.language.tree.nodes import Clause
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.tokens import tokens_of
-from keyexpr_schema.facts import AT, Literal
+from keyexpr_schema.facts import AT, LOCATED, Literal
 from keyexpr_schema.payloads.goals import Condition
 
 MOST_CHARACTERS = 8_000
 MOST_WORDS = 1_000
 MOST_WORDS_TOGETHER = 80
 """In one clause; of a long list one for each thing."""
-_CHOICES = 12
+CHOICES = 12
 """Of so many that a noun phrase may mean, one is asked for."""
 _NAMING = re.compile(r"not a known|as a goal")
 """What a refusal says that names a word nobody knows."""
@@ -99,19 +99,18 @@ class Reader:
         if self.mode != "fact":
             lexemes = marked(lexemes, self.tokens, self.text, self.vocabulary, self.tagger)
         dangling = False
-        sentences = [cut(words) for words in sentences_of(lexemes)]
+        parts = (part for whole in sentences_of(lexemes) for part in parted(whole))
+        sentences = [cut(words) for words in parts]
         for number, sentence in enumerate(sentences):
             self.later = [s for s in sentences[number + 1 :] if not self._said_of_oneself(s)]
             self.why.check(sentence)
             timed = bool(sentence.times) or any(part.role for part in sentence.segments)
+            states = self._with_goals_ended(states, timed, now)
             for state in states:
                 said = state.said
                 said.elliptic, said.addressees, said.done, said.again = "", [], False, None
-                said.telegraphic = sentence.telegraphic
+                said.telegraphic, said.clauses, said.offer = sentence.telegraphic, 0, None
                 said.urgent = said.urgent or sentence.urgent
-                if timed or said.times or said.when:
-                    with suppress(NotUnderstood):  # the last sentence says it again
-                        self._close(said, now)
                 said.times, said.time_words = list(sentence.times), sentence.time_words
             dangling = sentence.dangling
             if self._said_of_oneself(sentence):
@@ -123,23 +122,53 @@ class Reader:
                 states = self._sentence(sentence, states)
         return self._ended(states, now, dangling)
 
+    def _with_goals_ended(
+        self, states: Sequence[_State], timed: bool, now: datetime | None
+    ) -> list[_State]:
+        """Those readings whose goals could end, where the next sentence has times of its own."""
+        kept, problem = [], None
+        for state in states:
+            said = state.said
+            try:
+                if timed or said.times or said.when or said.only_if:
+                    end_goal(said, self.vocabulary, now, self.mode)
+            except NotUnderstood as error:
+                problem = problem or error
+            else:
+                kept.append(state)
+        if not kept and problem is not None:
+            raise problem
+        return kept
+
     # --- one sentence after the other -------------------------------------------------------------
     def _sentence(self, sentence: Sentence, states: list[_State]) -> list[_State]:
         for number, segment in enumerate(sentence.segments):
             if segment.joint == "then":
                 for state in states:
                     state.said.draft.next_stage()
+            if segment.joint == "sooner":
+                for state in states:
+                    state.said.draft.hold()
             try:
                 states = self._segment(segment, states)
+                for state in states:
+                    state.said.draft.release()
             except NotUnderstood as problem:
                 left = sentence.segments[number:]
                 raise self.why.rather(problem, left, self.later) from None
         return states
 
     def _segment(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
-        if (call := called(segment.words, self.tagger)) and not (segment.role or segment.always):
-            return self._task(call, states)
+        call = called(segment.words, self.tagger)
         segment = replace(segment, words=spoken_out(segment.words))
+        if call is not None and not (segment.role or segment.always):
+            if call.task.yields:
+                with suppress(NotUnderstood):
+                    return self._clauses(segment, states)
+            return self._task(call, states)
+        return self._clauses(segment, states)
+
+    def _clauses(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
         words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))
         if words > MOST_WORDS_TOGETHER:
             raise NotUnderstood(
@@ -185,11 +214,11 @@ class Reader:
 
     def _task(self, call: TaskCall, states: Sequence[_State]) -> list[_State]:
         found: list[_State] = []
-        for asked, reading in expanded(call, self.vocabulary, self.within, self._said_by_method):
+        for meant in expanded(call, self.vocabulary, self.within, self._said_by_method):
             for state in states:
                 said = state.said.copy()
-                take(said, call, reading, self.vocabulary.robots)
-                found.append(_State(said, state.cost, state.question, state.asked or asked))
+                take(said, call, meant, self.vocabulary.robots)
+                found.append(_State(said, state.cost, state.question, state.asked or meant.asked))
         return found[:_READINGS]
 
     def _said_by_method(self, text: str, within: tuple[str, ...]) -> list[Row]:
@@ -197,7 +226,7 @@ class Reader:
 
     def _each(self, which: WhichOne, segment: Segment, states: Sequence[_State]) -> list[_State]:
         """The readings in which a noun phrase means one, then another of those that it can."""
-        if len(which.choices) > _CHOICES or len(states) > _CHOICES:
+        if len(which.choices) > CHOICES or len(states) > CHOICES:
             return []
         found: list[_State] = []
         for meant in which.choices:
@@ -216,7 +245,37 @@ class Reader:
     def _resolved(
         self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment
     ) -> tuple[Discourse, Question | None]:
-        mode = "fact" if segment.role else self.mode
+        if not segment.role:
+            return self._understood(clauses, said, segment, self.mode)
+        try:
+            return self._understood(clauses, said.copy(), segment, "fact")
+        except NotUnderstood:
+            if (found := self._found(clauses, said, segment)) is None:
+                raise
+            return found, None
+
+    def _found(
+        self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment
+    ) -> Discourse | None:
+        """Under a condition that something is found, and none other that somebody does."""
+        draft, said.draft = said.draft, GoalDraft(self.vocabulary.is_at)
+        with suppress(NotUnderstood):
+            said, question = self._understood(clauses, said, replace(segment, role=""), "goal")
+            each = list(said.draft.of_each())
+            found = [row for stage in said.draft.conditions() for row in stage]
+            looked_for = bool(found) and all(row.relation == LOCATED for row in found)
+            if looked_for and question is None and not any(by for by, _ in each):
+                rows = said.when if segment.role == "when" else said.only_if
+                wanted = segment.role != "unless"
+                rows.extend(Condition(relation=LOCATED, subject=row.subject, any_of=row.any_of,
+                                      value=wanted) for row in found)  # fmt: skip
+                said.draft = draft
+                return said
+        return None
+
+    def _understood(
+        self, clauses: tuple[Clause, ...], said: Discourse, segment: Segment, mode: str
+    ) -> tuple[Discourse, Question | None]:
         before = dict(said.facts)
         draft = said.draft
         if segment.always:
@@ -242,7 +301,8 @@ class Reader:
                     value = not value
                 if relation == AT:
                     relation = self.vocabulary.relation_to(str(value))
-                said.when.append(Condition(relation=relation, subject=subject, value=value))
+                rows = said.when if segment.role == "when" else said.only_if
+                rows.append(Condition(relation=relation, subject=subject, value=value))
             said.elliptic = ""
         return said, scene.question
 
@@ -306,11 +366,19 @@ class Reader:
             assert problem is not None
             raise problem
         rows = [(cost, asked, reading) for reading, (cost, asked) in found.items()]
-        return sorted(rows, key=lambda row: row[0])
+        best: dict[Reading, Row] = {}
+        for each in sorted(rows, key=lambda row: (row[0], not self._believed(row[2]))):
+            best.setdefault(replace(each[2], presumed=()), each)  # what is presumed asks nothing
+        return list(best.values())
+
+    def _believed(self, reading: Reading) -> bool:
+        """Whether all that it takes for granted is believed."""
+        is_at = self.vocabulary.is_at
+        return all(is_at(key.subject, str(value)) for key, value in reading.presumed)
 
     def _reading(self, state: _State, now: datetime | None, dangling: bool) -> Reading:
         said = state.said.copy()
-        self._close(said, now)
+        end_goal(said, self.vocabulary, now, self.mode)
         facts = tuple(Literal(key, value) for key, value in said.facts.items())
         if dangling or not (said.goals or facts or state.question):
             if self.mode == "fact":
@@ -321,80 +389,3 @@ class Reader:
         remarks = (*self.remarks, *said.remarks)
         methods = tuple(dict.fromkeys(said.methods))
         return Reading(self.line, goals, facts, state.question, presumed, remarks, methods)
-
-    def _close(self, said: Discourse, now: datetime | None) -> None:
-        """End the goal that was being said: other times or conditions hold for what follows.
-
-        Raises:
-            NotUnderstood: it cannot be, or a time belongs to nothing.
-        """
-        wanted = [
-            (by, draft.conditions(self.vocabulary.speaker)) for by, draft in said.draft.of_each()
-        ]
-        wants = bool(any(stages for _, stages in wanted) or said.always or said.never)
-        if wants:
-            for number, (by, stages) in enumerate(wanted):
-                goal = WantedGoal(
-                    stages,
-                    () if number else tuple(dict.fromkeys(said.always)),
-                    () if number else tuple(dict.fromkeys(said.never)),
-                    when=tuple(dict.fromkeys(said.when)),
-                    by=by,
-                )
-                said.goals.append(timed(goal, said, now))
-        elif said.times and self.mode == "fact":
-            named = [(token.word, token.spoken) for token in self.tokens]
-            reason = reason_for(named, "a fact")
-            raise NotUnderstood(reason or f"{self.line!r} names a time, which a fact cannot")
-        elif said.times or said.when:
-            what = f"{said.time_words!r} names a time" if said.times else '"If" names a condition'
-            raise NotUnderstood(f"{what}, but nothing is to be done then")
-        said.draft = GoalDraft(self.vocabulary.is_at)
-        said.always, said.never, said.when, said.times = [], [], [], []
-
-
-def read(text: str, vocabulary: Vocabulary, now: datetime | None = None) -> Reading | Ambiguity:
-    """What a text asks for, says, or asks; of several meanings the plainest.
-
-    `now` is what the clock says, with its zone, for times of day.
-
-    Raises:
-        NotUnderstood: it means nothing here; one sentence says why.
-    """
-    return _one(Reader(text, vocabulary).read(now))
-
-
-def _one(readings: Sequence[tuple[int, str, Reading]]) -> Reading | Ambiguity:
-    least, asked = readings[0][:2]
-    best = [reading for cost, _, reading in readings if cost == least]
-    if len(best) == 1:
-        return best[0]
-    candidates = tuple((each.understood_as, each) for each in best[:_CHOICES])
-    return Ambiguity(best[0].text, candidates, asked)
-
-
-def read_goal(text: str, vocabulary: Vocabulary) -> Reading:
-    """What a text asks for, where it asks for one goal that is to be reached once.
-
-    Raises:
-        NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
-    """
-    reading = _one(Reader(text, vocabulary, "goal").read(None))
-    if isinstance(reading, Ambiguity):
-        raise NotUnderstood(reading.sentence)
-    if reading.facts or any(goal != WantedGoal(goal.stages, priority=goal.priority)
-                            for goal in reading.goals):  # fmt: skip
-        raise NotUnderstood(f"{reading.text!r} says more than what shall be reached: leave it out")
-    return reading
-
-
-def statement_facts(text: str, vocabulary: Vocabulary) -> tuple[Literal, ...]:
-    """The facts in a statement, where the value `None` is *unknown*.
-
-    Raises:
-        NotUnderstood: a word was not understood, or the text contradicts itself; one sentence.
-    """
-    reading = _one(Reader(text, vocabulary, "fact").read(None))
-    if isinstance(reading, Ambiguity):
-        raise NotUnderstood(reading.sentence)
-    return reading.facts

@@ -12,15 +12,18 @@ _OPENING = frozenset({"KEEP", "ENSURE", "WANT", "DONT", "NEVER", "AVOID"})
 _ASKED = frozenset({"WHERE", "HOWMANY", "WHICH", "WHAT", "WHO"})
 _CLAUSAL = _OPENING | {"VERB", "FIN", "GER", "BE", "MODAL", "HAVE", "PREP", "CAUSE", "BELONG"}
 _WISHED = frozenset({"should", "must", "ought", "has", "have", "needs", "need"})
-_CONDITIONS = {"IF": "when", "WHEN": "when", "UNLESS": "unless"}
+_ENDS = frozenset({"NOUN", "PRON", "NUM", "ADJ", "PART", "HERE", "HOME", "ANYWHERE", "THERE"})
+"""What a condition can end with, where no comma ends it."""
+_CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless"}
 
 
 @dataclass(frozen=True)
 class Segment:
     """Words that are parsed together.
 
-    `joint` is what stands before them: "", "and" or "then". `role`: `when` or `unless` for a
-    condition, else "". `dangling`: an "and" or "then" that nothing follows stands behind them.
+    `joint` is what stands before them: "", "and", "then", or "sooner" ("but first"). `role`: `if`,
+    `when` or `unless` for a condition, else "". `dangling`: an "and" or "then" that nothing follows
+    stands behind them.
     """
 
     words: tuple[Lexeme, ...]
@@ -66,6 +69,31 @@ def sentences_of(lexemes: Sequence[Lexeme]) -> list[tuple[Lexeme, ...]]:
     return [*found, tuple(begun)] if begun else found
 
 
+def parted(words: tuple[Lexeme, ...]) -> list[tuple[Lexeme, ...]]:
+    """A sentence as several, where parts of it have times or conditions of their own."""
+    found, begun = [], 0
+    for i, word in enumerate(words):
+        if not word.tags & {"AND", "COMMA"} or i < begun + 2:
+            continue
+        rest = words[i + 1 + (i + 1 < len(words) and "AND" in words[i + 1].tags) :]
+        if _of_its_own(words[begun:i]) and _of_its_own(rest) and _opens_after_time(rest):
+            found.append(words[begun:i])
+            begun = len(words) - len(rest)
+    return [*found, words[begun:]]
+
+
+def _of_its_own(words: Sequence[Lexeme]) -> bool:
+    """Whether it has a time, or a condition, and more than that."""
+    timed = any("TIME" in word.tags for word in words)
+    given = any(set(_CONDITIONS) & word.tags and "NOUN" not in word.tags for word in words)
+    return (timed or given) and any(w.tags & _CLAUSAL for w in words if "TIME" not in w.tags)
+
+
+def _opens_after_time(words: Sequence[Lexeme]) -> bool:
+    rest = [word for word in words if not word.tags & {"TIME", "POLITE", "COMMA"}]
+    return bool(rest) and bool(set(_CONDITIONS) & rest[0].tags or "VERB" in rest[0].tags)
+
+
 def cut(words: Sequence[Lexeme]) -> Sentence:
     """A sentence cut where that is clear: at "then", and before verbs that begin a clause."""
     times: list[TimePhrase] = []
@@ -80,18 +108,23 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             urgent = urgent or -1
         elif "POLITE" not in word.tags or word.tags & {"NOUN"}:
             kept.append(word)
-    kept = _asked(_thought(_without_fillers(kept)))
+    kept = _asked(_if_so(_thought(_without_fillers(kept))))
     while kept and (kept[0].words == ("but",) or "COMMA" in kept[0].tags):
         kept.pop(0)  # "no rush, but …"
     segments: list[Segment] = []
+    if kept and "OF" in kept[0].tags and (among := _among(kept)):  # "of the mugs, bring me …"
+        segments.append(Segment(tuple(kept[1:among]), topic=True))
+        kept = _commas(kept[among:])
     for role, part in _roles(_ordered(_commas(kept))):
         joint, begun = "", list[Lexeme]()
         for i, word in enumerate(part):
             rest = part[i + 1 :]
-            if "THEN" in word.tags and "NOUN" not in word.tags:
+            if word.tags & {"THEN", "SOONER"} and "NOUN" not in word.tags:
                 segments += _segment(begun, joint, role)
-                joint, begun = "then", []
-            elif word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest):
+                joint, begun = "then" if "THEN" in word.tags else "sooner", []
+            elif (word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest, begun)) or (
+                "COMMA" in word.tags and begun and _about_it(rest)
+            ):
                 segments += _segment(begun, joint, role)
                 joint, begun = "and", []
             elif "WITHOUT" in word.tags and begun:
@@ -107,7 +140,9 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
         segments += _segment(begun, joint, role)
         dangling = not _content(begun) and joint in ("then", "and")
         dangling = dangling or bool(begun and "AND" in begun[-1].tags)
-    if len(segments) > 1 and not segments[0].role:  # "that blanket on the couch, fold it"
+    if (
+        len(segments) > 1 and not segments[0].role and not segments[0].topic
+    ):  # "that blanket on the couch, fold it"
         about = any("PRON" in word.tags for word in segments[1].words)
         plain = not any(word.tags & (_CLAUSAL - {"PREP"}) for word in segments[0].words)
         segments[0] = replace(segments[0], topic=about and plain)
@@ -130,6 +165,18 @@ def _without_fillers(words: Sequence[Lexeme]) -> list[Lexeme]:
             continue
         kept.append(word)
     return kept
+
+
+def _if_so(words: list[Lexeme]) -> list[Lexeme]:
+    """`check whether it is on, and if so turn it off` as `if it is on, turn it off`."""
+    at = next((i for i, word in enumerate(words) if "IFSO" in word.tags), None)
+    asks = len(words) > 2 and "ASK" in words[0].tags and words[1].tags & {"IF", "WHETHER"}
+    if at is None or not asks or not words[at + 1 :]:
+        return words
+    inner = [w for w in words[2:at] if "COMMA" not in w.tags]
+    inner = inner[:-1] if inner and "AND" in inner[-1].tags else inner
+    comma = replace(words[at], tags=frozenset({"COMMA"}))
+    return [replace(words[1], tags=frozenset({"IF"})), *inner, comma, *_commas(words[at + 1 :])]
 
 
 def _thought(words: list[Lexeme]) -> list[Lexeme]:
@@ -167,6 +214,18 @@ def _content(words: Sequence[Lexeme]) -> list[Lexeme]:
     return [word for word in words if not word.tags & {"COMMA", "AND"}]
 
 
+def _among(words: Sequence[Lexeme]) -> int | None:
+    """Where those end of whom something is said: "of the two towels | bring me …"."""
+    return next(
+        (
+            i
+            for i, word in enumerate(words)
+            if i > 1 and ("COMMA" in word.tags or ("VERB" in word.tags and "NOUN" not in word.tags))
+        ),
+        None,
+    )
+
+
 def _commas(words: Sequence[Lexeme]) -> list[Lexeme]:
     """Without commas at the ends, and of several in a row one."""
     kept: list[Lexeme] = []
@@ -183,8 +242,16 @@ def _clausal(words: Sequence[Lexeme]) -> bool:
     return any(w.tags & _CLAUSAL and not w.tags & {"NOUN"} for w in words)
 
 
-def _opens(rest: Sequence[Lexeme]) -> bool:
-    """Whether what follows begins a clause, and cannot go on with a list."""
+def _about_it(rest: Sequence[Lexeme]) -> bool:
+    """Whether what follows says something of what was named: "the curtains, they should …"."""
+    return len(rest) > 2 and "PRON" in rest[0].tags and bool(
+        rest[1].tags & {"MODAL", "BE", "NEEDS", "HAVE", "BELONG"}
+    )  # fmt: skip
+
+
+def _opens(rest: Sequence[Lexeme], before: Sequence[Lexeme]) -> bool:
+    """Whether what follows begins a clause, and cannot go on with a list; none goes on with what
+    calls a task."""
     rest = list(rest[:2])
     if rest and rest[0].tags & {"AND", "COMMA"}:
         rest = rest[1:]
@@ -195,14 +262,14 @@ def _opens(rest: Sequence[Lexeme]) -> bool:
     tags = rest[0].tags
     if tags & _OPENING:
         return True
-    return "VERB" in tags and not tags & {"NOUN", "ADJ", "ORD"}
+    return "VERB" in tags and ("TASK" in before[-1].tags or not tags & {"NOUN", "ADJ", "ORD"})
 
 
 def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
     """With "A before B" and "after B, A" as "A then B", where a clause follows those words."""
     for i, word in enumerate(words):
         if word.words == ("but",) and (sooner := _sooner(words[i + 1 :])):
-            return [*sooner, replace(word, tags=frozenset({"THEN"})), *_commas(words[:i])]
+            return [*_commas(words[:i]), replace(word, tags=frozenset({"SOONER"})), *sooner]
         tag = next((tag for tag in ("BEFORE", "AFTER", "WHEN") if tag in word.tags), None)
         rest = list(words[i + 1 :])
         if tag is None or not rest or not _happens(rest, by_you=tag == "WHEN"):
@@ -210,7 +277,8 @@ def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
         then = replace(word, tags=frozenset({"THEN"}))
         if i:
             first, rest = _commas(words[:i]), _deed(rest)
-            return [*first, then, *rest] if tag == "BEFORE" else [*rest, then, *first]
+            earlier = replace(word, tags=frozenset({"SOONER"}))
+            return [*first, then if tag == "BEFORE" else earlier, *rest]
         ends = [j for j, w in enumerate(rest) if "COMMA" in w.tags]
         verbs = [
             j
@@ -276,11 +344,23 @@ def _roles(words: Sequence[Lexeme]) -> list[tuple[str, list[Lexeme]]]:
             if rest and "THEN" in rest[0].tags:
                 rest = rest[1:]
             return [(role, list(words[1:end])), ("", rest)]
+        if (end := _command_after(words)) is not None:
+            return [(role, list(words[1:end])), ("", list(words[end:]))]
     if words and words[0].words == ("should",):  # "should the door be open, close it"
         end = next((j for j, word in enumerate(words) if "COMMA" in word.tags), None)
         if end is not None:
-            return [("when", list(words[:end])), ("", list(words[end + 1 :]))]
+            return [("if", list(words[:end])), ("", list(words[end + 1 :]))]
     return [("", list(words))]
+
+
+def _command_after(words: Sequence[Lexeme]) -> int | None:
+    """Where what is to be done begins behind a condition that no comma ends: "if you find it bring
+    it here"."""
+    for i in range(3, len(words) - 1):
+        before = words[i - 1].tags
+        if "VERB" in words[i].tags and "NOUN" not in words[i].tags and before & _ENDS:
+            return i
+    return None
 
 
 def _segment(words: Sequence[Lexeme], joint: str, role: str) -> list[Segment]:

@@ -87,7 +87,7 @@ def compose(llm_file: Path | None = None) -> Composition:
         planners,
         allocators,
         model,
-        LlmParaphraser(model),
+        LlmParaphraser(model, symbolic),
         symbolic,
         ModelWriter(model),
         _program_writers(),

@@ -25,6 +25,7 @@ from fleet.service.planner_service import PlannerService
 from fleet.service.planning.pool import PlanningPool
 from fleet.service.skill_models import load_all_skills
 from fleet.service.task_files import load_all_tasks
+from fleet.service.word_files import load_words
 from keyexpr_schema.errors import SchemaError
 from keyexpr_schema.transport.session import SessionConfig, open_session
 
@@ -35,6 +36,7 @@ def run(
     data_dir: Path,
     skill_files: tuple[Path, ...] = (),
     task_files: tuple[Path, ...] = (),
+    word_files: tuple[Path, ...] = (),
     llm_file: Path | None = None,
     policy: Policy | None = None,
     retention: Retention | None = None,
@@ -43,7 +45,8 @@ def run(
 
     The event journal and the archive of what is over lie in `data_dir`; `retention` says how long
     that keeps its keys. It waits for a router as long as there is none. `skill_files` are those of
-    `load_all_skills`, `task_files` those of `load_all_tasks`, `llm_file` that of `compose`.
+    `load_all_skills`, `task_files` those of `load_all_tasks`, `word_files` those of `load_words`,
+    `llm_file` that of `compose`.
 
     Raises:
         SystemExit: with 1 and one sentence on stderr, when it cannot start or is superseded.
@@ -60,6 +63,7 @@ def run(
             interpreter=model.configured,
             confirm=language.confirm,
             tasks=load_all_tasks(task_files),
+            words=load_words(word_files),
         )
         pool = PlanningPool(llm_file, data_dir / "failed-planning-jobs")
         asyncio.run(_run(endpoints, realm, data_dir, pool, skills, policy, retention))

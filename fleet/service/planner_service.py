@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from fleet.core import answering, events
 from fleet.core.effects import DropJob, Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import At, Event
-from fleet.core.model.skills import Skills, phrases_of, state_words_of
+from fleet.core.model.skills import Skills, phrases_of, relations_of_skills, state_words_of
 from fleet.core.named_tasks import tasks_known
 from fleet.core.state import LOGIC, Policy, State
 from fleet.errors import FleetError, Superseded
@@ -83,7 +83,10 @@ class PlannerService:
         self._pool = pool
         self._skills = dict(skills)
         self._policy = replace(
-            policy, skill_phrases=phrases_of(skills), state_words=state_words_of(skills)
+            policy,
+            skill_phrases=phrases_of(skills),
+            state_words=state_words_of(skills),
+            relations=relations_of_skills(skills),
         )
         self._incarnation = uuid.uuid4().hex[:12]
         self._charge = Charge(
@@ -97,6 +100,7 @@ class PlannerService:
             session, archive, self._outbox, retention or Retention(), lambda: self._core.state
         )
         self._inbox: asyncio.Queue[Event] = asyncio.Queue()
+        self._timers = Timers()
         self._held: list[Effect] | None = []
         """Effects held back until everything stored is known; afterwards `None`."""
 
@@ -245,6 +249,8 @@ class PlannerService:
         if change.key is SIM_CLOCK:
             if change.value is not None:
                 self._clock.ticked(change.value.time_s)
+                if self._timers.rings(self.state, change.value.time_s):
+                    self._inbox.put_nowait(events.TimerFired(**self._at()))
         elif change.key is PLANNER_STATUS:
             self._charge.status_changed(change.value)
         elif (event := event_of(change, self._at())) is not None:
@@ -266,15 +272,14 @@ class PlannerService:
 
     async def _take_events(self) -> None:
         """Take events one after the other; wake up when a timer of the state runs out."""
-        timers = Timers()
         while True:
-            timer_s = timers.next(self.state)
+            timer_s = self._timers.next(self.state)
             try:
                 async with asyncio.timeout(None if timer_s is None else timer_s - time.monotonic()):
                     event = await self._inbox.get()
             except TimeoutError:
                 event = events.TimerFired(**self._at())
-                timers.fired(time.monotonic())
+                self._timers.fired(time.monotonic())
             self._apply(event)
 
     def _apply(self, event: Event) -> None:

@@ -8,7 +8,7 @@ from fleet.errors import BadTaskFile
 from fleet.language.methods.model import CompoundTask
 from fleet.language.methods.patterns import Row, rows_of
 from fleet.language.methods.task_file import tasks_from_data
-from keyexpr_schema.config_files import config_file, read_yaml
+from keyexpr_schema.config_files import config_file, parsed_yaml, read_yaml
 
 
 def load_all_tasks(task_files: tuple[Path, ...] = ()) -> tuple[CompoundTask, ...]:
@@ -41,3 +41,28 @@ def load_tasks(path: Path) -> tuple[CompoundTask, ...]:
         BadTaskFile: it cannot be read, or what is in it is not right.
     """
     return tasks_from_data(read_yaml(path, BadTaskFile), str(path))
+
+
+def add_task(path: Path, entry: str) -> CompoundTask:
+    """Write a task behind those of a file, which is made if need be; `entry` is that of `entry_of`.
+
+    Raises:
+        BadTaskFile: the file is none of tasks, has one of that name, or cannot be written.
+    """
+    (task,) = tasks_from_data(parsed_yaml(f"tasks:\n{entry}", BadTaskFile, str(path)), str(path))
+    known = load_tasks(path) if path.exists() else ()
+    if any(task.name == other.name for other in known):
+        raise BadTaskFile(f"{path}: there is a task {task.name} already")
+    try:
+        text = path.read_text(encoding="utf-8") if path.exists() else "tasks:\n"
+        text = f"{text.rstrip()}\n{entry}"
+        written = tasks_from_data(parsed_yaml(text, BadTaskFile, str(path)), str(path))
+        if [each.name for each in written] != [*(each.name for each in known), task.name]:
+            raise BadTaskFile(f"{path}: nothing can be written behind what stands there")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside = path.with_name(f"{path.name}.new")
+        beside.write_text(text, encoding="utf-8")
+        beside.replace(path)
+    except OSError as error:
+        raise BadTaskFile(f"{path} cannot be written: {error.strerror}") from None
+    return task

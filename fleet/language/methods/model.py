@@ -34,7 +34,8 @@ class CompoundTask(msgspec.Struct, frozen=True, kw_only=True):
     """What people call by a name of its own: "set the table for two".
 
     `says` are the phrases, `methods` the ways to do it, the first that can be taken first.
-    `defaults` are for parameters that a phrase leaves out, `file` says where it stands.
+    `defaults` are for parameters that a phrase leaves out, `file` says where it stands. One that
+    `yields` is called only where the grammar makes nothing of the words.
     """
 
     name: str
@@ -43,6 +44,7 @@ class CompoundTask(msgspec.Struct, frozen=True, kw_only=True):
     about: str = ""
     defaults: dict[str, str] = {}
     file: str = ""
+    yields: bool = False
 
     @property
     def shown(self) -> str:

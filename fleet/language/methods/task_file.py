@@ -18,7 +18,7 @@ from fleet.language.methods.patterns import BadPhrase, rows_of, slots_of
 from fleet.language.words.tokens import NUMBERS
 
 _METHOD = ("do", "in_order", "needs")
-_FIELDS = ("about", "says", "defaults", "methods", "do", "in_order", "needs")
+_FIELDS = ("about", "says", "defaults", "yields", "methods", "do", "in_order", "needs")
 _NAME = re.compile(r"[^\W\d]\w*")
 _NEED = re.compile(r"(?:(\d+|\{\w+\})\s+)?\w+(?:\s*[&|]\s*\w+)*")
 
@@ -48,6 +48,9 @@ def _task(name: Any, data: Any, where: str, file: str) -> CompoundTask:
     given = {*defaults} | {
         slot for slot in types if all(slot in _always_said(text) for text in says)
     }
+    yields = data.get("yields", False)
+    if not isinstance(yields, bool):
+        raise BadTaskFile(f"{where}: `yields` must be true or false, not {yields!r}")
     if "methods" in data:
         if both := [key for key in _METHOD if key in data]:
             raise BadTaskFile(
@@ -71,6 +74,7 @@ def _task(name: Any, data: Any, where: str, file: str) -> CompoundTask:
         about=str(data.get("about", "")),
         defaults=defaults,
         file=file,
+        yields=yields,
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import reason_for
-from fleet.language.resolve.frames import Frame, framed, frames_of, no_use
+from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of, no_use
 from fleet.language.resolve.going import Going
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.looking import ROBOTS_TELL, Looking
@@ -19,9 +19,12 @@ from fleet.language.resolve.stages import GoalDraft
 from fleet.language.resolve.tidiness import Tidiness
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tagging.skill_words import SkillFrame
-from fleet.language.tree.nodes import Clause, Nouns, Particle, Quantity
+from fleet.language.tree.nodes import Clause, Nouns, Particle, Place, Quantity
 from keyexpr_schema.facts import AT, HELD, LOCATED
 from keyexpr_schema.payloads.goals import Condition
+
+_FETCHED = frozenset({"get", "fetch", "retrieve"})
+"""After these, "next to the lamp" says which one, not where it shall be."""
 
 
 class Commands:
@@ -63,10 +66,20 @@ class Commands:
         self._verb(replace(before, arguments=(clause.subject, *rest)), None)
         return True
 
+    def on_paired(self, clause: Clause) -> None:
+        """`and Ben a mug`, after `bring Anna a cup`."""
+        offer = self.scene.said.offer
+        if offer is None or clause.subject is None:
+            first = clause.subject.items if clause.subject is not None else ()
+            text = self.scene.said.quote(first[0].first, first[-1].last) if first else ""
+            raise NotUnderstood(f"{text!r} is not understood as a goal: {EXAMPLE}")
+        self._verb(replace(offer, arguments=(clause.subject, *clause.arguments)), None)
+
     def on_told(self, clause: Clause) -> None:
         assert clause.subject is not None
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         if any(s.type == "object" for s in who) and self._goes(clause):
+            self.scene.said.elliptic, self.scene.said.verb = "move", ""
             return self.wishes.to_target(
                 who, *self.wishes.whereto(framed(clause.arguments), each=True)
             )
@@ -84,21 +97,28 @@ class Commands:
 
     def _verb(self, clause: Clause, who: Sequence[Subject] | None) -> None:
         assert clause.verb is not None
+        if who is None:
+            clause, who = self._with_robot(clause)
+        verb = clause.verb
+        assert verb is not None
         self._clause = clause
         problems: list[NotUnderstood] = []
         frames = frames_of(
-            self.scene.tagger, clause.verb, clause.arguments, ("VERB", "FIN", "GER", "PART")
+            self.scene.tagger, verb, clause.arguments, ("VERB", "FIN", "GER", "PART")
         )
         if not frames:
             behind = [word.lexeme.last for word in clause.arguments if isinstance(word, Particle)]
-            end = min([*behind[:1], clause.verb.last + 1, clause.last])
-            said = self.scene.said.quote(clause.verb.first, end)
-            raise no_use(self.scene.tagger, clause.verb, said)
+            end = min([*behind[:1], verb.last + 1, clause.last])
+            said = self.scene.said.quote(verb.first, end)
+            raise no_use(self.scene.tagger, verb, said)
         for frame, phrases in frames:
             before = self.scene.said
             self.scene.said = before.copy()
             try:
                 frame = self._for_me(frame, phrases)
+                fetched = frame.verb in _FETCHED or len(frame.themes) > 1
+                wishes = "move" in frame.senses and not phrases and not fetched
+                frame = self.places.relations.attached(frame, wishes)
                 if phrases:
                     if phrases[0].phrase.type != "robot":
                         self._check_who(who)
@@ -114,6 +134,18 @@ class Commands:
                 if self.skilled.fits(frame, phrases):
                     break
         raise problems[0]
+
+    def _with_robot(self, clause: Clause) -> tuple[Clause, Sequence[Subject] | None]:
+        """The clause without "with the forklift", and who that is."""
+        for place in clause.arguments:
+            if not isinstance(place, Place) or place.role != "with" or place.nouns is None:
+                continue
+            robots = self.nouns.can_be(place.nouns, ("robot",))
+            if robots and not self.nouns.can_be(place.nouns, ("object",)):
+                rest = tuple(a for a in clause.arguments if a is not place)
+                who = self.nouns.subjects(place.nouns, ("robot",), "a robot")
+                return replace(clause, arguments=rest), who
+        return clause, None
 
     def _for_me(self, frame: Frame, skills: Sequence[SkillFrame]) -> Frame:
         """The frame without "for me" and "me", where that says no more than who asks."""
@@ -133,6 +165,8 @@ class Commands:
     def _sense(self, frame: Frame, who: Sequence[Subject] | None) -> None:
         senses = frame.senses
         self.scene.said.verb = frame.verb
+        if len(frame.themes) == 2:
+            self.scene.said.offer = self._clause
         if not senses & {"move", "go", "give"}:
             self.scene.said.again = self._clause
         self.scene.said.elliptic = "move" if senses & {"move", "go", "give"} else ""

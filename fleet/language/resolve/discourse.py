@@ -52,8 +52,12 @@ class Discourse:
     """Goals that ended with their sentence, for which a time or condition was said."""
     again: Any = None
     """The verb and arguments of the last clause: "and then the second one"."""
+    clauses: int = 0
+    """How many clauses of the sentence there were that ask for or say something."""
     remarks: list[str] = field(default_factory=list)
     """Clauses that ask for nothing."""
+    offer: Any = None
+    """The last clause that named who shall have what: "bring Anna a cup and Ben a mug"."""
     began: int = 0
     ended: int = 0
     facts: dict[FactKey, Value] = field(default_factory=dict)
@@ -61,6 +65,7 @@ class Discourse:
     always: list[Condition] = field(default_factory=list)
     never: list[Condition] = field(default_factory=list)
     when: list[Condition] = field(default_factory=list)
+    only_if: list[Condition] = field(default_factory=list)
     times: list[TimePhrase] = field(default_factory=list)
     urgent: int = 0
     time_words: str = ""
@@ -84,6 +89,7 @@ class Discourse:
             always=list(self.always),
             never=list(self.never),
             when=list(self.when),
+            only_if=list(self.only_if),
             times=list(self.times),
             chosen=dict(self.chosen),
             extra=list(self.extra),

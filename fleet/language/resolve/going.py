@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import listed, reason_for
+from fleet.language.refusals import listed
 from fleet.language.resolve.frames import Frame
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Subject
 from fleet.language.resolve.places import WHERE
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import Place
-from keyexpr_schema.facts import AT
+from keyexpr_schema.facts import AT, HELD
 
 
 class Going:
@@ -25,16 +25,23 @@ class Going:
 
     def go(self, frame: Frame, who: Sequence[Subject] | None) -> None:
         """`go to PLACE`; any robot goes if nobody is named."""
-        if frame.home or (frame.particle_words & {"back"} and not frame.places):
+        back = bool(frame.particle_words & {"back"}) and not frame.places
+        if back and frame.verb == "come" and self.scene.vocabulary.speaker is not None:
+            said = self.scene.said
+            in_hand = any(wish.relation == HELD for wish in said.draft.stages[-1])
+            if in_hand and said.ended < len(said.tokens) - 1:
+                return None  # "…, pick it up, come back and give it to me"
+            said.draft.next_stage()
+            here = Place("to", "", None, self.scene.said.began, self.scene.said.ended, "here")
+            return self.go(replace(frame, particles=(), places=(here,)), who)
+        if frame.home or back:
             raise NotUnderstood("a robot has no home: name the place where it shall go")
         if frame.verb in ("head for", "make for", "enter"):
             frame = self._headed_for(frame)
         if via := [p for p in frame.places if p.role == "via" and p.nouns is not None]:
             return self._by_way_of(frame, via, who)
         if other := [p for p in frame.places if p.role not in WHERE]:
-            shown = [(word, word) for word in other[0].preposition.split()]
-            text = self.scene.said.quote(other[0].first, other[0].last)
-            raise NotUnderstood(reason_for(shown) or f"{text!r} is not understood")
+            raise self.places.relations.unknown(other[0])
         where, _ = self.wishes.whereto(frame)
         if where.target is None or where.target_type == "robot":
             known = listed(self.scene.lexicon.known(("place",)))

@@ -10,6 +10,7 @@ from fleet.language.refusals import listed, nearest, one_of, suggestion
 from fleet.language.resolve.mentions import NounPhrase, Subject
 from fleet.language.resolve.pronouns import PERSONAL, Pronouns, either
 from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.salience import Salience
 from fleet.language.resolve.scene import Scene
 from fleet.language.tagging.lexicon import CATEGORIES, ENTITY_TYPES, Entity, EntityType
 from fleet.language.tree.nodes import (
@@ -19,6 +20,7 @@ from fleet.language.tree.nodes import (
 )
 from fleet.language.words.tokens import ORDINALS, Token, words_of
 
+_ALL_OF_IT = (Quantity.THE, Quantity.ALL, Quantity.BARE)
 _SINGULAR = ("ss", "us", "is")
 
 
@@ -29,6 +31,7 @@ class NounResolver:
         self.scene = scene
         self.who = who
         self.pronouns = Pronouns(scene)
+        self.salience = Salience(scene)
         self.located: Callable[[Noun, NounPhrase], NounPhrase] = lambda noun, made: made
 
     def subjects(self, nouns: Nouns, types: Sequence[EntityType], what: str) -> list[Subject]:
@@ -91,28 +94,14 @@ class NounResolver:
         if chosen is not None and set(chosen) <= set(made.names):
             several = Quantity.ALL if len(chosen) > 1 else made.quantity
             return replace(made.among(chosen), quantity=several, exact=True, source=None)
-        return self._salient(self._spoken_briefly(noun, made))
-
-    def _spoken_briefly(self, noun: Noun, made: NounPhrase) -> NounPhrase:
-        """Bare plurals of a sentence without articles are all of them: "lights off"."""
-        bare = made.plural and made.quantity is Quantity.BARE and made.count is None
-        if bare and self.scene.said.telegraphic and self.scene.mode == "":
-            return replace(made, quantity=Quantity.ALL)
-        return made
-
-    def _salient(self, made: NounPhrase) -> NounPhrase:
-        """Of several, the one that was spoken of: "the plate" after "plate 2"."""
-        if made.quantity is not Quantity.THE or made.plural or made.source is not None:
-            return made
-        if made.ordinal is not None or made.count is not None or len(made.names) < 2:
-            return made
-        named = {subjects for subjects in self.scene.said.named if set(subjects) & set(made.names)}
-        if any(len(subjects) > 1 for subjects in named):
-            return made
-        return made.among([name for (name,) in named]) if named else made
+        return self.salience.meant(made)
 
     def _described_by_words(self, noun: Noun, types: Sequence[EntityType], what: str) -> NounPhrase:
         text = self.scene.said.quote(noun.first, noun.last)
+        if noun.floor:  # it can be cleaned; what lies on it is in the place, and nowhere in it
+            if "place" not in types or {"robot", "object"} & set(types):
+                raise self.unknown(noun, types, what)
+            types = ("place",)
         made = NounPhrase((), text, noun.first, noun.quantity, count=noun.count)
         made = self._headed(noun, made, types, what)
         made = self._owned(noun, made)
@@ -163,6 +152,7 @@ class NounResolver:
         named = self._named(head, noun.head[0].text, types)
         if named and not noun.numbers:
             self._remember_kind(named[0])
+            self._remember_owner(named, head)
             return replace(made, found=named, exact=True)
         return self._described(noun, made, types, what)
 
@@ -184,11 +174,13 @@ class NounResolver:
         self, noun: Noun, made: NounPhrase, types: Sequence[EntityType], what: str
     ) -> NounPhrase:
         words = noun.head[0].words
+        collective = self.scene.tagger.book.collective
         tokens = _tokens(words)
         end, found = self.scene.lexicon.described(tokens, 0, types)
         # "The kitchen" is the place of that name, and no table that is called by it, too.
         named_end, named = self.scene.lexicon.exact(tokens, 0, ENTITY_TYPES)
         other = named and named_end == len(words) and all(e.type == "place" for e in named)
+        other = other and self.scene.lexicon.kind(tokens, 0, len(words), types) is None
         if end != len(words) or not found or (other and "place" not in types):
             raise self.unknown(noun, types, what)
         plural, generic = False, False
@@ -196,6 +188,7 @@ class NounResolver:
         if kind is not None and (of_kind := tuple(e for e in found if e in kind[1])):
             plural, found = kind[0], of_kind
             plural = plural or (words[-1].endswith("s") and not words[-1].endswith(_SINGULAR))
+            plural = plural or (words[-1] in collective and noun.quantity in _ALL_OF_IT)
             category = any(words[0] in (c, f"{c}s") for cs in CATEGORIES.values() for c in cs)
             generic = len(words) == 1 and len(found) == len(kind[1]) and category
         if noun.of:
@@ -204,6 +197,8 @@ class NounResolver:
         if noun.ordinals or noun.numbers or said_plainly:  # the first cup is no mug
             closest = tuple(e for e in found if self.scene.lexicon.is_kin(words, e))
             found = closest or found
+        if noun.form == "one":  # "the red one", of the kind that was spoken of
+            found = tuple(e for e in found if e in self.kind) or found
         self._remember_kind(found[0])
         if noun.form == "one":
             return replace(made, found=found, plural=noun.head[-1].spoken == "ones")
@@ -238,15 +233,8 @@ class NounResolver:
         narrowed = noun.relatives or noun.places or noun.but or noun.use
         if "EVERYTHING" not in tags or narrowed or noun.first in self.scene.said.chosen:
             return made
-        listed_ = self.listed()
+        listed_ = self.salience.listed()
         return replace(made.among(listed_), generic=False, exact=True) if listed_ else made
-
-    def listed(self) -> tuple[str, ...]:
-        """Things that the text has named, one after the other: "everything" may be those."""
-        names = {n for m in self.scene.said.mentioned if m.type == "object" for n in m.subjects}
-        things = tuple(n for n in self.scene.vocabulary.objects if n in names)
-        several = len(things) > 1 and not any(m.open for m in self.scene.said.mentioned)
-        return things if several else ()
 
     def _owned(self, noun: Noun, made: NounPhrase) -> NounPhrase:
         """Those of an owner: of "Anna's mug" only those; of "my mug" those, if there are any."""
@@ -260,6 +248,7 @@ class NounResolver:
             owner = self.scene.vocabulary.speaker
         elif noun.determiner in ("his", "her", "their"):
             owner = said.person
+            made = self._place_of(owner, made) if owner is not None else made
         things = self.scene.vocabulary.objects
         owned = [
             n for n in made.names if n in things and things[n].properties.get("owner") == owner
@@ -269,6 +258,17 @@ class NounResolver:
         if noun.whose is not None:
             raise NotUnderstood(f"{made.text!r}: nothing of that kind is known to be {owner}'s")
         return made
+
+    def _place_of(self, owner: str, made: NounPhrase) -> NounPhrase:
+        """`her office`, of a place that is called "Carla's office"."""
+        names = [words_of(self.scene.vocabulary.objects[owner].label), words_of(owner)]
+        called = [
+            e.stands_for
+            for e in made.found
+            if e.type == "place"
+            and any(name[: len(own) + 1] == (*own, "'s") for name in e.names for own in names)
+        ]
+        return made.among(called) if called else made
 
     def _useful(self, made: NounPhrase, verb: str) -> NounPhrase:
         known = {use for e in self.scene.lexicon.entities if e.type == "object" for use in e.uses}
@@ -343,6 +343,13 @@ class NounResolver:
     def _remember_kind(self, entity: Entity) -> None:
         if entity.type in ("object", "robot"):
             self.scene.said.kind_of = entity
+
+    def _remember_owner(self, named: Sequence[Entity], words: tuple[str, ...]) -> None:
+        """Of "Mr Jones's lunch", Mr Jones is whom "him" means."""
+        thing = self.scene.vocabulary.objects.get(named[0].id)
+        owner = thing.properties.get("owner") if thing is not None and "'s" in words else None
+        if len(named) == 1 and isinstance(owner, str):
+            self.scene.said.spoken_of((owner,))
 
     def unknown(self, noun: Noun, types: Sequence[EntityType], what: str) -> NotUnderstood:
         """The phrase names nothing known of these types."""

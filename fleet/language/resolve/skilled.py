@@ -66,7 +66,13 @@ class Skilled:
             raise NotUnderstood(
                 f"{self.scene.said.clause!r} ends where an object is missing; known are {known}"
             )
-        things = self.nouns.subjects(themes[0], ("object",), "an object")
+        able = {
+            o.object
+            for o in self.scene.vocabulary.objects.values()
+            if any(p.fits(o) for p in phrases)
+        }
+        it = self.nouns.pronouns.that_can(themes[0].items[0], able)
+        things = [it] if it else self.nouns.subjects(themes[0], ("object",), "an object")
         where = None
         places = tuple(
             replace(p, role="in") if p.special in ("there", "here") and not p.preposition else p
@@ -81,11 +87,6 @@ class Skilled:
             raise NotUnderstood(
                 f"{sorted(frame.particle_words)[0]!r} is not understood after {frame.verb!r}"
             )
-        able = {
-            o.object
-            for o in self.scene.vocabulary.objects.values()
-            if any(p.fits(o) for p in phrases)
-        }
         carrier = self.scene.said.carrier
         things = [
             Mention((carrier,), "object", thing.key)

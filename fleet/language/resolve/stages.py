@@ -35,6 +35,8 @@ class Wish:
     means: bool = False
     whereto: bool = False
     by: tuple[str, ...] | None = ()
+    shared: bool = False
+    """Whether what fulfils it may fulfil another one, too: pairs of "two of the three"."""
 
     def condition(self) -> Condition:
         """The condition that makes it true."""
@@ -57,15 +59,43 @@ class GoalDraft:
     stages: list[list[Wish]] = field(default_factory=lambda: [[]])
     by: tuple[str, ...] = ()
     """The robots that are told to do what is wished for now."""
+    held: list[list[Wish]] = field(default_factory=list)
+    """Stages that come after what is wished for now, though they were said before."""
 
     @property
     def empty(self) -> bool:
         """Whether the stage that is being filled has nothing yet."""
         return not self.stages[-1]
 
+    @property
+    def last(self) -> Wish | None:
+        """What was wished for last."""
+        return next((stage[-1] for stage in reversed(self.stages) if stage), None)
+
+    def sent_to(self) -> str | None:
+        """Where somebody was sent last, if nothing has been taken anywhere else since."""
+        for wish in (wish for stage in reversed(self.stages) for wish in reversed(stage)):
+            if wish.means:
+                return str(wish.value)
+            if wish.relation in PLACED:
+                return None
+        return None
+
     def copy(self) -> GoalDraft:
         """The same, to go on from."""
-        return GoalDraft(self.is_at, [list(stage) for stage in self.stages], self.by)
+        held = [list(stage) for stage in self.held]
+        return GoalDraft(self.is_at, [list(stage) for stage in self.stages], self.by, held)
+
+    def hold(self) -> None:
+        """What comes now is wanted before what was said last."""
+        self.held, self.stages = [*self.stages[-1:]], [*self.stages[:-1], []]
+
+    def release(self) -> None:
+        """What comes now is wanted after what was held."""
+        if self.held:
+            self.next_stage()
+            self.stages[-1:] = [*filter(None, self.stages[-1:]), *self.held]
+            self.held = []
 
     def next_stage(self) -> None:
         """What comes now is wanted after all that came."""
@@ -106,6 +136,7 @@ class GoalDraft:
                 means,
                 whereto,
                 None if mention.type == "robot" else self.by,
+                mention.least > 1,
             )
             for number, subjects in enumerate(each)
         )
@@ -225,7 +256,10 @@ def _sequenced(stage: Sequence[Wish]) -> list[list[Wish]]:
     split: list[list[Wish]] = [[]]
     for wish in stage:
         last = split[-1][-1] if split[-1] else None
-        if last is not None and last.means and not wish.means:
+        sent = last is not None and last.relation == AT and last.by is None
+        if last is not None and sent and wish.by and set(last.subjects) <= set(wish.by):
+            split.append([])  # "Rosie, go to the kitchen and fetch …"
+        elif last is not None and last.means and not wish.means:
             if wish.relation == SEARCHED and wish.subjects == (last.value,):
                 split[-1].pop()
             else:
@@ -304,7 +338,7 @@ def _check_open(kept: Sequence[Wish], fixed: dict[tuple[str, str], Wish]) -> Non
 
     Wishes are matched with subjects by augmenting paths (Kuhn 1955).
     """
-    at = [wish for wish in kept if wish.open and wish.relation in PLACED]
+    at = [wish for wish in kept if wish.open and wish.relation in PLACED and not wish.shared]
     for wish in at:
         for other in at:
             if wish.key == other.key and wish.value != other.value:

@@ -17,7 +17,16 @@ from fleet.language.tree.nodes import (
     Relative,
 )
 
-COSTS = {"bare": 2, "whereto": 2, "named": 6, "told": 1, "being": 0, "item": 5, "unknown": 8}
+COSTS = {
+    "bare": 2,
+    "whereto": 2,
+    "named": 6,
+    "told": 1,
+    "being": 0,
+    "item": 5,
+    "unknown": 8,
+    "paired": 3,
+}
 """How far from plain speech a derivation is: the plainest ones that mean something are meant."""
 _THINGS: frozenset[EntityType] = frozenset({"object", "robot"})
 SPOTS: frozenset[EntityType] = frozenset({"place", "surface", "robot"})
@@ -144,6 +153,16 @@ class NounBuilder:
         quantity = Quantity.THE if made.quantity is Quantity.BARE else made.quantity
         return replace(made, whose=children[0], quantity=quantity)
 
+    def make_floor(self, children: tuple[Any, ...], start: int, end: int) -> Any:
+        words = [child for child in children if isinstance(child, Lexeme)]
+        if any("PREP" in w.tags and w.words not in (("in",), ("of",)) for w in words):
+            return None
+        found = determined(tuple(child for child in children if isinstance(child, _Pre)))
+        nouns = [w for w in words if "NOUN" in w.tags and "FLOOR" not in w.tags]
+        if found is None or not nouns:
+            return None
+        return self._placed_at(replace(found, head=(nouns[-1],), floor=True), start, end)
+
     def make_whatever(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         places = tuple(child for child in children if isinstance(child, Place))
         if any(place.role == "to" or place.special for place in places):
@@ -249,6 +268,8 @@ class NounBuilder:
             return frozenset({"robot", "surface", "object"})
         if noun.form == "whatever":
             return frozenset({"object"})
+        if noun.floor:
+            return frozenset(e.type for e in self.entities(noun) if e.type == "place")
         if noun.form == "general":
             return frozenset({"robot"} if "EVERYONE" in noun.head[0].tags else {"object"})
         if noun.form != "noun" or any("UNK" in word.tags for word in noun.head):

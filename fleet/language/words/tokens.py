@@ -68,7 +68,9 @@ def tokens_of(text: str) -> tuple[Token, ...]:
     Underscores and hyphens inside words separate words, quotes are left out, colons and dashes
     count as commas, and contractions are written out: "don't" is "do not", "where's" "where 's".
     """
-    same_length = _BETWEEN_WORDS.sub(" ", text.replace("\u2019", "'").replace("…", "."))
+    same_length = _BETWEEN_WORDS.sub(
+        " ", text.replace("\u2019", "'").replace("…", ",").replace("...", ",  ")
+    )
     found: list[Token] = []
     for match in _PART.finditer(same_length):
         for spoken in _written_out(match[0].casefold()):

@@ -75,7 +75,12 @@ def problem_text(world: WorldModel, goals: Iterable[Goal], keep: Iterable[Condit
         if not (variable.relation == AT and variable.subject in world.robots)
     ]
     wanted = [
-        {"goal": goal.goal, "text": goal.text, "conditions": [str(c) for c in goal.conditions]}
+        {
+            "goal": goal.goal,
+            "text": goal.text,
+            "conditions": [str(c) for c in goal.conditions],
+            **({"only_by": list(goal.by)} if goal.by else {}),
+        }
         for goal in goals
     ]
     return fenced(
@@ -121,6 +126,7 @@ def frames_text(vocabulary: Vocabulary) -> str:
         f"- {'; '.join((phrase.verb, *phrase.says))} ({phrase.type})"
         for phrase in vocabulary.skill_phrases
     ]
+    rows += [f"- {'; '.join(task.says)}: a task of its own" for task in vocabulary.tasks]
     words = dict.fromkeys(each.word for each in vocabulary.state_words)
     rows += [f"- something should be: {', '.join(words)}"] if words else []
     return "\n".join(rows) or "- nothing"

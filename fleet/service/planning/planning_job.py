@@ -17,6 +17,7 @@ from fleet.core.events import GoalInterpreted, PlanningFailed, PlanningSucceeded
 from fleet.core.model.world import WorldModel
 from fleet.core.planning_input import InterpretationInput, PlanningInput
 from fleet.jobshop.time_budget import Clock, TimeBudget
+from fleet.language.methods.entry import entry_of
 from fleet.planners.base import NoPlan, Planner, PlanningProblem
 from fleet.planners.contradictions import contradictions, reasons_of
 from fleet.planners.mission_bound import mission_bound_s
@@ -74,13 +75,17 @@ def run_planning_job(
 
 def run_interpretation(given: InterpretationInput, composition: Composition) -> GoalInterpreted:
     """Have a language model say a goal's sentence in other words, at the time of the input."""
-    said = composition.paraphraser.paraphrase(given.text, given.refusal, given.vocabulary)
+    said = composition.paraphraser.paraphrase(
+        given.text, given.refusal, given.vocabulary(), given.now, world=given.world()
+    )
+    task = None if isinstance(said, str) else said.task
     return GoalInterpreted(
         time_s=given.time_s,
         wall_time_s=given.wall_time_s,
         goal=given.goal,
         text=given.text,
         paraphrase=None if isinstance(said, str) else said.text,
+        teaches=None if task is None else entry_of(task),
         reason=said if isinstance(said, str) else None,
     )
 
@@ -308,6 +313,7 @@ class _Run:
             sometime_before=_both(
                 plan.sometime_before, (row for g in goals for row in g.sometime_before)
             ),
+            by={**plan.by, **{g.goal: g.by for g in goals if g.by}},
         )
 
 

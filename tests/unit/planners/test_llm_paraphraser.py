@@ -57,6 +57,7 @@ def test_a_sentence_is_said_in_others_that_the_grammar_reads(model_client: Model
     assert "- wipe; give {cup} a wipe (cup)" in prompt
     assert server.requests[0]["response_format"]["json_schema"]["schema"]["required"] == [
         "sentences",
+        "task",
         "reason",
     ]
 

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -25,9 +26,11 @@ def robotctl(router: RouterProcess, tmp_path: Path) -> Robotctl:
 
 
 @asynccontextmanager
-async def fleet(router: RouterProcess, folder: Path, *said: str) -> AsyncIterator[LlmServer]:
+async def fleet(
+    router: RouterProcess, folder: Path, *said: str, task: dict[str, Any] | None = None
+) -> AsyncIterator[LlmServer]:
     """A planner with a language model that says these sentences, whatever it is asked."""
-    with LlmServer(Reply({"sentences": list(said), "reason": ""})) as server:
+    with LlmServer(Reply({"sentences": list(said), "task": task, "reason": ""})) as server:
         path = folder / "llm.yaml"
         path.write_text(f"llm: {{model: openai/scripted, api_base: {server.api_base}}}\n")
         async with (
@@ -98,3 +101,37 @@ async def test_labels_that_give_orders_lead_to_nothing_but_a_question(
     assert "cup_1" in candidate
     assert "cup_2" in candidate
     assert server.prompt(0).count("</data>") == 2  # the system's own words, and one fence
+
+
+async def test_what_a_model_proposes_as_a_task_is_kept_by_whoever_wants_it(
+    router: RouterProcess, robotctl: Robotctl, tmp_path: Path
+) -> None:
+    task = {
+        "name": "make_tea",
+        "says": ["make tea for {where: place}"],
+        "do": [["bring cup 1 to {where}"]],
+    }
+    async with fleet(router, tmp_path, PLAIN, task=task):
+        await robotctl.soon("goal", "add", "Make tea for the hallway", "--id", "g")
+        page = (await robotctl.soon("goal", "show", "g")).out
+        early = await robotctl.soon("task", "keep", "g", "mine.yaml")
+        await robotctl.soon("goal", "answer", "g", "yes")
+        kept = await robotctl.soon("task", "keep", "g", "mine.yaml")
+        twice = await robotctl.soon("task", "keep", "g", "mine.yaml")
+        await robotctl.soon("goal", "add", PLAIN, "--id", "h")
+        none = await robotctl.soon("task", "keep", "h", "mine.yaml")
+    assert "make tea for {where: place}" in page
+    assert early.code == 1
+    assert "robotctl goal answer g yes" in early.err
+    assert kept.code == 0, kept.err
+    assert "make_tea" in kept.out
+    assert "there is a task make_tea already" in twice.err
+    assert "no language model has proposed a task for goal h" in none.err
+    mine = str(tmp_path / "mine.yaml")
+    async with (
+        person(router.endpoint, cups=2),
+        planner(router.endpoint, tmp_path / "planner", "--tasks", mine),
+    ):
+        said = await robotctl.soon("task", "explain", "make tea for the living room")
+    assert said.code == 0, said.err
+    assert "at(cup_1) = living_room" in said.out

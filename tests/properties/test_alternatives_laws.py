@@ -144,12 +144,12 @@ def worlds(draw: st.DrawFn) -> tuple[WorldModel, Trajectory]:
             never=(Condition(relation=UP, subject=TOKENS[0], any_of=TOKENS[:2], value=True),)
         ),
     }
-    way = constraints.get(draw(st.integers(0, 8)), Trajectory())
+    way = constraints.get(draw(st.integers(0, 4)), Trajectory())
     return WorldModel.of(skills, PLACES, objects, (robot,), facts), way
 
 
 @reaches("found", "impossible", "with constraints", "impossible only by constraints")
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(worlds())
 def test_there_is_a_sequence_where_a_search_of_all_states_finds_one(
     reached: Reached, drawn: tuple[WorldModel, Trajectory]

@@ -252,6 +252,34 @@ def test_numbers_are_counted() -> None:
     assert "fill" not in skills(planned(filled, condition("watered", "plant", True)))
 
 
+@pytest.mark.parametrize(("wanted", "times"), [(2, 2), (5, 5), (-1, None)])
+def test_a_number_is_counted_to(wanted: int, times: int | None) -> None:
+    drip = {
+        "parameters": {"robot": "robot", "jug": "jug"},
+        "before": ["holding(robot) = jug"],
+        "after": ["level(jug) += 1"],
+        "duration_s": 5,
+    }
+    own = {**SKILLS, **skills_from_data({"skills": {"drip": drip}}, "own.yaml")}
+    world = WorldModel.of(
+        own,
+        PLACES,
+        (thing("jug", "jug"),),
+        (able(manipulator("hsr"), "drip"),),
+        (
+            Fact(subject="jug", relation="level", value=0, source="test"),
+            fact("jug", "at", "kitchen"),
+            fact("hsr", "holding", "nothing"),
+        ),
+    )
+    found = made(world, condition("level", "jug", wanted))
+    assert isinstance(found, CheckedPlan) is (times is not None)
+    if isinstance(found, CheckedPlan):
+        assert skills(found.plan).count("drip") == times
+    else:
+        assert not found.postponed, "it only ever becomes more"
+
+
 def test_a_robot_that_cannot_drive_acts_where_it_stands() -> None:
     fixed = msgspec.structs.replace(
         manipulator(),

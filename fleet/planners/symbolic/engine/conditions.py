@@ -12,7 +12,7 @@ from functools import cached_property
 
 from fleet.core.model import derived
 from fleet.core.model.formulas.evaluation import conjuncts, evaluate
-from fleet.core.model.formulas.nodes import Formula, Holds, Not, Or
+from fleet.core.model.formulas.nodes import Formula, Holds, Not, Or, Stored
 from fleet.planners.symbolic.engine.alternatives import quorums
 from fleet.planners.symbolic.engine.nodes import Axiom, Nodes, Opaque, Ride, Stands
 from fleet.planners.symbolic.engine.readings import (
@@ -50,6 +50,10 @@ class Conditions:
             return self._readings[literal]
         if not is_read_off(literal, self.world):
             v = self.nodes.number.get(literal.variable)
+            if v is not None and literal.variable in self.nodes.counted:
+                if literal not in self._readings:
+                    self._readings[literal] = self._only_evaluated(Stored(literal), aboard=False)
+                return self._readings[literal]
             if v is not None:
                 return self.nodes.fact(v, literal.value)
             return derived.holds(literal, self.nodes.known, self.world, aboard=aboard)

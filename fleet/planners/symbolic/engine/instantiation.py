@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator, Sequence
 from functools import cache
 
 from fleet.core.model import derived
+from fleet.core.model.formulas.evaluation import is_number
 from fleet.core.model.parameter_types import OBJECT, PLACE, ROBOT, parse_type
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel, known_value
@@ -69,9 +70,10 @@ class Instantiation:
         binding: Binding = {}
         wanted: list[tuple[Value, Value]] = [(row.variable.subject, literal.variable.subject)]
         if literal.value != ANY:
-            if row.adds:
+            if not row.adds:
+                wanted.append((row.value, literal.value))
+            elif not self._may_come_to(row, literal):
                 return None
-            wanted.append((row.value, literal.value))
         for term, value in wanted:
             kind = row.kind_of(term)
             if kind is None:
@@ -83,6 +85,17 @@ class Instantiation:
             if binding.setdefault(str(term), value) != value:
                 return None
         return {name: value for name, value in binding.items() if name in row.skill.parameters}
+
+    def _may_come_to(self, row: Row, literal: Literal) -> bool:
+        """Whether adding to a number may lead to one, from what it is now or is set to."""
+        aim = _as_number(literal.value)
+        sets = (other.value for other in self.writers[row.relation] if not other.adds)
+        known = [_as_number(value) for value in (self.known(literal.variable), *sets)]
+        numbers = [value for value in known if value is not None]
+        if aim is None or not numbers:
+            return False
+        larger, smaller = row.goes
+        return (larger and min(numbers) < aim) or (smaller and max(numbers) > aim)
 
     def completed(
         self, skill: SkillModel, binding: Binding, literal: Literal | None
@@ -253,6 +266,10 @@ class Instantiation:
             if before is None or before.value != value:
                 return False
         return True
+
+
+def _as_number(value: Value) -> float | None:
+    return float(value) if isinstance(value, int | float) and is_number(value) else None
 
 
 class _MayChange(Exception):

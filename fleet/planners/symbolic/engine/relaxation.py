@@ -251,11 +251,15 @@ def least_dear(
     undecided: Mapping[Quorum, Quorum], task: FiniteDomainTask
 ) -> dict[Quorum, tuple[Formula, ...]]:
     """Of what is missing of alternatives those that take least, and a few more."""
+    nodes = {
+        row: [task.conditions.formula(part) for part in conjuncts(row)]
+        for missing in undecided.values()
+        for row in missing.of
+    }
     costs_s = Relaxation(task, additive=True).costs_s(task.initial)
 
     def cost_s(row: Formula) -> float:
-        nodes = map(task.conditions.formula, conjuncts(row))
-        return sum(0.0 if node is True else costs_s.get(node, inf) for node in nodes)
+        return sum(0.0 if node is True else costs_s.get(node, inf) for node in nodes[row])
 
     return {
         quorum: tuple(sorted(missing.of, key=cost_s)[: missing.least + SPARE])

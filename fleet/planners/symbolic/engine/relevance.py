@@ -7,7 +7,17 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from fleet.core.model.derived import READ_OFF
-from fleet.core.model.formulas.nodes import TRUE, Exists, Formula, grounded, relations_of
+from fleet.core.model.formulas.evaluation import is_number
+from fleet.core.model.formulas.nodes import (
+    TRUE,
+    Constant,
+    Exists,
+    Formula,
+    Sum,
+    Term,
+    grounded,
+    relations_of,
+)
 from fleet.core.model.parameter_types import OBJECT
 from fleet.core.model.skills import SkillModel
 from fleet.core.model.world import WorldModel
@@ -34,8 +44,8 @@ class Row:
     variable: FactKey
     value: Value
     each: tuple[tuple[str, str], ...] = ()
-    adds: bool = False
-    """It changes a number, nobody knows to what."""
+    more: Term | None = None
+    """What it adds to a number."""
     when: Formula = TRUE
     """What it depends on."""
 
@@ -54,6 +64,21 @@ class Row:
             and all(before.variable.subject == skill.actor_parameter for before in skill.before)
             and len(skill.robot_parameters) == 1
         )
+
+    @property
+    def adds(self) -> bool:
+        """Whether it changes a number, nobody knows to what."""
+        return self.more is not None
+
+    @property
+    def goes(self) -> tuple[bool, bool]:
+        """Whether what it adds to a number may make it larger, and smaller."""
+        match self.more:
+            case Constant(value) | Sum((Constant(value),), ()) if is_number(value):
+                return float(str(value)) > 0, float(str(value)) < 0
+            case Sum((), (Constant(value),)) if is_number(value):
+                return float(str(value)) < 0, float(str(value)) > 0
+        return True, True
 
     def depends_on(self, literal: Literal, args: Mapping[str, str]) -> Formula:
         """What must hold for it to make a literal true, if the skill has these arguments: for the
@@ -85,7 +110,7 @@ def rows_of(skill: SkillModel) -> Iterator[Row]:
         yield Row(skill, _stored(variable, value, skill), value)
     for effect in skill.conditional:
         variable = _stored(effect.variable, effect.value, skill)
-        yield Row(skill, variable, effect.value, effect.each, effect.add is not None, effect.when)
+        yield Row(skill, variable, effect.value, effect.each, effect.add, effect.when)
 
 
 def _stored(variable: FactKey, value: Value, skill: SkillModel) -> FactKey:

@@ -237,14 +237,14 @@ class Wanted:
         """Want those alternatives that were chosen, or all that it may take."""
         rows = [row for row in quorum.of if not self._holds_or_is_wanted(row)]
         least = quorum.least - (len(quorum.of) - len(rows))
-        self.leaves_out |= least < len(rows)
-        if least <= 0:
-            return
-        if quorum in self._chosen:
-            rows = [row for row in rows if row in self._chosen[quorum]]
-        else:
+        chosen: Collection[Formula] = ()
+        if least > 0 and quorum in self._chosen:
+            chosen = self._chosen[quorum]
+        elif least > 0:
             self.undecided[quorum] = Quorum(tuple(rows), least)
-        for row in rows:
+            chosen = rows
+        self.leaves_out |= any(row not in chosen for row in rows)
+        for row in chosen:
             self.want_formula(row)
 
     def _holds_or_is_wanted(self, row: Formula) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import reason_for
-from fleet.language.resolve.frames import Frame, framed, frames_of, no_use
+from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of, no_use
 from fleet.language.resolve.going import Going
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.looking import ROBOTS_TELL, Looking
@@ -66,10 +66,20 @@ class Commands:
         self._verb(replace(before, arguments=(clause.subject, *rest)), None)
         return True
 
+    def on_paired(self, clause: Clause) -> None:
+        """`and Ben a mug`, after `bring Anna a cup`."""
+        offer = self.scene.said.offer
+        if offer is None or clause.subject is None:
+            first = clause.subject.items if clause.subject is not None else ()
+            text = self.scene.said.quote(first[0].first, first[-1].last) if first else ""
+            raise NotUnderstood(f"{text!r} is not understood as a goal: {EXAMPLE}")
+        self._verb(replace(offer, arguments=(clause.subject, *clause.arguments)), None)
+
     def on_told(self, clause: Clause) -> None:
         assert clause.subject is not None
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         if any(s.type == "object" for s in who) and self._goes(clause):
+            self.scene.said.elliptic, self.scene.said.verb = "move", ""
             return self.wishes.to_target(
                 who, *self.wishes.whereto(framed(clause.arguments), each=True)
             )
@@ -155,6 +165,8 @@ class Commands:
     def _sense(self, frame: Frame, who: Sequence[Subject] | None) -> None:
         senses = frame.senses
         self.scene.said.verb = frame.verb
+        if len(frame.themes) == 2:
+            self.scene.said.offer = self._clause
         if not senses & {"move", "go", "give"}:
             self.scene.said.again = self._clause
         self.scene.said.elliptic = "move" if senses & {"move", "go", "give"} else ""

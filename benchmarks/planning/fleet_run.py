@@ -29,6 +29,7 @@ from fleet.core.step import step
 from fleet.language import Confirm
 from fleet.service.composition import Composition
 from fleet.service.planning.planning_job import run_interpretation, run_planning_job
+from fleet.service.task_files import load_all_tasks
 from keyexpr_schema.facts import AT, ON
 from keyexpr_schema.keyspace import FACT, OBJECT, ORDER, PLACE, ROBOT_SPEC, ROBOT_STATE
 from keyexpr_schema.payloads.goals import GoalStatus
@@ -256,6 +257,7 @@ class FleetRun:
             interpreter=self._composition.language_model.configured,
             confirm=Confirm.NEVER,
             skill_phrases=phrases_of(self.mission.skills),
+            tasks=load_all_tasks(),
         )
         self._handle(
             events.PlannerStarted,

@@ -40,7 +40,7 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     longer (wall time, s) counts as lost. `planning_limit_s`: a plan has to be made within that many
     seconds. `skill_phrases` are skills that goals can ask for by name, and
     `state_words` words for states, `tasks` what people call by names of its own, `words` what a
-    user adds to the words of the language.
+    user adds to the words of the language, `relations` what skills bring about between two things.
     """
 
     approval: bool = False
@@ -53,6 +53,7 @@ class Policy(msgspec.Struct, frozen=True, kw_only=True):
     state_words: tuple[StateWord, ...] = ()
     tasks: tuple[CompoundTask, ...] = ()
     words: tuple[OwnWords, ...] = ()
+    relations: tuple[str, ...] = ()
 
 
 class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -136,6 +137,7 @@ class State(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
             believed=FactValues(self.facts),
             state_words=self.policy.state_words,
             tasks=self.policy.tasks,
+            relations=self.policy.relations,
             language=wordbook_of(self.policy.words),
         )
 

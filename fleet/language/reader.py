@@ -109,7 +109,7 @@ class Reader:
             for state in states:
                 said = state.said
                 said.elliptic, said.addressees, said.done, said.again = "", [], False, None
-                said.telegraphic = sentence.telegraphic
+                said.telegraphic, said.clauses, said.offer = sentence.telegraphic, 0, None
                 said.urgent = said.urgent or sentence.urgent
                 said.times, said.time_words = list(sentence.times), sentence.time_words
             dangling = sentence.dangling
@@ -146,8 +146,13 @@ class Reader:
             if segment.joint == "then":
                 for state in states:
                     state.said.draft.next_stage()
+            if segment.joint == "sooner":
+                for state in states:
+                    state.said.draft.hold()
             try:
                 states = self._segment(segment, states)
+                for state in states:
+                    state.said.draft.release()
             except NotUnderstood as problem:
                 left = sentence.segments[number:]
                 raise self.why.rather(problem, left, self.later) from None

@@ -21,9 +21,9 @@ _CONDITIONS = {"IF": "if", "WHEN": "when", "UNLESS": "unless"}
 class Segment:
     """Words that are parsed together.
 
-    `joint` is what stands before them: "", "and" or "then". `role`: `if`, `when` or `unless`
-    for a condition, else "". `dangling`: an "and" or "then" that nothing follows stands behind
-    them.
+    `joint` is what stands before them: "", "and", "then", or "sooner" ("but first"). `role`: `if`,
+    `when` or `unless` for a condition, else "". `dangling`: an "and" or "then" that nothing follows
+    stands behind them.
     """
 
     words: tuple[Lexeme, ...]
@@ -108,7 +108,7 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
             urgent = urgent or -1
         elif "POLITE" not in word.tags or word.tags & {"NOUN"}:
             kept.append(word)
-    kept = _asked(_thought(_without_fillers(kept)))
+    kept = _asked(_if_so(_thought(_without_fillers(kept))))
     while kept and (kept[0].words == ("but",) or "COMMA" in kept[0].tags):
         kept.pop(0)  # "no rush, but …"
     segments: list[Segment] = []
@@ -119,9 +119,9 @@ def cut(words: Sequence[Lexeme]) -> Sentence:
         joint, begun = "", list[Lexeme]()
         for i, word in enumerate(part):
             rest = part[i + 1 :]
-            if "THEN" in word.tags and "NOUN" not in word.tags:
+            if word.tags & {"THEN", "SOONER"} and "NOUN" not in word.tags:
                 segments += _segment(begun, joint, role)
-                joint, begun = "then", []
+                joint, begun = "then" if "THEN" in word.tags else "sooner", []
             elif (word.tags & {"AND", "COMMA"} and _clausal(begun) and _opens(rest, begun)) or (
                 "COMMA" in word.tags and begun and _about_it(rest)
             ):
@@ -165,6 +165,18 @@ def _without_fillers(words: Sequence[Lexeme]) -> list[Lexeme]:
             continue
         kept.append(word)
     return kept
+
+
+def _if_so(words: list[Lexeme]) -> list[Lexeme]:
+    """`check whether it is on, and if so turn it off` as `if it is on, turn it off`."""
+    at = next((i for i, word in enumerate(words) if "IFSO" in word.tags), None)
+    asks = len(words) > 2 and "ASK" in words[0].tags and words[1].tags & {"IF", "WHETHER"}
+    if at is None or not asks or not words[at + 1 :]:
+        return words
+    inner = [w for w in words[2:at] if "COMMA" not in w.tags]
+    inner = inner[:-1] if inner and "AND" in inner[-1].tags else inner
+    comma = replace(words[at], tags=frozenset({"COMMA"}))
+    return [replace(words[1], tags=frozenset({"IF"})), *inner, comma, *_commas(words[at + 1 :])]
 
 
 def _thought(words: list[Lexeme]) -> list[Lexeme]:
@@ -257,7 +269,7 @@ def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
     """With "A before B" and "after B, A" as "A then B", where a clause follows those words."""
     for i, word in enumerate(words):
         if word.words == ("but",) and (sooner := _sooner(words[i + 1 :])):
-            return [*sooner, replace(word, tags=frozenset({"THEN"})), *_commas(words[:i])]
+            return [*_commas(words[:i]), replace(word, tags=frozenset({"SOONER"})), *sooner]
         tag = next((tag for tag in ("BEFORE", "AFTER", "WHEN") if tag in word.tags), None)
         rest = list(words[i + 1 :])
         if tag is None or not rest or not _happens(rest, by_you=tag == "WHEN"):
@@ -265,7 +277,8 @@ def _ordered(words: Sequence[Lexeme]) -> list[Lexeme]:
         then = replace(word, tags=frozenset({"THEN"}))
         if i:
             first, rest = _commas(words[:i]), _deed(rest)
-            return [*first, then, *rest] if tag == "BEFORE" else [*rest, then, *first]
+            earlier = replace(word, tags=frozenset({"SOONER"}))
+            return [*first, then if tag == "BEFORE" else earlier, *rest]
         ends = [j for j, w in enumerate(rest) if "COMMA" in w.tags]
         verbs = [
             j

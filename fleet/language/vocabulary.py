@@ -15,7 +15,7 @@ from fleet.language.methods.model import OBJECT, PERSON, PLACE, ROBOT, CompoundT
 from fleet.language.words.wordbook import Wordbook, shipped_language
 from keyexpr_schema.facts import AT, IN, ON, FactKey, Value
 from keyexpr_schema.payloads.robots import RobotSpec
-from keyexpr_schema.payloads.world import Feature, Object, Place
+from keyexpr_schema.payloads.world import Feature, Object, Place, Surface
 
 _CARRYING = (Feature.SUPPORTS, Feature.CONTAINS, Feature.PERSON)
 
@@ -91,6 +91,8 @@ class Vocabulary:
     state_words: tuple[StateWord, ...] = ()
     tasks: tuple[CompoundTask, ...] = ()
     """What people call by names of its own: "set the table"."""
+    relations: tuple[str, ...] = ()
+    """What skills bring about between two things: `next_to`."""
 
     @property
     def wordbook(self) -> Wordbook:
@@ -111,6 +113,11 @@ class Vocabulary:
     def good_for(self) -> Mapping[str, frozenset[Feature]]:
         """What has others on it or in it, or is a person, by id: by itself, or by its parts."""
         return _abilities(self.objects).good_for
+
+    @cached_property
+    def surfaces(self) -> Mapping[str, Surface]:
+        """Where furniture stands on the floor plan, as far as places say it."""
+        return {s.surface: s for place in self.places.values() for s in place.surfaces}
 
     @cached_property
     def movable(self) -> frozenset[str]:

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from fleet.core import answering, events
 from fleet.core.effects import DropJob, Effect, Interpret, MakePlan, Publish, Retract, effects_of
 from fleet.core.events import At, Event
-from fleet.core.model.skills import Skills, phrases_of, state_words_of
+from fleet.core.model.skills import Skills, phrases_of, relations_of_skills, state_words_of
 from fleet.core.named_tasks import tasks_known
 from fleet.core.state import LOGIC, Policy, State
 from fleet.errors import FleetError, Superseded
@@ -83,7 +83,10 @@ class PlannerService:
         self._pool = pool
         self._skills = dict(skills)
         self._policy = replace(
-            policy, skill_phrases=phrases_of(skills), state_words=state_words_of(skills)
+            policy,
+            skill_phrases=phrases_of(skills),
+            state_words=state_words_of(skills),
+            relations=relations_of_skills(skills),
         )
         self._incarnation = uuid.uuid4().hex[:12]
         self._charge = Charge(

@@ -17,6 +17,8 @@ def entry_of(task: CompoundTask) -> str:
     if task.defaults:
         given = ", ".join(f"{name}: {_text(value)}" for name, value in task.defaults.items())
         lines.append(f"    defaults: {{{given}}}")
+    if task.yields:
+        lines.append("    yields: true")
     if len(task.methods) == 1:
         lines += _method(task.methods[0], "    ", "    ")
     else:

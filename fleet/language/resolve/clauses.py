@@ -73,6 +73,7 @@ class Clauses:
             raise NotUnderstood(f"{said.clause!r} is not understood as a fact: {SAY_IT}")
         self._by_kind[clause.kind](clause)
         self.scene.said.done |= clause.kind not in _STATES
+        self.scene.said.clauses += clause.kind != "remarked"
         said = self.scene.said
         for mention, wants in said.extra:
             if self.scene.mode == "fact" or clause.kind not in _COMMANDS:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fleet.errors import NotUnderstood
 from fleet.language.refusals import reason_for
-from fleet.language.resolve.frames import Frame, framed, frames_of, no_use
+from fleet.language.resolve.frames import EXAMPLE, Frame, framed, frames_of, no_use
 from fleet.language.resolve.going import Going
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.looking import ROBOTS_TELL, Looking
@@ -22,6 +22,9 @@ from fleet.language.tagging.skill_words import SkillFrame
 from fleet.language.tree.nodes import Clause, Nouns, Particle, Place, Quantity
 from keyexpr_schema.facts import AT, HELD, LOCATED
 from keyexpr_schema.payloads.goals import Condition
+
+_FETCHED = frozenset({"get", "fetch", "retrieve"})
+"""After these, "next to the lamp" says which one, not where it shall be."""
 
 
 class Commands:
@@ -63,10 +66,20 @@ class Commands:
         self._verb(replace(before, arguments=(clause.subject, *rest)), None)
         return True
 
+    def on_paired(self, clause: Clause) -> None:
+        """`and Ben a mug`, after `bring Anna a cup`."""
+        offer = self.scene.said.offer
+        if offer is None or clause.subject is None:
+            first = clause.subject.items if clause.subject is not None else ()
+            text = self.scene.said.quote(first[0].first, first[-1].last) if first else ""
+            raise NotUnderstood(f"{text!r} is not understood as a goal: {EXAMPLE}")
+        self._verb(replace(offer, arguments=(clause.subject, *clause.arguments)), None)
+
     def on_told(self, clause: Clause) -> None:
         assert clause.subject is not None
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
         if any(s.type == "object" for s in who) and self._goes(clause):
+            self.scene.said.elliptic, self.scene.said.verb = "move", ""
             return self.wishes.to_target(
                 who, *self.wishes.whereto(framed(clause.arguments), each=True)
             )
@@ -103,6 +116,9 @@ class Commands:
             self.scene.said = before.copy()
             try:
                 frame = self._for_me(frame, phrases)
+                fetched = frame.verb in _FETCHED or len(frame.themes) > 1
+                wishes = "move" in frame.senses and not phrases and not fetched
+                frame = self.places.relations.attached(frame, wishes)
                 if phrases:
                     if phrases[0].phrase.type != "robot":
                         self._check_who(who)
@@ -149,6 +165,8 @@ class Commands:
     def _sense(self, frame: Frame, who: Sequence[Subject] | None) -> None:
         senses = frame.senses
         self.scene.said.verb = frame.verb
+        if len(frame.themes) == 2:
+            self.scene.said.offer = self._clause
         if not senses & {"move", "go", "give"}:
             self.scene.said.again = self._clause
         self.scene.said.elliptic = "move" if senses & {"move", "go", "give"} else ""

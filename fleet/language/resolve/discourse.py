@@ -52,8 +52,12 @@ class Discourse:
     """Goals that ended with their sentence, for which a time or condition was said."""
     again: Any = None
     """The verb and arguments of the last clause: "and then the second one"."""
+    clauses: int = 0
+    """How many clauses of the sentence there were that ask for or say something."""
     remarks: list[str] = field(default_factory=list)
     """Clauses that ask for nothing."""
+    offer: Any = None
+    """The last clause that named who shall have what: "bring Anna a cup and Ben a mug"."""
     began: int = 0
     ended: int = 0
     facts: dict[FactKey, Value] = field(default_factory=dict)

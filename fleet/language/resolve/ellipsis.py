@@ -39,14 +39,17 @@ class Continuations:
             return self.claims.placed(clause.subject, clause.arguments)
         said = self.scene.said
         self.places_are_known(clause)
+        if not said.elliptic and said.clauses:
+            raise NotUnderstood(f"{said.clause!r} does not say what shall be done with it")
         if not said.elliptic:
             said.telegraphic = True
+            said.elliptic = "move"
         frame, beneficiary = self.wishes.for_whom(framed(clause.arguments))
         if beneficiary is not None and not frame.places:
             return self._to_person(clause.subject, beneficiary)
         who = self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
-        verb = self.scene.said.verb.split() if self.scene.said.elliptic == "move" else [""]
-        fetching = verb[0] in self.scene.tagger.book.fetching
+        verb = said.verb.split()[:1] if said.elliptic == "move" else []
+        fetching = bool(verb) and verb[0] in self.scene.tagger.book.fetching
         where, home = self.wishes.whereto(framed(clause.arguments), each=True, fetching=fetching)
         return self.wishes.to_target(who, where, home)
 

@@ -11,6 +11,7 @@ from fleet.language.tagging.skill_words import SKILL, SkillFrame
 from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.nodes import (
     Argument,
+    Contrast,
     Except,
     Nouns,
     Particle,
@@ -53,6 +54,9 @@ def framed(
 ) -> Frame:
     """The arguments of a clause, sorted."""
     themes = [a for a in arguments if isinstance(a, Nouns)]
+    for contrast in (a.what for a in arguments if isinstance(a, Contrast)):
+        if not any(isinstance(a, type(contrast)) and a != contrast for a in arguments):
+            raise NotUnderstood("'not' leaves something out, and it is not said of what")
     for left_out in (a for a in arguments if isinstance(a, Except)):
         if not themes:
             raise NotUnderstood("'except' leaves something out, and it is not said of what")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import listed, reason_for
+from fleet.language.refusals import listed
 from fleet.language.resolve.frames import Frame
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Subject
@@ -41,9 +41,7 @@ class Going:
         if via := [p for p in frame.places if p.role == "via" and p.nouns is not None]:
             return self._by_way_of(frame, via, who)
         if other := [p for p in frame.places if p.role not in WHERE]:
-            shown = [(word, word) for word in other[0].preposition.split()]
-            text = self.scene.said.quote(other[0].first, other[0].last)
-            raise NotUnderstood(reason_for(shown) or f"{text!r} is not understood")
+            raise self.places.relations.unknown(other[0])
         where, _ = self.wishes.whereto(frame)
         if where.target is None or where.target_type == "robot":
             known = listed(self.scene.lexicon.known(("place",)))

@@ -6,25 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from fleet.errors import NotUnderstood
-from fleet.language.refusals import one_of, reason_for
+from fleet.language.refusals import one_of
 from fleet.language.resolve.frames import EXAMPLE
 from fleet.language.resolve.mentions import Mention, NounPhrase, WhichOne
 from fleet.language.resolve.nouns import NounResolver
 from fleet.language.resolve.referents import Referents
+from fleet.language.resolve.relations import SPATIAL, Relations
 from fleet.language.resolve.scene import PLACES, SPOTS, THINGS, Scene
 from fleet.language.tagging.lexicon import EntityType
-from fleet.language.tree.nodes import (
-    Noun,
-    Nouns,
-    Place,
-    Quantity,
-)
-from keyexpr_schema.facts import (
-    AT,
-    IN,
-    ON,
-    FactKey,
-)
+from fleet.language.tree.nodes import Noun, Nouns, Place, Quantity
+from keyexpr_schema.facts import AT, IN, ON, FactKey
 from keyexpr_schema.payloads.world import Feature
 
 _ON = frozenset({"on", "onto", "top"})
@@ -70,6 +61,7 @@ class PlaceResolver:
         self.scene = scene
         self.who = who
         self.nouns = nouns
+        self.relations = Relations(scene, who, nouns)
         nouns.located = self.located
 
     def locative(self, place: Place) -> Locative:
@@ -82,8 +74,7 @@ class PlaceResolver:
         words = frozenset(place.preposition.split())
         text = self.scene.said.quote(place.first, place.last)
         if place.role not in WHERE:
-            shown = [(word, word) for word in place.preposition.split()]
-            raise NotUnderstood(reason_for(shown) or f"{text!r} is not understood")
+            raise self.relations.unknown(place)
         if place.special == "there":
             return Locative(place.role, self._there(place, text), words)
         if place.special == "where" and place.nouns is not None:
@@ -207,6 +198,10 @@ class PlaceResolver:
             if not owner.found:
                 raise NotUnderstood("no robot with a basket is known")
             return owner
+        word = self.scene.said.tokens[noun.last - 1].word
+        called = self.scene.tagger.entities((word,)) if word != "basket" else ()
+        if any(e.type == "object" for e in called):
+            raise NotUnderstood(f"{text!r} is a thing of its own")
         found = tuple(
             e for e in self.scene.lexicon.entities if e.type == "robot" and e.id in owners
         )
@@ -317,11 +312,14 @@ class PlaceResolver:
     def located(self, noun: Noun, made: NounPhrase) -> NounPhrase:
         """The same with where its own words say that it is: "the cup that is on the table"."""
         places = [*noun.places, *(p for r in noun.relatives for p in r.places)]
+        made = self.relations.told_apart(noun, made)
+        places = [place for place in places if place.role not in SPATIAL]
         if not places:
             return made
         for relative in noun.relatives:
-            if relative.negated:
-                gone = self.where([self.locative(p) for p in relative.places]).target or ""
+            inside = [p for p in relative.places if p.role not in SPATIAL]
+            if relative.negated and inside:
+                gone = self.where([self.locative(p) for p in inside]).target or ""
                 self.scene.said.last_place = gone or self.scene.said.last_place
                 return made.among(
                     [n for n in made.names if not self.scene.vocabulary.is_at(n, gone)]

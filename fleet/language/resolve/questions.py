@@ -214,6 +214,22 @@ class Questions:
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say what may be so")
         return self.asks(Question("whether", (), rows))
 
+    def on_whether_or(self, clause: Clause) -> None:
+        """`is the door locked or unlocked?`"""
+        assert clause.subject is not None
+        words = [word for word in clause.words if "ADJ" in word.tags]
+        names = [
+            name
+            for subject in self.nouns.subjects(clause.subject, THINGS, "an object or a robot")
+            for name in self.who.resolve(subject).subjects
+        ]
+        first, other = (self.scene.stated.wants(word, names[0]) for word in words)
+        if len(first) != 1 or first == other or [r for r, _ in first] != [r for r, _ in other]:
+            raise NotUnderstood(f"{self.scene.said.clause!r} asks two things: ask one at a time")
+        ((relation, value),) = first
+        rows = (Condition(relation=relation, subject=name, value=value) for name in names)
+        self.asks(Question("whether", (), tuple(rows)))
+
     def on_whether_any(self, clause: Clause) -> None:
         assert clause.subject is not None
         if any(n.count is not None for n in clause.subject.items):

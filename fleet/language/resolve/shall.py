@@ -79,6 +79,8 @@ class Shall:
             )
         who = self.nouns.subjects(subject, THINGS, "an object or a robot")
         frame = framed(predicate.arguments if predicate is not None else arguments)
+        if self.wishes.beside(who, frame):
+            return None
         where, home = self.wishes.whereto(frame, each=True)
         return self.wishes.to_target(who, where, home)
 
@@ -157,6 +159,7 @@ class Shall:
         """`Ben needs a screwdriver`, `Anna is in the garden and wants it`."""
         assert clause.subject is not None
         wanted = next((a for a in clause.arguments if isinstance(a, Nouns)), None)
+        places = [a for a in clause.arguments if isinstance(a, Place)]
         if wanted is None:  # it was said before who
             wanted = clause.subject
             names = [n for m in self.scene.said.recent for n in m.subjects]
@@ -166,6 +169,8 @@ class Shall:
         if wanted is None or len(names) != 1 or not self.scene.vocabulary.is_person(names[0]):
             raise NotUnderstood(f"{self.scene.said.clause!r} does not say what shall be so")
         things = self.nouns.subjects(wanted, ("object",), "an object")
+        if places:  # that is where it shall be
+            return self.wishes.to_target(things, *self.wishes.whereto(framed(places)))
         where = replace(self.places.where([]), target=names[0], target_type="object")
         self.scene.said.spoken_of(names)
         return self.wishes.to_target(things, where, False)

@@ -59,6 +59,8 @@ class GoalDraft:
     stages: list[list[Wish]] = field(default_factory=lambda: [[]])
     by: tuple[str, ...] = ()
     """The robots that are told to do what is wished for now."""
+    held: list[list[Wish]] = field(default_factory=list)
+    """Stages that come after what is wished for now, though they were said before."""
 
     @property
     def empty(self) -> bool:
@@ -81,7 +83,19 @@ class GoalDraft:
 
     def copy(self) -> GoalDraft:
         """The same, to go on from."""
-        return GoalDraft(self.is_at, [list(stage) for stage in self.stages], self.by)
+        held = [list(stage) for stage in self.held]
+        return GoalDraft(self.is_at, [list(stage) for stage in self.stages], self.by, held)
+
+    def hold(self) -> None:
+        """What comes now is wanted before what was said last."""
+        self.held, self.stages = [*self.stages[-1:]], [*self.stages[:-1], []]
+
+    def release(self) -> None:
+        """What comes now is wanted after what was held."""
+        if self.held:
+            self.next_stage()
+            self.stages[-1:] = [*filter(None, self.stages[-1:]), *self.held]
+            self.held = []
 
     def next_stage(self) -> None:
         """What comes now is wanted after all that came."""
@@ -242,7 +256,10 @@ def _sequenced(stage: Sequence[Wish]) -> list[list[Wish]]:
     split: list[list[Wish]] = [[]]
     for wish in stage:
         last = split[-1][-1] if split[-1] else None
-        if last is not None and last.means and not wish.means:
+        sent = last is not None and last.relation == AT and last.by is None
+        if last is not None and sent and wish.by and set(last.subjects) <= set(wish.by):
+            split.append([])  # "Rosie, go to the kitchen and fetch …"
+        elif last is not None and last.means and not wish.means:
             if wish.relation == SEARCHED and wish.subjects == (last.value,):
                 split[-1].pop()
             else:

@@ -121,6 +121,8 @@ class Stated:
 
     def _most(self, noun: NounPhrase, word: str) -> NounPhrase:
         """The one of which a measure is greatest or least."""
+        if len(noun.names) == 1:
+            return noun
         measured: dict[str, float] = {}
         for name in noun.names:
             thing = self.vocabulary.objects.get(name)

@@ -13,6 +13,7 @@ from fleet.language.resolve.mentions import Mention, NounPhrase
 from fleet.language.resolve.scene import THINGS
 from fleet.language.resolve.wishes import Wishes
 from fleet.language.tree.nodes import (
+    Noun,
     Nouns,
 )
 from keyexpr_schema.facts import IN
@@ -36,7 +37,7 @@ class Tidiness:
         names = tuple(homes)
         house = any(p.special == "house" for p in frame.places)
         theme = frame.themes[0] if frame.themes else None
-        whole = theme is not None and len(theme.items) == 1 and theme.items[0].form == "general"
+        whole = theme is not None and len(theme.items) == 1 and _everything(theme.items[0])
         if theme is not None and not (whole and not frame.places):
             if whole or (self._about_things(theme) and not self._furniture(theme)):
                 return self.wishes.move(replace(frame, senses=frame.senses | {"tidy", "move"}))
@@ -167,3 +168,9 @@ class Tidiness:
                 "say where to bring it"
             )
         return names
+
+
+def _everything(noun: Noun) -> bool:
+    """Whether it is everything, of no kind and nowhere in particular."""
+    narrowed = noun.relatives or noun.places or noun.but or noun.adjectives or noun.use
+    return noun.form == "general" and not narrowed

@@ -11,6 +11,7 @@ from fleet.language.resolve.frames import EXAMPLE, HOME_HINT, Frame
 from fleet.language.resolve.ground import Ground
 from fleet.language.resolve.mentions import Mention, NounPhrase, Subject
 from fleet.language.resolve.places import Locative, Where
+from fleet.language.resolve.relations import SPATIAL
 from fleet.language.resolve.scene import THINGS
 from fleet.language.tagging.lexicon import EntityType
 from fleet.language.tree.nodes import (
@@ -64,6 +65,8 @@ class Wishes:
         if moved_more:
             frame = replace(frame, places=tuple(p for p in frame.places if p.role != "along"))
             moved += [s for n in moved_more for s in self.nouns.subjects(n, THINGS, "an object")]
+        if self.beside(moved, frame):
+            return None
         fetching = frame.verb.split()[0] in self.scene.tagger.book.fetching
         fetching = fetching or self._lies_there(frame, moved)
         where, home = self.whereto(frame, each=not give, fetching=fetching)
@@ -92,6 +95,24 @@ class Wishes:
         if (fetch or brings) and not whereto:
             return self._fetched(moved, where, frame.senses)
         return self.to_target(moved, where, home or (tidy and where.target is None))
+
+    def beside(self, moved: Sequence[Subject], frame: Frame) -> bool:
+        """Whether it says that these shall be next to something, and a skill does that."""
+        relations = self.places.relations
+        where = next((p for p in frame.places if p.role in SPATIAL and relations.made(p)), None)
+        if where is None or any(subject.type == "robot" for subject in moved):
+            return False
+        if len(frame.places) > 1 or frame.particle_words - _LOOSE:
+            raise NotUnderstood(f"{self.scene.said.clause!r} says twice where to: say one")
+        landmark = relations.landmark(where)
+        mentions = [self.who.resolve(self.who.movable(subject)) for subject in moved]
+        for mention in mentions:
+            kept = tuple(name for name in mention.subjects if name != landmark)
+            if not kept:
+                raise NotUnderstood(f"nothing can be {where.preposition} itself: say what else")
+            self.scene.said.draft.add(where.role, replace(mention, subjects=kept), landmark)
+        self.scene.said.remember(mentions)
+        return True
 
     def for_whom(self, frame: Frame) -> tuple[Frame, str | None]:
         """The frame without "for Anna"; for whom it is, if that is known."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from fleet.language.methods.model import NUMBER, PERSON, CompoundTask
@@ -11,7 +11,7 @@ from fleet.language.methods.patterns import ARTICLES, Row, Slot, rows_of
 from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.vocabulary import Vocabulary
 from fleet.language.words.morphology import gerund
-from fleet.language.words.tokens import Token, number_of
+from fleet.language.words.tokens import Phrase, Token, number_of
 
 _BEGINS = frozenset(
     {
@@ -88,11 +88,13 @@ class TaskPhrases:
         first = lexemes[at].first
         word = tokens[first].word
         doing = word not in self._rows and word in self._gerunds
+        rows = self._rows.get(self._gerunds[word] if doing else word, ())
         best: tuple[int, CompoundTask, dict[str, str]] | None = None
-        for task, row in self._rows.get(self._gerunds[word] if doing else word, ()):
-            for end, given in _matches(row[1:], tokens, first + 1, text, names):
-                if (best is None or end > best[0]) and self._ends(lexemes, end):
-                    best = end, task, given
+        for can_be in (names.can_be, names.are_unheard_of):
+            for task, row in rows if best is None else ():
+                for end, given in _matches(row[1:], tokens, first + 1, text, can_be):
+                    if (best is None or end > best[0]) and self._ends(lexemes, end):
+                        best = end, task, given
         if best is None:
             return None
         last, task, given = best
@@ -165,21 +167,35 @@ class _Names:
     def __init__(self, vocabulary: Vocabulary, tagger: Tagger) -> None:
         self._vocabulary, self._tagger = vocabulary, tagger
 
-    def can_be(self, words: tuple[str, ...], of: str) -> bool:
+    def can_be(self, words: Phrase, of: str) -> bool:
         """Whether the words can mean something of that type."""
         if of == NUMBER:
             return len(words) == 1 and (number_of(words[0]) or 0) > 0
-        phrases = self._tagger.book.phrases
-        if of == PERSON and "ME" in phrases.get(words, ()):
+        if of == PERSON and "ME" in self._tagger.book.phrases.get(words, ()):
             return True
+        things = self._vocabulary.of_type(of)
+        return any(e.id in things for e in self._tagger.entities(self._bare(words)))
+
+    def are_unheard_of(self, words: Phrase, of: str) -> bool:
+        """Whether they can, or one of them is known to nobody: the method's sentences then are
+        refused by its name."""
+        if self.can_be(words, of):
+            return True
+        words, phrases = self._bare(words), self._tagger.book.phrases
+        plain = (phrases.get((word,), frozenset()) <= {"EVERYDAY"} for word in words)
+        known = all(self._tagger.entities((word,)) for word in words)
+        return of != NUMBER and not known and all(plain)
+
+    def _bare(self, words: Phrase) -> Phrase:
+        """Without articles before them."""
+        phrases = self._tagger.book.phrases
         while words and phrases.get(words[:1], frozenset()) & {"DET", "INDEF"}:
             words = words[1:]
-        things = self._vocabulary.of_type(of)
-        return any(e.id in things for e in self._tagger.entities(words)) if words else False
+        return words
 
 
 def _matches(
-    row: Row, tokens: Sequence[Token], at: int, text: str, names: _Names
+    row: Row, tokens: Sequence[Token], at: int, text: str, can_be: Callable[[Phrase, str], bool]
 ) -> Iterator[tuple[int, dict[str, str]]]:
     """Where a row that goes on at a token can end, and what its parameters are then."""
     if not row:
@@ -193,13 +209,13 @@ def _matches(
             words = tuple(token.word for token in tokens[at:end])
             if not words[-1][0].isalnum():
                 return
-            if names.can_be(words, part.type):
+            if can_be(words, part.type):
                 said = " ".join(text[tokens[at].start : tokens[end - 1].end].split())
                 said = words[0] if part.type == NUMBER else said
-                for last, given in _matches(row[1:], tokens, end, text, names):
+                for last, given in _matches(row[1:], tokens, end, text, can_be):
                     yield last, {part.name: said, **given}
         return
     if tokens[at].word == part:
-        yield from _matches(row[1:], tokens, at + 1, text, names)
+        yield from _matches(row[1:], tokens, at + 1, text, can_be)
     elif tokens[at].word in ARTICLES:
-        yield from _matches(row, tokens, at + 1, text, names)
+        yield from _matches(row, tokens, at + 1, text, can_be)

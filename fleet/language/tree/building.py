@@ -9,6 +9,7 @@ from typing import Any
 from fleet.language.tagging.tagger import Lexeme, Tagger
 from fleet.language.tree.nodes import (
     Clause,
+    Contrast,
     Except,
     Noun,
     Nouns,
@@ -80,6 +81,8 @@ class Builder:
     def make_arg(self, children: tuple[Any, ...], start: int, end: int) -> Any:
         if isinstance(children[0], Lexeme) and "COMMA" in children[0].tags:
             children = children[1:]
+        if isinstance(children[0], Lexeme) and "NOT" in children[0].tags:
+            return Contrast(children[1])
         if isinstance(children[0], Lexeme) and "EXCEPT" in children[0].tags and len(children) > 1:
             left_out = self.nouns.left_out(children[1], children[2:])
             return left_out and [(not children[2:], Except(left_out))]

@@ -120,7 +120,14 @@ class Except:
     nouns: Nouns
 
 
-Argument = Nouns | Place | Particle | Except
+@dataclass(frozen=True)
+class Contrast:
+    """`not on the sofa`, beside what is meant."""
+
+    what: Nouns | Place
+
+
+Argument = Nouns | Place | Particle | Except | Contrast
 
 
 @_hashed_once

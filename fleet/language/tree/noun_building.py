@@ -17,7 +17,16 @@ from fleet.language.tree.nodes import (
     Relative,
 )
 
-COSTS = {"bare": 2, "whereto": 2, "named": 6, "told": 1, "being": 0, "item": 5, "unknown": 8}
+COSTS = {
+    "bare": 2,
+    "whereto": 2,
+    "named": 6,
+    "told": 1,
+    "being": 0,
+    "item": 5,
+    "unknown": 8,
+    "paired": 3,
+}
 """How far from plain speech a derivation is: the plainest ones that mean something are meant."""
 _THINGS: frozenset[EntityType] = frozenset({"object", "robot"})
 SPOTS: frozenset[EntityType] = frozenset({"place", "surface", "robot"})
@@ -149,7 +158,7 @@ class NounBuilder:
         if any("PREP" in w.tags and w.words not in (("in",), ("of",)) for w in words):
             return None
         found = determined(tuple(child for child in children if isinstance(child, _Pre)))
-        nouns = [word for word in words if "NOUN" in word.tags]
+        nouns = [w for w in words if "NOUN" in w.tags and "FLOOR" not in w.tags]
         if found is None or not nouns:
             return None
         return self._placed_at(replace(found, head=(nouns[-1],), floor=True), start, end)

@@ -194,7 +194,7 @@ def _of_day(words: Sequence[str]) -> tuple[int, TimePhrase] | None:
         return 3, TimePhrase("start", hour=_PARTS[words[2]], part=words[2])
     if words[0] in ("on", "next") and len(words) > 1 and words[1] in _DAYS:
         day, end = _DAYS.index(words[1]), 2
-        clock_at = _clock(words, 3) if words[2:3] == ["at"] else None
+        clock_at = _clock(words, 3, bare=True) if words[2:3] == ["at"] else None
         hour, minute, end = clock_at or (8, 0, end)
         return end, TimePhrase("start", hour=hour, minute=minute, weekday=day)
     if words[0] == "between":

@@ -132,7 +132,7 @@ from tests.support.language_house import WORDS
             "make sure the book isn't in the kitchen",
             '"isn\'t" says what must not be, or leaves something out',
         ),
-        ("put the book next to the first cup", "'next' names a relation that is not known"),
+        ("put the book next to the first cup", "'next to' names a relation that is not known"),
         ("put the book on the first cup", "'the first cup' is not a known place"),
         ("Bring the book to the sofa", "'the sofa' is not a known place"),
         ("go to the kitchen and the hallway", "'the hallway' is one place too many for one thing"),

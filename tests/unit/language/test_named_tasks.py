@@ -170,6 +170,8 @@ def test_what_a_method_leaves_open_is_asked() -> None:
         ("do tell", "says more than what is to be done"),
         ("do nothing", "'do nothing' cannot be done here: 'the unicorn'"),
         ("air the garage", "'air the garage' cannot be done here: "),
+        ("air the ballroom", "'air the ballroom' cannot be done here: "),
+        ("offer Zorg a drink", "cannot be done here: 'Zorg' is not understood"),
     ],
 )
 def test_what_a_method_must_not_say_is_refused_with_the_tasks_phrase(text: str, words: str) -> None:

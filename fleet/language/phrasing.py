@@ -83,7 +83,8 @@ class Phrasing:
         if known is None or sum(same) > 1:
             return name
         bare = name in words.robots or words.is_person(name) or label[-1:].isdigit()
-        return label if bare else f"the {label.lower() if label.istitle() else label}"
+        plain = label.istitle() or label[1:] == label[1:].lower()
+        return label if bare else f"the {label.lower() if plain else label}"
 
     def _any_of(self, names: Sequence[str]) -> str:
         said = [self.named(name) for name in names[:MOST_NAMED]]

@@ -22,6 +22,8 @@ from fleet.core.plan_entry import PlanningJob
 from fleet.core.standing import standing_constraints
 from fleet.core.state import State
 from fleet.language import Vocabulary
+from fleet.language.words.own_words import OwnWords
+from fleet.language.words.wordbook import wordbook_of
 from keyexpr_schema.facts import SEARCHED, Literal
 from keyexpr_schema.payloads.durations import Durations
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
@@ -93,9 +95,16 @@ class InterpretationInput(WorldInput, frozen=True, kw_only=True, tag="interpret"
     goal: str
     text: str
     refusal: str
-    vocabulary: Vocabulary
+    names: Vocabulary
+    """Without the words of the language."""
+    words: tuple[OwnWords, ...] = ()
+    """What is added to those that are shipped."""
     now: datetime | None = None
     """What clocks showed when it was said."""
+
+    def vocabulary(self) -> Vocabulary:
+        """All that the sentence, and other words for it, can use."""
+        return changed(self.names, language=wordbook_of(self.words))
 
 
 def planning_input(state: State, job: PlanningJob) -> PlanningInput:
@@ -158,7 +167,8 @@ def interpretation_input(state: State, goal: str) -> InterpretationInput:
         text=state.goals[goal].text,
         refusal=state.goal_states[goal].refusal or "",
         now=said_at(state.goals[goal]),
-        vocabulary=changed(
+        words=state.policy.words,
+        names=changed(
             words,
             places=dict(words.places),
             objects=dict(words.objects),
@@ -168,6 +178,7 @@ def interpretation_input(state: State, goal: str) -> InterpretationInput:
             carriers=dict(words.carriers),
             believed=dict(words.believed),
             speaker=state.goals[goal].speaker,
+            language=None,
         ),
     )
 

@@ -15,6 +15,7 @@ from fleet.core.model.recurrence import recurrence_of, said_at
 from fleet.core.state import State
 from fleet.errors import NotUnderstood
 from fleet.language import Ambiguity, Reading, Vocabulary, WantedGoal, read
+from fleet.language.phrasing import Phrasing
 from keyexpr_schema.facts import LOCATED, NOTHING, Value
 from keyexpr_schema.payloads.goals import Condition, Goal, GoalState, GoalStatus
 
@@ -82,7 +83,7 @@ def _taken(state: State, goal: Goal, status: GoalStatus, found: Reading | Ambigu
     parts = [(_in_force(goal, each, said_s), _means(status, each)) for each in wanted]
     for part, means in parts:
         _check(state, part, means)
-    said = None if goal.conditions else found.understood_as
+    said = None if goal.conditions else Phrasing(state.vocabulary()).reading(found)
     read = {"understood": said, "note": _note(state, found)}
     if len(parts) > 1:
         status = replace(status, state=GoalState.STANDING, **read)
@@ -152,7 +153,7 @@ def _in_other_words(
         return Understood(_rejected(status, f"{refusal}; {said}: {error}"), goal)
     if read.status.candidates:
         return Understood(_rejected(read.status, f"{said}: {read.status.reason}"), goal)
-    meaning = read.status.understood or ""
+    meaning = read.reading.understood_as
     wanted = [row for stage in read.status.stages for row in stage]
     wanted += (row for _, part in read.parts for stage in part.stages for row in stage)
     wanted += (row for goal in (read.goal, *(g for g, _ in read.parts)) for row in goal.constraints)

@@ -84,7 +84,7 @@ class Reader:
         self.remarks: list[str] = []
         self.later: Sequence[Sentence] = ()
         """The sentences after the one that is being read, but for remarks."""
-        self.why = Explanations(text, self.tokens, self.tagger, mode, vocabulary.tasks)
+        self.why = Explanations(text, self.tokens, self.tagger, mode, vocabulary)
         self.line = " ".join(text.split())
 
     def read(self, now: datetime | None) -> list[tuple[int, str, Reading]]:
@@ -166,7 +166,10 @@ class Reader:
                 with suppress(NotUnderstood):
                     return self._clauses(segment, states)
             return self._task(call, states)
-        return self._clauses(segment, states)
+        try:
+            return self._clauses(segment, states)
+        except NotUnderstood as problem:
+            raise self.why.beside_a_task(problem, segment) from None
 
     def _clauses(self, segment: Segment, states: Sequence[_State]) -> list[_State]:
         words = len(segment.words) - 2 * len(tuple(inside_lists(segment.words)))

@@ -76,7 +76,7 @@ def run_planning_job(
 def run_interpretation(given: InterpretationInput, composition: Composition) -> GoalInterpreted:
     """Have a language model say a goal's sentence in other words, at the time of the input."""
     said = composition.paraphraser.paraphrase(
-        given.text, given.refusal, given.vocabulary, given.now, world=given.world()
+        given.text, given.refusal, given.vocabulary(), given.now, world=given.world()
     )
     task = None if isinstance(said, str) else said.task
     return GoalInterpreted(

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from datetime import datetime
+
 import pytest
 
 from fleet.core import events
 from fleet.core.effects import Interpret
+from fleet.core.planning_input import InterpretationInput
 from fleet.core.state import Policy
-from fleet.language import Confirm
+from fleet.language import Confirm, read
+from fleet.language.methods.model import CompoundTask, Method
+from fleet.language.words.own_words import OwnWords
+from fleet.service.planning.messages import HEADER, JOB, frame
 from keyexpr_schema.facts import AT, FactKey
 from keyexpr_schema.payloads.goals import Goal, GoalState
 from keyexpr_schema.payloads.world import Object
@@ -63,12 +69,34 @@ def test_nothing_is_done_before_somebody_says_that_it_is_meant() -> None:
     assert "plan-1" not in model.plans
     means(model, MEANING)
     assert model.goal_state("g") is GoalState.WAITING
-    assert model.goal_states["g"].understood == MEANING
+    assert model.goal_states["g"].understood == "cup 1 is in the hallway"
     assert len(asked(model)) == 1
     model.plan(goals=("g",))
     model.finish()
     assert model.goal_state("g") is GoalState.REACHED
     assert model.state.facts[FactKey(AT, "cup_1")].value == "hallway"
+
+
+def test_what_a_language_model_needs_goes_to_its_process_and_back() -> None:
+    words = OwnWords(lists={"POLITE": ("mon ami",)})
+    model = FleetModel((manipulator(), carrier()), 2)
+    method = Method(do=(("find cup 1",),))
+    policy = Policy(
+        interpreter=True,
+        words=(words,),
+        tasks=(CompoundTask(name="tea", says=("make tea",), methods=(method,)),),
+    )
+    model.receive(events.PlannerStarted, epoch=2, incarnation="x", policy=policy)
+    said_at = "2026-05-01T14:00:00+02:00"
+    model.receive(events.GoalPut, goal=Goal(goal="g", text=ODD, said_at=said_at))
+    (effect,) = asked(model)
+    given = JOB.decode(frame(effect.given)[HEADER.size :])
+    assert given == effect.given
+    assert isinstance(given, InterpretationInput)
+    assert given.now == datetime.fromisoformat(said_at)
+    there = given.vocabulary()
+    assert read("Bring cup 1 to the hallway, mon ami, at 3 pm.", there, given.now)
+    assert read("Make tea.", there)
 
 
 def test_what_is_said_to_be_meant_must_be_what_was_offered() -> None:
@@ -138,7 +166,7 @@ def test_never_takes_it_at_once_and_says_so() -> None:
     model = model_with(Confirm.NEVER)
     says(model, PLAIN)
     status = model.goal_states["g"]
-    assert (status.state, status.understood) == (GoalState.WAITING, MEANING)
+    assert (status.state, status.understood) == (GoalState.WAITING, "cup 1 is in the hallway")
     assert (status.paraphrase, status.reason) == (PLAIN, None)
 
 

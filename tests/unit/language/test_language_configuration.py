@@ -41,7 +41,7 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     [
         (
             "language: {confirm: maybe}",
-            "'maybe' - at `language.confirm`; it is one of always, coarse",
+            "'maybe' - at `language.confirm`; it is one of",
         ),
         ("language: {confirm: true}", "at `language.confirm`; it is one of always, coarse, never"),
         ("language: {confirmed: always}", "no field confirmed; its fields are confirm"),
